@@ -1,0 +1,1 @@
+"""What a check cell uses: `launch`, the expectations, the values that vary."""

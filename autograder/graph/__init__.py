@@ -1,0 +1,1 @@
+"""Watches the ROS graph from outside the student's process."""

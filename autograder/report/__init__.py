@@ -1,0 +1,1 @@
+"""The views of a result: HTML, terminal and JUnit; JSON is the result itself."""

@@ -1,0 +1,146 @@
+"""The result of grading one submission: the one object behind the notebook, terminal, JSON and JUnit views.
+
+The JSON form is versioned by `SCHEMA_VERSION`. It is written by stage A (running) and read by stage B (nbgrader).
+"""
+
+from __future__ import annotations
+
+import os
+from enum import StrEnum
+from pathlib import Path
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from autograder import __version__
+
+SCHEMA_VERSION = 1
+
+
+class Status(StrEnum):
+    """What became of one expectation."""
+
+    PASSED = "passed"
+    FAILED = "failed"
+    NOT_CHECKED = "not checked"
+    """Something earlier in the same check failed, so this was not looked at."""
+    UNKNOWN = "could not find out"
+    """The grader itself failed. No points are taken; the instructor decides."""
+
+
+class Isolation(StrEnum):
+    """How a student's programs were kept away from everything else."""
+
+    FULL = "full"
+    """bubblewrap: own user, process, IPC and network namespaces, seccomp, limits."""
+    REDUCED = "reduced"
+    """Landlock, seccomp and limits; the network and the process list are shared."""
+    NONE = "none"
+    """No isolation at all: plain child processes with limits."""
+
+
+class _Model(BaseModel):
+    model_config = ConfigDict(extra="forbid")
+
+
+class Outcome(_Model):
+    """One expectation and what came of it, worded for a student."""
+
+    status: Status
+    title: str
+    """The expectation as a short sentence: `node /talker is on the graph`."""
+    expected: str = ""
+    observed: str = ""
+    because: str = ""
+    """The first broken link of the chain, as a sentence."""
+    hint: str = ""
+    """What to look at next, and where to read on."""
+    code: str = ""
+    """A short stable word for the reason, such as `qos-reliability`; tests and statistics use it."""
+    hidden: bool = False
+    """It stems from a hidden test: students see that it failed and the hint, nothing else."""
+
+
+class CheckResult(_Model):
+    """One check cell: its outcomes and its points."""
+
+    grade_id: str
+    title: str = ""
+    max_points: float
+    points: float | None = None
+    """None: the grader could not find out; an instructor decides."""
+    seconds: float = 0.0
+    outcomes: list[Outcome] = Field(default_factory=list)
+
+    @property
+    def status(self) -> Status:
+        """The worst outcome: could not find out, then failed, then passed."""
+        statuses = {outcome.status for outcome in self.outcomes}
+        if self.points is None or Status.UNKNOWN in statuses:
+            return Status.UNKNOWN
+        return Status.FAILED if statuses - {Status.PASSED} else Status.PASSED
+
+    @property
+    def first_failure(self) -> Outcome | None:
+        """The outcome that decided, if the check did not pass."""
+        return next((o for o in self.outcomes if o.status in (Status.FAILED, Status.UNKNOWN)), None)
+
+
+class NodeLog(_Model):
+    """What one program of the student's printed, capped, and how it ended."""
+
+    program: str
+    grade_id: str = ""
+    """The check cell that launched it."""
+    text: str = ""
+    truncated: bool = False
+    exit_status: int | None = None
+    """None: it was still running when the check stopped it. Negative: the number of the signal that ended it."""
+    stopped_by: str = ""
+    """The limit that ended it, such as `memory limit`; empty if none did."""
+
+
+class SubmissionResult(_Model):
+    """Everything that is known of one graded submission."""
+
+    schema_version: int = SCHEMA_VERSION
+    kit_version: str = __version__
+    student: str
+    lab: str
+    digest: str
+    """SHA-256 over the submission's files and the lab's source: it changes when either does."""
+    isolation: Isolation
+    seed: int = 0
+    """Seed of the values that differ from run to run."""
+    problems: list[Outcome] = Field(default_factory=list)
+    """What is wrong with the submission as a whole: a broken notebook, a forged cell."""
+    checks: list[CheckResult] = Field(default_factory=list)
+    logs: list[NodeLog] = Field(default_factory=list)
+    seconds: dict[str, float] = Field(default_factory=dict)
+    """Durations in seconds, by step."""
+
+    @property
+    def points(self) -> float:
+        """Points earned so far; a check nobody could decide counts 0 until an instructor does."""
+        return sum(check.points or 0.0 for check in self.checks)
+
+    @property
+    def max_points(self) -> float:
+        """Points that the automatic checks can give."""
+        return sum(check.max_points for check in self.checks)
+
+    @property
+    def needs_instructor(self) -> bool:
+        """Whether a person has to look at it."""
+        return any(check.status is Status.UNKNOWN for check in self.checks)
+
+    def save(self, path: Path) -> None:
+        """Write the result as JSON, whole or not at all."""
+        path.parent.mkdir(parents=True, exist_ok=True)
+        beside = path.with_name(f".{path.name}.{os.getpid()}")
+        beside.write_text(self.model_dump_json(indent=1) + "\n", encoding="utf-8")
+        beside.replace(path)
+
+    @classmethod
+    def load(cls, path: Path) -> SubmissionResult:
+        """Read a result; pydantic's ValidationError if it is not one of this schema version."""
+        return cls.model_validate_json(path.read_text(encoding="utf-8"))
