@@ -1,0 +1,142 @@
+"""The observer: one node, in a context of its own, that watches the graph of one launch.
+
+It is not a student's node and shares no process with one. It stays quiet: no parameter services, no /rosout.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from typing import Any
+
+import rclpy
+from rclpy.context import Context
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.qos import QoSProfile
+from rclpy.topic_endpoint_info import TopicEndpointInfo
+
+from autograder.graph.names import full_name
+from autograder.graph.recording import Recording, quiet_profile
+
+POLL = 0.02
+"""Seconds between two looks at the graph while waiting: rclpy reports messages, but not every graph change."""
+
+OBSERVER_NAME = "grading_observer"
+
+
+class Observer:
+    """Watches one ROS domain.
+
+    Args:
+        domain_id: the domain of the launch, 0 to 101.
+    """
+
+    def __init__(self, domain_id: int) -> None:
+        """Join the domain and start to spin in a thread of its own."""
+        self.domain_id = domain_id
+        self.changed = threading.Condition()
+        self._context = Context()
+        rclpy.init(context=self._context, domain_id=domain_id, args=[])
+        # The random end keeps a student's node from taking this name by chance or by guess.
+        self.name = f"{OBSERVER_NAME}_{time.monotonic_ns() % 0xFFFFFF:06x}"
+        self.node: Node = rclpy.create_node(
+            self.name,
+            context=self._context,
+            start_parameter_services=False,
+            enable_rosout=False,
+            enable_logger_service=False,
+            use_global_arguments=False,
+        )
+        self._executor = SingleThreadedExecutor(context=self._context)
+        self._executor.add_node(self.node)
+        self._recordings: dict[tuple[str, str], Recording] = {}
+        self._thread = threading.Thread(target=self._spin, name="observer", daemon=True)
+        self._thread.start()
+
+    def _spin(self) -> None:
+        try:
+            self._executor.spin()
+        except ExternalShutdownException:
+            pass
+
+    def close(self) -> None:
+        """Leave the domain. The thread is joined: a daemon thread that still spins at exit aborts the process."""
+        self._executor.shutdown(timeout_sec=2.0)
+        rclpy.try_shutdown(context=self._context)
+        self._thread.join(timeout=5.0)
+        self.node.destroy_node()
+        self._context.try_shutdown()
+
+    def notify(self) -> None:
+        """Wake whoever waits: something happened."""
+        with self.changed:
+            self.changed.notify_all()
+
+    def wait(self, ready: Callable[[], object], within: float, give_up: Callable[[], bool] | None = None) -> bool:
+        """Wait until `ready()` is true; at most `within` seconds, less if `give_up()` says that nothing can change.
+
+        The last look comes after the deadline: a grader that was not scheduled for a while still sees what is there.
+        """
+        deadline = time.monotonic() + within
+        while True:
+            late = time.monotonic() >= deadline or (give_up is not None and give_up())
+            if ready():
+                return True
+            if late:
+                return False
+            with self.changed:
+                self.changed.wait(min(POLL, max(0.0, deadline - time.monotonic())))
+
+    def nodes(self) -> list[str]:
+        """Full names of all nodes but the observer, one entry per node: two nodes of one name are listed twice."""
+        found = self.node.get_node_names_and_namespaces()
+        return sorted(full_name(namespace, name) for name, namespace in found if name != self.name)
+
+    def topics(self) -> dict[str, list[str]]:
+        """Topics and their type names, those that only the observer uses left out."""
+        return {
+            name: types
+            for name, types in self.node.get_topic_names_and_types()
+            if self.publishers(name) or self.subscriptions(name)
+        }
+
+    def publishers(self, topic: str) -> list[TopicEndpointInfo]:
+        """Publishers of a topic, the observer's own left out."""
+        return [end for end in self.node.get_publishers_info_by_topic(topic) if end.node_name != self.name]
+
+    def subscriptions(self, topic: str) -> list[TopicEndpointInfo]:
+        """Subscriptions to a topic, the observer's own left out."""
+        return [end for end in self.node.get_subscriptions_info_by_topic(topic) if end.node_name != self.name]
+
+    def services(self) -> dict[str, list[str]]:
+        """Services of all nodes but the observer, with their type names."""
+        found: dict[str, list[str]] = {}
+        for name, namespace in self.node.get_node_names_and_namespaces():
+            if name != self.name:
+                try:
+                    pairs = self.node.get_service_names_and_types_by_node(name, namespace)
+                except Exception:  # the node went away between the two questions (rclpy raises NodeNameNonExistentError)
+                    continue
+                found.update(pairs)
+        return found
+
+    def record(self, topic: str, msg_type: type, qos: QoSProfile | None = None) -> Recording:
+        """Subscribe to a topic and keep every message; the same topic and profile share one recording.
+
+        Args:
+            topic: full name.
+            msg_type: message class.
+            qos: the subscription's profile; by default best effort and volatile with a deep queue, which hears
+                every publisher whatever it offers.
+        """
+        profile = qos or quiet_profile()
+        key = (topic, repr(profile))
+        if key not in self._recordings:
+            self._recordings[key] = Recording(self, topic, msg_type, profile)
+        return self._recordings[key]
+
+    def publisher(self, topic: str, msg_type: type, qos: QoSProfile) -> Any:
+        """Make a publisher of the observer's."""
+        return self.node.create_publisher(msg_type, topic, qos)

@@ -1,0 +1,59 @@
+"""QoS as the graph shows it, and which policy keeps two endpoints apart."""
+
+from __future__ import annotations
+
+from rclpy.duration import Duration
+from rclpy.qos import QoSDurabilityPolicy, QoSLivelinessPolicy, QoSProfile, QoSReliabilityPolicy
+
+_INFINITE = 2**62
+"""Nanoseconds from which a duration on the graph means "never": the middleware's own infinity is about 2**63."""
+
+
+def seconds(duration: Duration) -> float | None:
+    """A duration in seconds; None for "never", which the middleware writes as zero or as infinity."""
+    nanoseconds = duration.nanoseconds
+    return None if nanoseconds <= 0 or nanoseconds >= _INFINITE else nanoseconds * 1e-9
+
+
+def describe(profile: QoSProfile) -> dict[str, str | float | None]:
+    """The policies that the graph shows, in words and seconds. History and depth are not among them."""
+    return {
+        "reliability": profile.reliability.name.lower(),
+        "durability": profile.durability.name.lower(),
+        "deadline": seconds(profile.deadline),
+        "lifespan": seconds(profile.lifespan),
+        "liveliness": profile.liveliness.name.lower(),
+        "lease": seconds(profile.liveliness_lease_duration),
+    }
+
+
+def first_mismatch(offered: QoSProfile, requested: QoSProfile) -> str | None:
+    """The first policy over which a publisher (offered) and a subscription (requested) do not match; None if they do.
+
+    Source: the DDS rule that a request must not be stricter than the offer, for reliability, durability, deadline,
+    liveliness and its lease.
+    """
+    if (
+        requested.reliability == QoSReliabilityPolicy.RELIABLE
+        and offered.reliability == QoSReliabilityPolicy.BEST_EFFORT
+    ):
+        return "reliability"
+    if (
+        requested.durability == QoSDurabilityPolicy.TRANSIENT_LOCAL
+        and offered.durability == QoSDurabilityPolicy.VOLATILE
+    ):
+        return "durability"
+    if _longer(seconds(offered.deadline), seconds(requested.deadline)):
+        return "deadline"
+    if (
+        requested.liveliness == QoSLivelinessPolicy.MANUAL_BY_TOPIC
+        and offered.liveliness == QoSLivelinessPolicy.AUTOMATIC
+    ):
+        return "liveliness"
+    if _longer(seconds(offered.liveliness_lease_duration), seconds(requested.liveliness_lease_duration)):
+        return "liveliness lease"
+    return None
+
+
+def _longer(offered: float | None, requested: float | None) -> bool:
+    return requested is not None and (offered is None or offered > requested)

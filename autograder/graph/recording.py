@@ -1,0 +1,86 @@
+"""What arrived on one topic."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from rclpy.event_handler import SubscriptionEventCallbacks
+from rclpy.qos import QoSDurabilityPolicy, QoSHistoryPolicy, QoSPolicyKind, QoSProfile, QoSReliabilityPolicy
+
+if TYPE_CHECKING:
+    from autograder.graph.observer import Observer
+
+
+def quiet_profile() -> QoSProfile:
+    """Best effort, volatile, deep queue: compatible with every publisher, and deep enough for a grader that stalls."""
+    return QoSProfile(
+        reliability=QoSReliabilityPolicy.BEST_EFFORT,
+        durability=QoSDurabilityPolicy.VOLATILE,
+        history=QoSHistoryPolicy.KEEP_LAST,
+        depth=5000,
+    )
+
+
+@dataclass(frozen=True)
+class Received:
+    """One message and what the middleware says about it."""
+
+    msg: Any
+    received: float
+    """When the observer took it, seconds on the monotonic clock."""
+    stamp: float
+    """When it was published, seconds on the publisher's system clock (same machine, so comparable between topics)."""
+    sequence: int
+    """The publisher's own count of what it has published, from 1."""
+
+
+class Recording:
+    """All messages of a topic since the observer subscribed, in the order of arrival."""
+
+    def __init__(self, observer: Observer, topic: str, msg_type: type, qos: QoSProfile) -> None:
+        """Subscribe; use `Observer.record`, which shares recordings."""
+        self.topic = topic
+        self.msg_type = msg_type
+        self.qos = qos
+        self.incompatible: list[str] = []
+        """Names of QoS policies over which a publisher and this subscription did not match."""
+        self._observer = observer
+        self._messages: list[Received] = []
+        self._subscription = observer.node.create_subscription(
+            msg_type,
+            topic,
+            self._take,
+            qos,
+            event_callbacks=SubscriptionEventCallbacks(incompatible_qos=self._refused, use_default_callbacks=False),
+        )
+
+    def _take(self, msg: Any, info: dict[str, int]) -> None:
+        self._messages.append(
+            Received(msg, time.monotonic(), info["source_timestamp"] * 1e-9, info["publication_sequence_number"])
+        )
+        self._observer.notify()
+
+    def _refused(self, event: Any) -> None:
+        self.incompatible.append(QoSPolicyKind(event.last_policy_kind).name)
+        self._observer.notify()
+
+    @property
+    def messages(self) -> list[Received]:
+        """What has arrived so far: a copy, so that it does not grow while it is looked at."""
+        return list(self._messages)
+
+    @property
+    def count(self) -> int:
+        """Number of messages so far."""
+        return len(self._messages)
+
+    @property
+    def matched(self) -> int:
+        """Number of publishers whose QoS this subscription accepted."""
+        return int(self._subscription.get_publisher_count())
+
+    def wait_for(self, count: int, within: float = 10.0) -> bool:
+        """Wait until at least `count` messages are there; at most `within` seconds."""
+        return self._observer.wait(lambda: self.count >= count, within)
