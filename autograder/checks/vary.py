@@ -1,0 +1,38 @@
+"""Values that differ from run to run, so that an answer which prints a constant does not pass.
+
+They come from the session's seed, which every result records.
+"""
+
+from __future__ import annotations
+
+from typing import TypeVar
+
+from autograder.checks import session
+
+_T = TypeVar("_T")
+_LETTERS = "bcdfghjkmnpqrstvwxz"
+
+
+def token(length: int = 4) -> str:
+    """A random word of lower-case letters."""
+    return "".join(session.current.random.choice(_LETTERS) for _ in range(length))
+
+
+def name(stem: str) -> str:
+    """A ROS name that begins with `stem`: `camera_kxwf`."""
+    return f"{stem}_{token()}"
+
+
+def integer(low: int, high: int) -> int:
+    """A whole number from `low` to `high`, both included."""
+    return session.current.random.randint(low, high)
+
+
+def number(low: float, high: float) -> float:
+    """A number between `low` and `high`, with two decimals."""
+    return round(session.current.random.uniform(low, high), 2)
+
+
+def pick(*values: _T) -> _T:
+    """One of the values."""
+    return session.current.random.choice(values)
