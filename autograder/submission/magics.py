@@ -1,0 +1,72 @@
+"""The first line of an answer cell says which file the rest of the cell is: `%%node talker`, `%%file camera.yaml`."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+CELL_BYTES = 64 * 1024
+"""The largest answer cell that is read, in bytes of UTF-8."""
+
+_NODE_NAME = re.compile(r"[a-z][a-z0-9_]{0,63}")
+_FILE_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}(\.[A-Za-z0-9_-]{1,32})*\.(yaml|yml|json|csv)")
+
+
+class BadNameError(ValueError):
+    """The name in the cell's first line cannot be the name of a file; the message says why, for a student."""
+
+
+@dataclass(frozen=True)
+class CellFile:
+    """A cell that names a file."""
+
+    magic: str
+    """`node` or `file`."""
+    name: str
+    """The name as it stands in the cell."""
+    text: str
+    """The file's text: everything below the first line."""
+
+    @property
+    def file_name(self) -> str:
+        """The file's name in the folder of the submission's programs."""
+        return f"{self.name}.py" if self.magic == "node" else self.name
+
+
+def check_name(magic: str, name: str) -> None:
+    """Refuse every name that is not plainly a program or a data file in the same folder.
+
+    Raises:
+        BadNameError: with the reason.
+    """
+    if not name:
+        example = "talker" if magic == "node" else "camera.yaml"
+        raise BadNameError(f"%%{magic} needs a name, such as `%%{magic} {example}`.")
+    if magic == "node" and not _NODE_NAME.fullmatch(name):
+        raise BadNameError(
+            f"`{name[:80]}` cannot name a program: use small letters, digits and underscores, begin with a letter,"
+            " and leave out `.py`."
+        )
+    if magic == "file" and not _FILE_NAME.fullmatch(name):
+        raise BadNameError(
+            f"`{name[:80]}` cannot name a file: use letters, digits, `-`, `_` and dots, no folder,"
+            " and end in .yaml, .yml, .json or .csv."
+        )
+
+
+def parse(source: str) -> CellFile | None:
+    """Read a cell's first line; None if the cell names no file.
+
+    Raises:
+        BadNameError: it wants to name a file, but not with a name that is allowed.
+    """
+    lines = source.replace("\r\n", "\n").split("\n")
+    while lines and not lines[0].strip():
+        lines.pop(0)
+    match = re.fullmatch(r"%%(node|file)(?:\s+(.*?))?\s*", lines[0]) if lines else None
+    if match is None:
+        return None
+    magic, name = match.group(1), match.group(2) or ""
+    check_name(magic, name)
+    text = "\n".join(lines[1:])
+    return CellFile(magic, name, text if text.endswith("\n") or not text else text + "\n")
