@@ -123,7 +123,7 @@ class LifecycleClient:
     def available(self, within: float = 10.0, give_up: GiveUp = lambda: False) -> Mapping[str, str]:
         """The transitions the node offers now: label of each, and the label of its goal state.
 
-        No state offers two transitions of one label: the three shutdowns leave three different states. Raises as `state`.
+        No state offers two transitions of one label: the three shutdowns leave three states. Raises as `state`.
         """
         reply = self._ask(GetAvailableTransitions, GetAvailableTransitions.Request(), within, give_up)
         return {item.transition.label: item.goal_state.label for item in reply.available_transitions}
