@@ -1,0 +1,303 @@
+"""Stage A: runs submissions, many at once, and keeps a result file for each. It needs no nbgrader and no database.
+
+The instructor's process only reads text here. What a student wrote runs in the sandbox, and comes back as a result that
+is checked against the lab before anyone believes it.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import random
+import signal
+import time
+from collections.abc import Callable, Mapping
+from concurrent.futures import FIRST_COMPLETED, Future, wait
+from dataclasses import dataclass
+from pathlib import Path
+
+from pydantic import ValidationError
+
+from autograder import __version__
+from autograder.errors import KitError
+from autograder.grading.job import Cell, Job
+from autograder.results import SCHEMA_VERSION, CheckResult, Isolation, Outcome, Status, SubmissionResult
+from autograder.submission.lab import Lab
+from autograder.submission.reader import Submission, read_submission
+
+SECONDS_PER_CHECK = 90.0
+"""After this long for each check cell, in seconds, the worker itself is stuck: its own deadlines are shorter."""
+ATTEMPTS = 2
+"""A worker that dies is the grader's fault, so it gets a second chance before an instructor is asked."""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How submissions are run."""
+
+    isolation: Isolation = Isolation.FULL
+    seed: int | None = None
+    """Seed of the values that vary; None draws one for each run."""
+    force: bool = False
+    """Run again even what did not change."""
+    jobs: int = 0
+    """How many run at once; 0 lets the machine decide."""
+
+    @property
+    def parallel(self) -> int:
+        """How many run at once. A run mostly waits for messages, so a core carries several."""
+        return self.jobs or min(16, 3 * (os.cpu_count() or 1))
+
+
+def result_path(root: Path, lab: str, student: str) -> Path:
+    """Where the result of a submission is kept."""
+    return root / "build" / "results" / lab / f"{student}.json"
+
+
+def stored_result(path: Path, digest: str, isolation: Isolation | None = None) -> SubmissionResult | None:
+    """Return the result at `path` if it is of these very answers and this very kit; otherwise None.
+
+    Args:
+        path: of the result's JSON.
+        digest: of the submission as it is now.
+        isolation: that it must have been run with; None accepts any.
+    """
+    try:
+        result = SubmissionResult.load(path)
+    except (OSError, ValueError):
+        return None
+    same = result.digest == digest and result.kit_version == __version__ and result.schema_version == SCHEMA_VERSION
+    return result if same and isolation in (None, result.isolation) else None
+
+
+def run_submission(
+    path: Path, student: str, lab: Lab, settings: Settings, keep_in: Path | None = None
+) -> SubmissionResult:
+    """Read one submission, run its checks in the sandbox, and return what came of it.
+
+    Args:
+        path: of the submitted notebook.
+        student: who handed it in.
+        lab: that it answers.
+        settings: how to run it.
+        keep_in: file to keep the result in, and to take it from if nothing changed; None keeps nothing.
+
+    Raises:
+        KitError: this machine cannot isolate programs as asked.
+    """
+    began = time.monotonic()
+    submission = read_submission(path, lab)
+    if keep_in is not None and not settings.force:
+        stored = stored_result(keep_in, submission.digest, settings.isolation)
+        if stored is not None and not stored.needs_instructor:
+            return stored
+    result = _run(submission, student, lab, settings)
+    result.seconds["total"] = round(time.monotonic() - began, 3)
+    if keep_in is not None:
+        result.save(keep_in)
+    return result
+
+
+def _run(submission: Submission, student: str, lab: Lab, settings: Settings) -> SubmissionResult:
+    job = _job(submission, student, lab, settings)
+    if not submission.readable:
+        return _all_checks(job, [_refused(submission.problems)] * len(lab.checks), points=0.0)
+    for _ in range(ATTEMPTS):
+        result = run_in_worker(job)
+        if not result.needs_instructor:
+            break
+    return result
+
+
+def _job(submission: Submission, student: str, lab: Lab, settings: Settings) -> Job:
+    return Job(
+        student=student,
+        lab=lab.name,
+        digest=submission.digest,
+        isolation=settings.isolation,
+        seed=random.SystemRandom().getrandbits(32) if settings.seed is None else settings.seed,
+        files=submission.files,
+        cells=list(lab.cells),
+        problems=submission.problems,
+    )
+
+
+def _refused(problems: list[Outcome]) -> Outcome:
+    """What every check says of a submission that could not be read."""
+    problem = problems[-1]
+    return problem.model_copy(update={"title": "there is a notebook to check"})
+
+
+def run_in_worker(job: Job) -> SubmissionResult:
+    """Run a job's checks in the sandbox. A worker that dies, hangs or talks nonsense means: could not find out."""
+    from autograder.sandbox.outer import run_in_sandbox
+
+    limit = 60.0 + SECONDS_PER_CHECK * sum(cell.points is not None for cell in job.cells)
+    run = run_in_sandbox(
+        ["autograder.grading.worker"], job.model_dump_json().encode("utf-8"), job.isolation, time_limit=limit
+    )
+    if run.timed_out:
+        return unknown(job, f"The grader took longer than {limit:.0f} s.", run.stderr)
+    try:
+        result = SubmissionResult.model_validate_json(run.stdout)
+    except ValidationError:
+        return unknown(job, f"The grader ended with status {run.status} and no result.", run.stderr)
+    return believed(job, result)
+
+
+def believed(job: Job, result: SubmissionResult) -> SubmissionResult:
+    """Keep of a worker's result what belongs to the job; a check that is missing or impossible is undecided."""
+    if (result.student, result.lab, result.digest) != (job.student, job.lab, job.digest):
+        return unknown(job, "The grader answered for another submission.", "")
+    by_id = {check.grade_id: check for check in result.checks}
+    checks = []
+    for cell in _checks(job):
+        check = by_id.get(cell.grade_id)
+        possible = check is not None and (check.points is None or 0.0 <= check.points <= check.max_points)
+        if check is None or not possible or check.max_points != cell.points:
+            check = _undecided(cell, "The grader returned no usable result for this check.", "")
+        checks.append(check.model_copy(update={"title": cell.title}))
+    return result.model_copy(update={"checks": checks, "isolation": job.isolation, "seed": job.seed})
+
+
+def unknown(job: Job, because: str, stderr: str) -> SubmissionResult:
+    """Return a result in which no check is decided, for an instructor to look at."""
+    outcome = _undecided(Cell(grade_id="", points=0.0, source=""), because, stderr).outcomes[0]
+    return _all_checks(job, [outcome] * len(_checks(job)), points=None)
+
+
+def _checks(job: Job) -> list[Cell]:
+    return [cell for cell in job.cells if cell.points is not None]
+
+
+def _undecided(cell: Cell, because: str, stderr: str) -> CheckResult:
+    outcome = Outcome(
+        status=Status.UNKNOWN,
+        title="the grader finished this check",
+        because=because,
+        observed="\n".join(stderr.strip().splitlines()[-5:])[-1000:],
+        hint="No points are taken. Your instructor decides.",
+        code="no-result",
+    )
+    return CheckResult(
+        grade_id=cell.grade_id, title=cell.title, max_points=cell.points or 0.0, points=None, outcomes=[outcome]
+    )
+
+
+def _all_checks(job: Job, outcomes: list[Outcome], points: float | None) -> SubmissionResult:
+    checks = [
+        CheckResult(
+            grade_id=cell.grade_id, title=cell.title, max_points=cell.points or 0.0, points=points, outcomes=[outcome]
+        )
+        for cell, outcome in zip(_checks(job), outcomes, strict=True)
+    ]
+    return SubmissionResult(
+        student=job.student,
+        lab=job.lab,
+        digest=job.digest,
+        isolation=job.isolation,
+        seed=job.seed,
+        problems=job.problems,
+        checks=checks,
+    )
+
+
+def run_class(
+    submissions: Mapping[str, Path],
+    root: Path,
+    lab: Lab,
+    settings: Settings,
+    on_result: Callable[[SubmissionResult], None],
+) -> dict[str, SubmissionResult]:
+    """Run a class, several submissions at once, and return the results by student.
+
+    Each result is kept as soon as it is there, so that an interrupted run loses only what was running. A run that fails
+    or hangs fails alone.
+
+    Args:
+        submissions: notebook by student.
+        root: of the course; results go to its `build/results`.
+        lab: that they answer.
+        settings: how to run them.
+        on_result: called in this thread for each result as it arrives.
+
+    Raises:
+        KeyboardInterrupt: after every run has been stopped; finished results are kept.
+    """
+    results: dict[str, SubmissionResult] = {}
+    waiting: dict[str, Path] = {}
+    for student, path in submissions.items():
+        stored = None if settings.force else _stored(path, root, lab, student, settings)
+        if stored is None:
+            waiting[student] = path
+        else:
+            results[student] = stored
+            on_result(stored)
+    if waiting:
+        _run_pool(waiting, root, lab, settings, results, on_result)
+    return {student: results[student] for student in submissions}
+
+
+def _stored(path: Path, root: Path, lab: Lab, student: str, settings: Settings) -> SubmissionResult | None:
+    keep_in = result_path(root, lab.name, student)
+    if not keep_in.is_file():
+        return None
+    stored = stored_result(keep_in, read_submission(path, lab).digest, settings.isolation)
+    return None if stored is None or stored.needs_instructor else stored
+
+
+def _run_pool(
+    waiting: dict[str, Path],
+    root: Path,
+    lab: Lab,
+    settings: Settings,
+    results: dict[str, SubmissionResult],
+    on_result: Callable[[SubmissionResult], None],
+) -> None:
+    from pebble import ProcessPool
+
+    # Each run may not be given up before the worker's own limit had its chance, twice.
+    limit = 60.0 + ATTEMPTS * (90.0 + SECONDS_PER_CHECK * len(lab.checks))
+    context = multiprocessing.get_context("forkserver")
+    context.set_forkserver_preload(["autograder.grading.stage_a", "autograder.sandbox.outer"])
+    pool = ProcessPool(
+        max_workers=min(settings.parallel, len(waiting)), context=context, initializer=_ignore_interrupts
+    )
+    try:
+        futures = {
+            pool.schedule(
+                run_submission, args=[path, student, lab, settings, result_path(root, lab.name, student)], timeout=limit
+            ): student
+            for student, path in waiting.items()
+        }
+        open_futures = set(futures)
+        while open_futures:
+            done, open_futures = wait(open_futures, return_when=FIRST_COMPLETED)
+            for future in done:
+                student = futures[future]
+                results[student] = _result_of(future, student, waiting[student], root, lab, settings)
+                on_result(results[student])
+        pool.close()
+    finally:
+        # Ends what still runs; each sandbox dies with the process that started it.
+        pool.stop()
+        pool.join()
+
+
+def _ignore_interrupts() -> None:
+    # A handler, not SIG_IGN: programs started from here begin with the default again, as a student's node must.
+    signal.signal(signal.SIGINT, lambda *_: None)
+
+
+def _result_of(
+    future: Future[SubmissionResult], student: str, path: Path, root: Path, lab: Lab, settings: Settings
+) -> SubmissionResult:
+    try:
+        return future.result()
+    except KitError:
+        raise
+    except Exception as error:  # whatever became of that process, the class goes on
+        job = _job(read_submission(path, lab), student, lab, settings)
+        result = unknown(job, f"The grading process failed: {type(error).__name__}.", str(error))
+        result.save(result_path(root, lab.name, student))
+        return result

@@ -1,0 +1,232 @@
+"""A lab as the instructor wrote it: which cells are trusted, which are answers, and what students receive.
+
+The notebook under `solutions/` is the only source. Where there is none, as in a student's copy of the course, the
+notebook under `labs/` serves: it has the same cells without the hidden tests.
+"""
+
+from __future__ import annotations
+
+import copy
+import hashlib
+import json
+import re
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from autograder.errors import KitError
+from autograder.grading.job import Cell
+from autograder.submission.magics import BadNameError, CellFile, parse
+
+CODE_STUB = "# YOUR CODE HERE"
+"""What students find in place of a solution: a comment in Python and in YAML."""
+TEXT_STUB = "YOUR ANSWER HERE"
+
+_HEADING = re.compile(r"^#{1,6}\s+(.*?)\s*#*\s*$", re.MULTILINE)
+
+
+@dataclass(frozen=True)
+class Answer:
+    """A cell that students fill in."""
+
+    grade_id: str
+    cell_type: str
+    blank: str
+    """The source that students receive."""
+    solution: str
+    """The source that solves it, without the markers."""
+    file: CellFile | None
+    """The file that the blank cell names; None for an answer in plain text."""
+    points: float | None
+    """What a person can give for it; None if it is not graded by hand."""
+
+
+@dataclass(frozen=True)
+class Lab:
+    """A lab, read from its notebook."""
+
+    name: str
+    notebook: Path
+    raw: dict[str, Any]
+    """The notebook's JSON."""
+    cells: tuple[Cell, ...]
+    """The trusted code cells in order, set-up cells and check cells."""
+    answers: dict[str, Answer]
+    """By grade_id, in order."""
+    given: dict[str, str]
+    """Files of locked cells, by file name: programs that students use but do not write."""
+    released: tuple[dict[str, Any], ...]
+    """The cells that students receive."""
+
+    @property
+    def checks(self) -> tuple[Cell, ...]:
+        """The cells that give points."""
+        return tuple(cell for cell in self.cells if cell.points is not None)
+
+    @property
+    def max_points(self) -> float:
+        """Points that the checks can give; answers graded by hand come on top."""
+        return sum(cell.points or 0.0 for cell in self.cells)
+
+    @property
+    def max_manual_points(self) -> float:
+        """Points that a person can give for answers in plain text."""
+        return sum(answer.points or 0.0 for answer in self.answers.values())
+
+    @cached_property
+    def digest(self) -> str:
+        """SHA-256 over everything that can change a result: the trusted cells and the files they use."""
+        parts = [
+            [cell.model_dump(exclude={"title"}) for cell in self.cells],
+            sorted(self.given.items()),
+            [[answer.grade_id, answer.blank] for answer in self.answers.values()],
+        ]
+        return hashlib.sha256(json.dumps(parts).encode()).hexdigest()
+
+    def clean_notebook(self, sources: dict[str, str]) -> dict[str, Any]:
+        """Return the released notebook with these sources in its answer cells: nothing else of a student's is in it."""
+        cells = copy.deepcopy(list(self.released))
+        for cell in cells:
+            grade_id = grade_id_of(cell)
+            if grade_id in self.answers and grade_id in sources:
+                cell["source"] = sources[grade_id]
+        return {
+            "cells": cells,
+            "metadata": copy.deepcopy(self.raw.get("metadata", {})),
+            "nbformat": self.raw.get("nbformat", 4),
+            "nbformat_minor": self.raw.get("nbformat_minor", 5),
+        }
+
+
+def nbgrader_of(cell: dict[str, Any]) -> dict[str, Any]:
+    """Return a cell's nbgrader metadata; empty if it has none, or something else in its place."""
+    metadata = cell.get("metadata")
+    nbgrader = metadata.get("nbgrader") if isinstance(metadata, dict) else None
+    return nbgrader if isinstance(nbgrader, dict) else {}
+
+
+def grade_id_of(cell: dict[str, Any]) -> str:
+    """Return a cell's grade_id; empty if it has none."""
+    grade_id = nbgrader_of(cell).get("grade_id")
+    return encodable(grade_id) if isinstance(grade_id, str) else ""
+
+
+def encodable(text: str) -> str:
+    """Replace what JSON can spell but UTF-8 cannot: halves of surrogate pairs."""
+    return text.encode("utf-8", "replace").decode("utf-8")
+
+
+def source_of(cell: dict[str, Any]) -> str:
+    """Return a cell's source as one string that can be encoded; notebooks hold it as a string or as lines.
+
+    Raises:
+        ValueError: it is neither.
+    """
+    source = cell.get("source", "")
+    if isinstance(source, list) and all(isinstance(line, str) for line in source):
+        source = "".join(source)
+    if not isinstance(source, str):
+        raise ValueError("a cell's source is neither text nor lines of text")
+    return encodable(source).replace("\r\n", "\n")
+
+
+def lab_names(root: Path) -> list[str]:
+    """Return the names of the course's labs, sorted."""
+    found = {
+        p.stem for folder in ("solutions", "labs") for p in (root / folder).glob("*/*.ipynb") if p.parent.name == p.stem
+    }
+    return sorted(found)
+
+
+def load_lab(root: Path, name: str) -> Lab:
+    """Read a lab of the course at `root`.
+
+    Raises:
+        KitError: there is no such lab, or its notebook cannot be used; says which cell.
+    """
+    candidates = [root / folder / name / f"{name}.ipynb" for folder in ("solutions", "labs")]
+    notebook = next((path for path in candidates if path.is_file()), None)
+    if notebook is None or not re.fullmatch(r"[A-Za-z0-9_-]+", name):
+        names = ", ".join(lab_names(root)) or "none"
+        raise KitError(f"This course has no lab `{name}`.", f"Labs in {root}: {names}.")
+    try:
+        raw = json.loads(notebook.read_text(encoding="utf-8"))
+        return _read(name, notebook, raw)
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        raise KitError(f"{notebook} cannot be used as a lab: {error}", "Repair that cell.") from error
+
+
+def _read(name: str, notebook: Path, raw: dict[str, Any]) -> Lab:
+    cells: list[Cell] = []
+    answers: dict[str, Answer] = {}
+    given: dict[str, str] = {}
+    released: list[dict[str, Any]] = []
+    seen: set[str] = set()
+    title = ""
+    for raw_cell in raw["cells"]:
+        cell = copy.deepcopy(raw_cell)
+        source = source_of(cell)
+        nbgrader = nbgrader_of(cell)
+        grade_id = grade_id_of(cell)
+        if grade_id in seen:
+            raise ValueError(f"two cells have the grade_id `{grade_id}`")
+        if grade_id:
+            seen.add(grade_id)
+        if cell["cell_type"] == "markdown" and not nbgrader.get("solution"):
+            headings = _HEADING.findall(source)
+            title = headings[-1] if headings else title
+        blank = source
+        points = float(nbgrader["points"]) if nbgrader.get("grade") else None
+        if nbgrader.get("solution"):
+            blank = _without_solution(source, cell["cell_type"])
+            answers[grade_id] = Answer(
+                grade_id, cell["cell_type"], blank, _without_markers(source), _file(grade_id, blank), points
+            )
+        elif cell["cell_type"] == "code" and (nbgrader.get("locked") or nbgrader.get("grade")):
+            blank = _without_region(source, "HIDDEN TESTS")
+            file = _file(grade_id, source)
+            if file is not None:
+                given[file.file_name] = file.text
+            elif not source.lstrip().startswith("%%"):
+                cells.append(Cell(grade_id=grade_id, title=title, points=points, source=source))
+        cell["source"] = blank
+        if cell["cell_type"] == "code":
+            cell.update(outputs=[], execution_count=None)
+        released.append(cell)
+    return Lab(name, notebook, raw, tuple(cells), answers, given, tuple(released))
+
+
+def _file(grade_id: str, source: str) -> CellFile | None:
+    try:
+        return parse(source)
+    except BadNameError as error:
+        raise ValueError(f"cell `{grade_id}`: {error}") from error
+
+
+def _without_region(source: str, mark: str, stub: str | None = None) -> str:
+    """Drop the lines between `BEGIN mark` and `END mark`, or put a stub in their place, as nbgrader does."""
+    lines: list[str] = []
+    inside = False
+    for line in source.split("\n"):
+        if f"BEGIN {mark}" in line:
+            inside = True
+            if stub is not None:
+                lines.append(re.match(r"\s*", line).group() + stub)  # type: ignore[union-attr]
+        elif f"END {mark}" in line:
+            inside = False
+        elif not inside:
+            lines.append(line)
+    return "\n".join(lines)
+
+
+def _without_solution(source: str, cell_type: str) -> str:
+    stub = CODE_STUB if cell_type == "code" else TEXT_STUB
+    if "BEGIN SOLUTION" not in source:
+        return stub
+    return _without_region(source, "SOLUTION", stub)
+
+
+def _without_markers(source: str) -> str:
+    lines = source.split("\n")
+    return "\n".join(line for line in lines if "BEGIN SOLUTION" not in line and "END SOLUTION" not in line)

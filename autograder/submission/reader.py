@@ -1,0 +1,255 @@
+"""Reads what a student handed in, as text: nothing of it is executed, imported or unpickled here.
+
+Only the source of the answer cells counts, found by grade_id. Whatever else is wrong with the notebook becomes a named
+outcome, so that one broken submission never stops a class.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import stat
+from collections import defaultdict
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from autograder.results import Outcome, Status
+from autograder.submission.lab import Lab, grade_id_of, nbgrader_of, source_of
+from autograder.submission.magics import CELL_BYTES, BadNameError, parse
+
+NOTEBOOK_BYTES = 8 * 1024 * 1024
+"""The largest notebook that is read, in bytes."""
+
+
+@dataclass
+class Submission:
+    """What a student handed in for a lab."""
+
+    sources: dict[str, str] = field(default_factory=dict)
+    """The source of every answer cell by grade_id; what students receive where there was no usable answer."""
+    files: dict[str, str] = field(default_factory=dict)
+    """File name to text: the programs and files that cells name, the lab's own included."""
+    problems: list[Outcome] = field(default_factory=list)
+    digest: str = ""
+    """SHA-256 over the answers and the lab: it changes when either does."""
+    readable: bool = True
+    """False: there is no notebook of this lab to grade, and `problems` says why."""
+    notebook: dict[str, Any] = field(default_factory=dict)
+    """The released notebook with the answers' sources in it."""
+
+
+class _UnreadableError(Exception):
+    def __init__(self, problem: Outcome) -> None:
+        super().__init__(problem.title)
+        self.problem = problem
+
+
+def read_submission(path: Path, lab: Lab) -> Submission:
+    """Read a submitted notebook; every defect of it ends up in `problems`, none is raised."""
+    submission = Submission(sources={answer.grade_id: answer.blank for answer in lab.answers.values()})
+    try:
+        _take_answers(_cells(_bytes(path)), lab, submission)
+    except _UnreadableError as error:
+        submission.problems.append(error.problem)
+        submission.readable = False
+    _take_files(lab, submission)
+    problems = [[problem.code, problem.because] for problem in submission.problems]
+    parts = [lab.digest, problems, list(submission.sources.items())]
+    submission.digest = hashlib.sha256(json.dumps(parts).encode()).hexdigest()
+    submission.notebook = lab.clean_notebook(submission.sources)
+    return submission
+
+
+def _problem(code: str, title: str, because: str, hint: str = "") -> Outcome:
+    return Outcome(status=Status.FAILED, title=title, because=because, hint=hint, code=code)
+
+
+def _bytes(path: Path) -> bytes:
+    title = "the notebook can be read"
+    try:
+        # O_NOFOLLOW: a link could point at the instructor's files. O_NONBLOCK: a FIFO would wait for ever.
+        descriptor = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK)
+        with os.fdopen(descriptor, "rb") as file:
+            if not stat.S_ISREG(os.fstat(descriptor).st_mode):
+                raise OSError("it is not a file")
+            content = file.read(NOTEBOOK_BYTES + 1)
+    except OSError as error:
+        because = f"There is no file {path.name} to read ({error.strerror or error})."
+        raise _UnreadableError(_problem("no-notebook", title, because, f"Submit {path.name}.")) from error
+    if not content.strip():
+        raise _UnreadableError(
+            _problem("no-notebook", title, f"No {path.name} was handed in.", f"Submit the file {path.name} itself.")
+        )
+    if len(content) > NOTEBOOK_BYTES:
+        raise _UnreadableError(
+            _problem(
+                "oversized-notebook",
+                title,
+                f"The notebook is larger than {NOTEBOOK_BYTES // 1024**2} MiB.",
+                "Clear all outputs, save, and submit again.",
+            )
+        )
+    return content
+
+
+def _cells(content: bytes) -> list[dict[str, Any]]:
+    title = "the file is a Jupyter notebook"
+    hint = "Open it in JupyterLab, save it there, and submit that file."
+    try:
+        notebook = json.loads(content.decode("utf-8-sig"))
+    except (ValueError, RecursionError) as error:
+        because = "The file is not a notebook: it is not valid JSON."
+        raise _UnreadableError(_problem("not-json", title, because, hint)) from error
+    cells = notebook.get("cells") if isinstance(notebook, dict) else None
+    if not isinstance(cells, list) or notebook.get("nbformat") != 4 or not all(isinstance(c, dict) for c in cells):
+        because = "The file is JSON, but not a notebook of format 4: it has no list of cells."
+        raise _UnreadableError(_problem("not-a-notebook", title, because, hint))
+    return cells
+
+
+def _take_answers(cells: list[dict[str, Any]], lab: Lab, submission: Submission) -> None:
+    released = {grade_id_of(cell): cell for cell in lab.released if grade_id_of(cell)}
+    found: dict[str, list[dict[str, Any]]] = defaultdict(list)
+    for cell in cells:
+        if grade_id_of(cell):
+            found[grade_id_of(cell)].append(cell)
+    if not found.keys() & released.keys():
+        raise _UnreadableError(
+            _problem(
+                "wrong-notebook",
+                f"the notebook is {lab.name}",
+                f"No cell of it belongs to {lab.name}: it is another notebook, or every graded cell was deleted.",
+                f"Start from labs/{lab.name}/{lab.name}.ipynb and submit that notebook.",
+            )
+        )
+    forged = sorted(found.keys() - released.keys())
+    if forged:
+        names = ", ".join(f"`{grade_id[:40]}`" for grade_id in forged[:5]) + (", …" if len(forged) > 5 else "")
+        submission.problems.append(
+            _problem(
+                "forged-cell",
+                "every graded cell belongs to the lab",
+                f"The lab has no graded cell {names}: ignored.",
+                "Use ordinary cells for your own notes and experiments.",
+            )
+        )
+    for grade_id, original in released.items():
+        _take_cell(grade_id, original, found.get(grade_id, []), lab, submission)
+
+
+def _take_cell(
+    grade_id: str, original: dict[str, Any], copies: list[dict[str, Any]], lab: Lab, submission: Submission
+) -> None:
+    answer = lab.answers.get(grade_id)
+    if len(copies) > 1:
+        which = "the last one counts" if answer else "none of them is run; the lab's own cell is"
+        submission.problems.append(
+            _problem(
+                "duplicated-cell",
+                f"there is one cell `{grade_id}`",
+                f"There are {len(copies)} copies of the cell `{grade_id}`: {which}.",
+                "Delete the copies: a copied cell takes its grading mark along.",
+            )
+        )
+    flags = ("grade", "solution", "locked")
+    meant = {flag: bool(nbgrader_of(original).get(flag, False)) for flag in flags}
+    if any({flag: bool(nbgrader_of(cell).get(flag, False)) for flag in flags} != meant for cell in copies):
+        submission.problems.append(
+            _problem(
+                "forged-flags",
+                f"the cell `{grade_id}` is marked as in the lab",
+                f"The grading marks of the cell `{grade_id}` were changed; the lab's own marks count.",
+            )
+        )
+    if answer is None:
+        _compare(grade_id, original, copies, submission)
+        return
+    if not copies:
+        submission.problems.append(
+            _problem(
+                "missing-cell",
+                f"the answer cell `{grade_id}` is there",
+                f"The answer cell `{grade_id}` was deleted: there is no answer to grade.",
+                f"Copy the cell from a fresh labs/{lab.name}/{lab.name}.ipynb.",
+            )
+        )
+        return
+    try:
+        source = source_of(copies[-1])
+    except ValueError:
+        submission.problems.append(
+            _problem("not-a-notebook", f"the cell `{grade_id}` holds text", f"The cell `{grade_id}` holds no text.")
+        )
+        return
+    if len(source.encode("utf-8")) > CELL_BYTES:
+        submission.problems.append(
+            _problem(
+                "oversized-cell",
+                f"the cell `{grade_id}` is at most {CELL_BYTES // 1024} KiB",
+                f"The cell `{grade_id}` is larger than {CELL_BYTES // 1024} KiB; it is not graded.",
+            )
+        )
+        return
+    submission.sources[grade_id] = source
+
+
+def _compare(grade_id: str, original: dict[str, Any], copies: list[dict[str, Any]], submission: Submission) -> None:
+    """Report an edited check cell; a deleted one does no harm, for the lab's own cell is run anyway."""
+
+    def text(cell: dict[str, Any]) -> list[str]:
+        try:
+            return [line.rstrip() for line in source_of(cell).rstrip().split("\n")]
+        except ValueError:
+            return []
+
+    if any(text(cell) != text(original) for cell in copies):
+        submission.problems.append(
+            _problem(
+                "changed-cell",
+                f"the cell `{grade_id}` is as in the lab",
+                f"The cell `{grade_id}` was edited; the lab's own cell is run instead.",
+            )
+        )
+
+
+def _take_files(lab: Lab, submission: Submission) -> None:
+    owners: dict[str, str] = {}
+    for grade_id, answer in lab.answers.items():
+        if answer.file is None:
+            continue
+        title = f"the cell `{grade_id}` names its file"
+        wanted = f"%%{answer.file.magic} {answer.file.name}"
+        try:
+            file = parse(submission.sources[grade_id])
+        except BadNameError as error:
+            submission.problems.append(_problem("bad-file-name", title, str(error), f"Begin the cell with `{wanted}`."))
+            continue
+        if file is None:
+            because = f"The cell `{grade_id}` does not begin with `{wanted}`, so it is no file."
+            submission.problems.append(_problem("no-file-name", title, because, f"Begin the cell with `{wanted}`."))
+            continue
+        if file.file_name in lab.given:
+            because = f"`{file.file_name}` belongs to the lab and cannot be replaced."
+            submission.problems.append(_problem("given-file", title, because, f"Begin the cell with `{wanted}`."))
+            continue
+        if file.file_name != answer.file.file_name:
+            because = f"The cell `{grade_id}` names {file.file_name}; the lab asks for {answer.file.file_name}."
+            submission.problems.append(_problem("renamed-file", title, because, f"Begin the cell with `{wanted}`."))
+        if file.file_name in owners:
+            because = (
+                f"The cells `{owners[file.file_name]}` and `{grade_id}` both name {file.file_name}: the later counts."
+            )
+            submission.problems.append(_problem("same-file", title, because, f"Begin the cell with `{wanted}`."))
+        owners[file.file_name] = grade_id
+        submission.files[file.file_name] = file.text
+    submission.files.update(lab.given)
+
+
+def grade_ids_in(path: Path) -> set[str]:
+    """Return the grade_ids in a notebook; none if it cannot be read."""
+    try:
+        return {grade_id_of(cell) for cell in _cells(_bytes(path))} - {""}
+    except _UnreadableError:
+        return set()
