@@ -1,0 +1,245 @@
+"""Cut a lecture into slides that fit a projector of 1280 x 720 pixels.
+
+The book shows all of a notebook. A slide has no scroll bar, so this extension (for the builder `revealjs` only)
+
+- leaves out what is in a container of class `book`, folded cells, and folded inputs (their outputs stay);
+- puts the blocks of a section on as many slides as they need, by an estimate of their heights in pixels;
+- divides listings, outputs, lists and tables that are higher than a slide.
+
+A container of class `slide` is left out of the book instead.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+from docutils import nodes
+from myst_nb.sphinx_ import HideCodeCellNode
+from sphinx.application import Sphinx
+from sphinx.util import logging
+from sphinx.writers.html5 import HTML5Translator
+from sphinx_revealjs.nodes import revealjs_break
+from sphinx_revealjs.writers import RevealjsSlideTranslator
+
+# The measures below belong to course.css, section "Slides"; they assume a wide font, so that a narrow one fits too.
+ROOM = 560  # pixels below a slide's heading
+LEAST_FIGURE = 380  # a figure is not shrunk below this height to share a slide
+TEXT_LINE, TEXT_COLUMNS, TEXT_GAP = 36, 80, 16
+CODE_LINE, CODE_COLUMNS, CODE_GAP = 25, 96, 34
+ROW_LINE, ROW_COLUMNS, ROW_GAP = 29, 96, 15
+ADMONITION = 70  # title, padding and margin
+
+logger = logging.getLogger(__name__)
+
+
+class SlideTranslator(RevealjsSlideTranslator):
+    """Write listings as the book does, so that both share one style and no script is needed."""
+
+    visit_literal_block = HTML5Translator.visit_literal_block
+    depart_literal_block = HTML5Translator.depart_literal_block
+
+
+def lines(text: str, columns: int) -> int:
+    """Return how many lines a text takes when it wraps after so many characters."""
+    return sum(max(1, math.ceil(len(line) / columns)) for line in text.splitlines() or [""])
+
+
+def height(node: nodes.Node, columns: int = TEXT_COLUMNS) -> int:
+    """Return about how many pixels a block needs on a slide."""
+    if isinstance(node, (nodes.comment, nodes.target, nodes.Invisible)):
+        return 0
+    if isinstance(node, nodes.literal_block):
+        return lines(node.astext(), CODE_COLUMNS) * CODE_LINE + CODE_GAP
+    if isinstance(node, nodes.table):
+        return sum(row_height(row) for row in node.findall(nodes.row)) + TEXT_GAP
+    if holds_figure(node):
+        return LEAST_FIGURE
+    if isinstance(node, (nodes.bullet_list, nodes.enumerated_list, nodes.definition_list)):
+        return sum(height(item, columns - 6) for item in node.children) + TEXT_GAP
+    if isinstance(node, (nodes.paragraph, nodes.term, nodes.title, nodes.rubric)):
+        gap = TEXT_GAP // 2 if isinstance(node.parent, nodes.list_item) else TEXT_GAP
+        return lines(node.astext().replace("\n", " "), columns) * TEXT_LINE + gap
+    extra = ADMONITION if isinstance(node, nodes.Admonition) else 0
+    return extra + sum(height(child, columns) for child in node.children)
+
+
+def row_height(row: nodes.row) -> int:
+    """Return about how many pixels a table row needs; columns share the width as their content asks."""
+    table = next(parent for parent in ancestors(row) if isinstance(parent, nodes.table))
+    rows = [[entry.astext() for entry in other.children] for other in table.findall(nodes.row)]
+    needs = [max(min(len(cell), 60) for cell in column) + 3 for column in zip(*rows, strict=False)]
+    share = min(1.0, ROW_COLUMNS / sum(needs))
+    cells = [entry.astext() for entry in row.children]
+    most = max(lines(cell, max(8, int(need * share) - 3)) for cell, need in zip(cells, needs, strict=False))
+    return most * ROW_LINE + ROW_GAP
+
+
+def ancestors(node: nodes.Node) -> Iterator[nodes.Element]:
+    """Return the elements around a node, the nearest first."""
+    parent = node.parent
+    while parent is not None:
+        yield parent
+        parent = parent.parent
+
+
+def holds_figure(node: nodes.Node) -> bool:
+    """Return whether a block is a picture, drawn from a file or by raw HTML."""
+    if isinstance(node, nodes.raw):
+        return "<img" in node.astext() or "<svg" in node.astext()
+    return isinstance(node, nodes.Element) and node.next_node(nodes.image, include_self=True) is not None
+
+
+def blocks(parent: nodes.Element) -> Iterator[nodes.Element]:
+    """Return what a slide shows of a section, a notebook cell taken apart into listing and outputs."""
+    for node in parent.children:
+        if isinstance(node, HideCodeCellNode) or "book" in node.get("classes", ()):
+            continue
+        kind = node.get("nb_element")
+        if kind in ("cell_code", "cell_code_source", "cell_code_output") or "slide" in node.get("classes", ()):
+            for inner in blocks(node):
+                yield inner if kind in (None, "cell_code") else wrapped(node, [inner])
+        elif isinstance(node, nodes.container) and len(node.children) == 1:
+            yield from blocks(node)
+        else:
+            yield node
+
+
+def wrapped(like: nodes.Element, children: list[nodes.Node]) -> nodes.Element:
+    """Return an empty copy of an element with these children."""
+    copy = like.copy()
+    copy += children
+    return copy
+
+
+def pieces(block: nodes.Element) -> Iterator[nodes.Element]:
+    """Return a block as parts that are no higher than a slide."""
+    if height(block) <= ROOM:
+        yield block
+    elif isinstance(block, nodes.container) and len(block.children) == 1:
+        for part in pieces(block.children[0]):
+            yield wrapped(block, [part])
+    elif isinstance(block, nodes.literal_block):
+        text = block.astext().splitlines()
+        most = (ROOM - CODE_GAP) // CODE_LINE
+        while text:
+            end = cut(text, most)
+            part = block.copy()
+            part += nodes.Text("\n".join(text[:end]))
+            part.rawsource = part.astext()
+            yield part
+            text = text[end:]
+    elif isinstance(block, nodes.table):
+        yield from table_pieces(block)
+    elif isinstance(block, (nodes.bullet_list, nodes.enumerated_list, nodes.definition_list)):
+        start = 1
+        for group in grouped(list(block.children), [height(item, TEXT_COLUMNS - 6) for item in block.children], 0):
+            part = wrapped(block, group)
+            if isinstance(block, nodes.enumerated_list):
+                part["start"] = start
+                start += len(group)
+            yield part
+    else:
+        logger.warning("a block is higher than a slide and cannot be divided: %.60r", block.astext())
+        yield block
+
+
+def cut(text: list[str], most: int) -> int:
+    """Return where to divide a listing: the last blank line of a slide's worth, before a definition if possible."""
+    room, end = most, 0
+    while end < len(text) and (room := room - lines(text[end], CODE_COLUMNS)) >= 0:
+        end += 1
+    if end == len(text):
+        return end
+    blank = [number for number in range(end // 3, end + 1) if not text[min(number, len(text) - 1)].strip()]
+    return blank[-1] if blank else end
+
+
+def grouped(items: list[Any], heights: list[int], extra: int) -> Iterator[list[Any]]:
+    """Return items in groups, each with `extra` pixels more and no higher than a slide."""
+    group: list[Any] = []
+    used = extra
+    for item, need in zip(items, heights, strict=True):
+        if group and used + need > ROOM:
+            yield group
+            group, used = [], extra
+        group.append(item)
+        used += need
+    if group:
+        yield group
+
+
+def table_pieces(table: nodes.table) -> Iterator[nodes.table]:
+    """Return a table as several, each with the heading row."""
+    head = sum(row_height(row) for thead in table.findall(nodes.thead) for row in thead.children) + TEXT_GAP
+    body = next(table.findall(nodes.tbody))
+    rows = list(body.children)
+    for group in list(grouped(list(range(len(rows))), [row_height(row) for row in rows], head)):
+        part = table.deepcopy()
+        body = next(part.findall(nodes.tbody))
+        body.children = [row for number, row in enumerate(body.children) if number in group]
+        yield part
+
+
+def paginate(section: nodes.Element) -> None:
+    """Replace a section's own blocks by slides; its sub-sections, which follow, get slides of their own."""
+    subsections = [node for node in section.children if isinstance(node, nodes.section)]
+    title = [node for node in section.children if isinstance(node, nodes.title)]
+    own = section.copy()
+    own.children = [node for node in section.children if node not in subsections and node not in title]
+    result: list[nodes.Node] = []
+    page: list[nodes.Element] = []
+    used = 0
+
+    def close() -> None:
+        nonlocal page, used
+        spare = ROOM - used
+        for block in page:
+            for image in block.findall(nodes.image):
+                image["height"] = f"{LEAST_FIGURE + spare}px"
+                image.attributes.pop("width", None)
+        result.extend(page)
+        page, used = [], 0
+
+    for block in blocks(own):
+        for part in pieces(block):
+            need = height(part)
+            if page and used + need > ROOM:
+                # A line of text that leads to what comes next goes with it.
+                lead = page.pop() if len(page) > 1 and leads(page[-1]) else None
+                if lead is not None:
+                    used -= height(lead)
+                close()
+                result.append(revealjs_break())
+                if lead is not None:
+                    page, used = [lead], height(lead)
+            page.append(part)
+            used += need
+    close()
+    section.children = []
+    section += title + result + subsections
+    for subsection in subsections:
+        paginate(subsection)
+
+
+def leads(block: nodes.Element) -> bool:
+    """Return whether a block is a short text before what it announces."""
+    return isinstance(block, nodes.paragraph) and height(block) <= 2 * TEXT_LINE + TEXT_GAP
+
+
+def on_resolved(app: Sphinx, doctree: nodes.document, docname: str) -> None:
+    """Prepare a document for the builder that is about to write it."""
+    if app.builder.name == "revealjs":
+        for section in [node for node in doctree.children if isinstance(node, nodes.section)]:
+            paginate(section)
+    else:
+        for node in [node for node in doctree.findall(nodes.container) if "slide" in node["classes"]]:
+            node.parent.remove(node)
+
+
+def setup(app: Sphinx) -> dict[str, Any]:
+    """Register with Sphinx."""
+    app.set_translator("revealjs", SlideTranslator, override=True)
+    app.connect("doctree-resolved", on_resolved)
+    return {"parallel_read_safe": True, "parallel_write_safe": True}

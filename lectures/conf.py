@@ -1,0 +1,88 @@
+"""Sphinx configuration: one MyST notebook per topic becomes a page of the book and a deck of slides.
+
+Every code cell runs on the real rclpy, in a ROS domain of this build's own; a cell that fails ends the build. The
+second builder takes the outputs of the first from the cache, so book and slides show the same run.
+"""
+
+from __future__ import annotations
+
+import os
+import socket
+import sys
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+ROOT = HERE.parent
+sys.path[:0] = [str(ROOT), str(HERE / "_ext")]
+
+from autograder.sandbox.environment import profile_environment  # noqa: E402  (needs the path above)
+
+
+def free_domain() -> int:
+    """Return a ROS domain ID (1 to 101) in which no participant of this machine is alive."""
+    ids = range(1, 102)
+    first = os.getpid() % len(ids)
+    for domain in (*ids[first:], *ids[:first]):
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+            try:
+                # RTPS: the first participant of a domain takes this unicast port.
+                probe.bind(("127.0.0.1", 7410 + 250 * domain))
+            except OSError:
+                continue
+            return domain
+    raise RuntimeError("All ROS domains of this machine are in use.")
+
+
+# What the kernels inherit. The log folder must exist before rclpy starts.
+os.environ |= profile_environment() | {"ROS_DOMAIN_ID": str(free_domain()), "JUPYTER_PREFER_ENV_PATH": "1"}
+Path(os.environ["ROS_LOG_DIR"]).mkdir(parents=True, exist_ok=True)
+
+project = "ROS 2 in Python: executors, names, lifecycle, quality of service"
+author = "The course kit's authors"
+language = "en"
+extensions = ["myst_nb", "sphinx_revealjs", "slides"]
+exclude_patterns = ["_*"]
+pygments_style = "default"
+myst_enable_extensions = ["colon_fence", "deflist"]
+myst_heading_anchors = 3
+
+nb_execution_mode = "cache"
+nb_execution_cache_path = str(ROOT / "build" / "lectures" / "cache")
+nb_execution_in_temp = True
+nb_execution_timeout = 60
+nb_execution_raise_on_error = True
+nb_execution_show_tb = True
+nb_merge_streams = True
+nb_ipywidgets_js: dict[str, dict[str, str]] = {}
+nb_code_prompt_show = "Show the {type}"
+nb_code_prompt_hide = "Hide the {type}"
+nb_mime_priority_overrides = [
+    ("revealjs", "text/html", 30),
+    ("revealjs", "image/svg+xml", 40),
+    ("revealjs", "image/png", 50),
+    ("revealjs", "text/markdown", 80),
+    ("revealjs", "text/plain", 100),
+]
+
+html_theme_path = ["_theme"]
+html_theme = "book"
+html_title = "ROS 2 in Python"
+html_static_path = ["_static"]
+html_css_files = ["course.css"]
+html_copy_source = False
+html_use_index = False
+
+revealjs_html_theme = "revealjs-simple"
+revealjs_style_theme = "white"
+revealjs_static_path = ["_static"]
+revealjs_css_files = ["pygments.css", "course.css"]
+revealjs_script_conf = {
+    "width": 1280,
+    "height": 720,
+    "margin": 0,
+    "center": False,
+    "hash": True,
+    "transition": "none",
+    "slideNumber": "c/t",
+    "controls": False,
+}
