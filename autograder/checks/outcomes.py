@@ -94,7 +94,9 @@ def _rest_not_checked() -> None:
     except SyntaxError:  # only the shell knows this source (IPython syntax around it): nothing to list
         return
     hidden = _hidden_lines(frame)
-    blocks = [n for n in ast.walk(tree) if isinstance(n, ast.With) and n.lineno <= frame.f_lineno <= (n.end_lineno or 0)]
+    blocks = [
+        n for n in ast.walk(tree) if isinstance(n, ast.With) and n.lineno <= frame.f_lineno <= (n.end_lineno or 0)
+    ]
     if not blocks:
         return
     block = min(blocks, key=lambda node: (node.end_lineno or 0) - node.lineno)

@@ -50,6 +50,8 @@ class Session:
         """Forget the findings so far: a new cell begins."""
         self.outcomes: list[Outcome] = []
         self.logs: list[NodeLog] = []
+        self.scored_logs: list[NodeLog] = []
+        """Logs of what has been scored since the cell began."""
         self.started = time.monotonic()
 
     @property
@@ -94,8 +96,9 @@ class Session:
             seconds=time.monotonic() - self.started,
             outcomes=self.outcomes,
         )
-        self.last_logs = self.logs
+        logs = self.scored_logs + self.logs
         self.reset()
+        self.scored_logs = logs
         return result
 
 

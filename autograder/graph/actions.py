@@ -128,9 +128,7 @@ def send_goal(
     Raises:
         ServiceMissing: no server appeared.
     """
-    client = ActionClient(
-        observer.node, action_type, name, feedback_sub_qos_profile=QoSProfile(depth=FEEDBACK_DEPTH)
-    )
+    client = ActionClient(observer.node, action_type, name, feedback_sub_qos_profile=QoSProfile(depth=FEEDBACK_DEPTH))
     if not observer.wait(client.server_is_ready, within, give_up):
         client.destroy()
         raise ServiceMissing(name)

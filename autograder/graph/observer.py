@@ -5,6 +5,7 @@ It is not a student's node and shares no process with one. It stays quiet: no pa
 
 from __future__ import annotations
 
+import contextlib
 import threading
 import time
 from collections.abc import Callable
@@ -56,10 +57,8 @@ class Observer:
         self._thread.start()
 
     def _spin(self) -> None:
-        try:
+        with contextlib.suppress(ExternalShutdownException):
             self._executor.spin()
-        except ExternalShutdownException:
-            pass
 
     def close(self) -> None:
         """Leave the domain. The thread is joined: a daemon thread that still spins at exit aborts the process."""
@@ -117,7 +116,9 @@ class Observer:
             if name != self.name:
                 try:
                     pairs = self.node.get_service_names_and_types_by_node(name, namespace)
-                except Exception:  # the node went away between the two questions (rclpy raises NodeNameNonExistentError)
+                except (
+                    Exception
+                ):  # the node went away between the two questions (rclpy raises NodeNameNonExistentError)
                     continue
                 found.update(pairs)
         return found

@@ -51,9 +51,7 @@ def get_parameters(
     return found
 
 
-def list_parameters(
-    observer: Observer, node: str, within: float, give_up: GiveUp = lambda: False
-) -> list[str]:
+def list_parameters(observer: Observer, node: str, within: float, give_up: GiveUp = lambda: False) -> list[str]:
     """Names of all declared parameters, sorted. Raises as `get_parameters`."""
     reply = _call(observer, node, "list_parameters", ListParameters, ListParameters.Request(), within, give_up)
     return sorted(reply.result.names)

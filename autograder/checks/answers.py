@@ -1,0 +1,91 @@
+"""Tables of answers: a `%%file NAME.yaml` cell of plain `question: answer` lines."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import yaml
+
+from autograder.checks import outcomes, session
+from autograder.checks.scoring import score
+from autograder.checks.session import Score
+
+
+class Answers:
+    """One table of answers; `with answers("predictions.yaml") as table:` like a launch."""
+
+    def __init__(self, file: str) -> None:
+        """Name the file; it is read on entering the block."""
+        self.file = file
+        self._table: dict[str, Any] = {}
+
+    def __enter__(self) -> Answers:
+        return self
+
+    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> bool:
+        if error is not None and not isinstance(error, outcomes.CheckEnded) and isinstance(error, Exception):
+            outcomes.unknown("The check itself broke", f"{type(error).__name__}: {error}")
+        return error is None or isinstance(error, Exception)
+
+    def expect_table(self) -> None:
+        """The file exists and is a table."""
+        path = session.current.folder / self.file
+        title = f"`{self.file}` is a table of answers"
+        if not path.is_file():
+            outcomes.failed(
+                title,
+                because=f"No cell that begins with `%%file {self.file}` was found.",
+                hint="Check the first line of the cell; it must stand there unchanged.",
+                code="file-missing",
+            )
+        try:
+            table = yaml.safe_load(path.read_text(encoding="utf-8"))
+        except yaml.YAMLError as error:
+            where = getattr(error, "problem_mark", None)
+            line = f" in line {where.line + 1}" if where else ""
+            outcomes.failed(title, because=f"It is not YAML{line}.", hint="Write `question: answer`.", code="not-yaml")
+        if not isinstance(table, dict):
+            outcomes.failed(title, because="It has no `question: answer` lines.", code="not-yaml")
+        self._table = {str(key): value for key, value in table.items()}
+
+    def expect_filled(self, questions: Mapping[str, Sequence[Any]] | Sequence[str]) -> None:
+        """Every question has an answer; where a sequence of allowed answers is given, one of them."""
+        self.expect_table()
+        title = f"Every question in `{self.file}` is answered"
+        for question in questions:
+            answer = self._table.get(question)
+            if answer is None or answer == "?":
+                outcomes.failed(title, because=f"`{question}` has no answer yet.", code="unanswered")
+            if isinstance(questions, Mapping) and answer not in questions[question]:
+                allowed = ", ".join(str(value) for value in questions[question])
+                outcomes.failed(
+                    title, because=f"`{question}` is {answer!r}; it must be one of {allowed}.", code="answer-form"
+                )
+        outcomes.passed(title)
+
+    def expect_answer(self, question: str, *right: Any, hint: str = "") -> None:
+        """The answer to one question is one of the right ones."""
+        if not self._table:
+            self.expect_table()
+        answer = self._table.get(question)
+        title = f"`{question}`"
+        if answer in right and isinstance(answer, bool) == any(isinstance(r, bool) for r in right if r == answer):
+            outcomes.passed(title, observed=str(answer))
+            return
+        outcomes.failed(
+            title,
+            observed=str(answer),
+            because="There is no answer." if answer is None else f"{answer!r} is not what happens.",
+            hint=hint or "Run the experiment again and look at what it prints.",
+            code="unanswered" if answer is None else "wrong-answer",
+        )
+
+    def score(self, points: float) -> Score:
+        """The score of the cell, as `ros.score`."""
+        return score(points)
+
+
+def answers(file: str) -> Answers:
+    """A table of answers that a `%%file` cell holds."""
+    return Answers(file)

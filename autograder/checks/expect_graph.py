@@ -1,0 +1,240 @@
+"""Expectations of names: nodes, topics, endpoints and their QoS."""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import Any, Literal
+
+from rclpy.topic_endpoint_info import TopicEndpointInfo
+
+from autograder.checks import outcomes, session
+from autograder.checks.base import WITHIN, ExpectationBase
+from autograder.graph import diagnosis, qos
+from autograder.graph.diagnosis import Diagnosis, Scene
+from autograder.graph.names import full_name, type_name
+
+End = Literal["publisher", "subscription"]
+
+GONE_WITHIN = 2.0
+"""Seconds that an absence may take to show, for example after a node was stopped."""
+
+
+class GraphExpectations(ExpectationBase):
+    """What must be on the graph, and what must not."""
+
+    def scene(self) -> Scene:
+        """The launch as the diagnosis sees it."""
+        return Scene(
+            self.observer,
+            [program for _, program in self.programs],
+            self._missing,
+            session.current.folder,
+            [rule for node, _ in self.programs for rule in node.rules()],
+        )
+
+    def expect_node(self, name: str, *, within: float = WITHIN, hint: str = "") -> None:
+        """The node with this full name is on the graph, exactly once."""
+        title = f"The node `{name}` is on the graph"
+        if not self.wait(lambda: name in self.observer.nodes(), within):
+            self.fail(
+                title,
+                diagnosis.why_no_node(self.scene(), name),
+                expected=name,
+                observed=", ".join(self.observer.nodes()) or "no node",
+                hint=hint,
+            )
+        if self.observer.nodes().count(name) > 1:
+            self.fail(
+                title,
+                Diagnosis(
+                    f"Two nodes are called `{name}`: their parameters and services cannot be told apart.",
+                    "duplicate-node",
+                    "Give each node a name of its own.",
+                ),
+                expected="one node of this name",
+                observed=", ".join(self.observer.nodes()),
+                hint=hint,
+            )
+        outcomes.passed(title, observed=name)
+
+    def expect_no_node(self, name: str, *, within: float = GONE_WITHIN, hint: str = "") -> None:
+        """No node has this full name; use it after a positive expectation, which proves that the graph is known."""
+        gone = self.observer.wait(lambda: name not in self.observer.nodes(), within)
+        self.expect_that(
+            gone,
+            f"No node is called `{name}`",
+            lambda: Diagnosis(f"`{name}` is still on the graph.", "node-present"),
+            observed=", ".join(self.observer.nodes()),
+            hint=hint,
+        )
+
+    def expect_topic(self, topic: str, msg_type: type, *, within: float = WITHIN, hint: str = "") -> None:
+        """The topic exists with this message type."""
+        wanted = type_name(msg_type)
+        found = self.wait(lambda: wanted in self.observer.topics().get(topic, []), within)
+        self.expect_that(
+            found,
+            f"The topic `{topic}` carries {wanted}",
+            lambda: diagnosis.why_no_endpoint(self.scene(), topic, msg_type, "publisher"),
+            expected=f"{topic} ({wanted})",
+            observed=lambda: self._topics(),
+            hint=hint,
+        )
+
+    def expect_no_topic(self, topic: str, *, within: float = GONE_WITHIN, hint: str = "") -> None:
+        """Nobody publishes or subscribes to this topic."""
+        gone = self.observer.wait(lambda: topic not in self.observer.topics(), within)
+        self.expect_that(
+            gone,
+            f"Nobody uses the topic `{topic}`",
+            lambda: self._topic_present(topic),
+            observed=lambda: self._topics(),
+            hint=hint,
+        )
+
+    def _topic_present(self, topic: str) -> Diagnosis:
+        ends = self.observer.publishers(topic) + self.observer.subscriptions(topic)
+        owners = sorted({full_name(end.node_namespace, end.node_name) for end in ends})
+        if any(end.node_namespace != "/" and not topic.startswith(end.node_namespace + "/") for end in ends):
+            return Diagnosis(
+                f"{', '.join(owners)} uses `{topic}`, which lies outside the node's own namespace: the name is absolute.",
+                "absolute-name",
+                "A topic name with a leading slash is absolute: no namespace reaches it. Write it without the slash.",
+            )
+        return Diagnosis(f"{', '.join(owners) or 'A node'} uses `{topic}`.", "topic-present")
+
+    def _topics(self) -> str:
+        own = [t for t in sorted(self.observer.topics()) if t not in ("/rosout", "/parameter_events")]
+        return ", ".join(own) or "no topic"
+
+    def _ends(self, topic: str, msg_type: type | None, kind: End, node: str) -> list[TopicEndpointInfo]:
+        ends = self.observer.publishers(topic) if kind == "publisher" else self.observer.subscriptions(topic)
+        return [
+            end
+            for end in ends
+            if (msg_type is None or end.topic_type == type_name(msg_type))
+            and (not node or full_name(end.node_namespace, end.node_name) == node)
+        ]
+
+    def _expect_end(
+        self, topic: str, msg_type: type, kind: End, node: str, count: int, within: float, hint: str
+    ) -> None:
+        title = f"{f'`{node}`' if node else 'A node'} has a {kind} on `{topic}` ({type_name(msg_type)})"
+        if count != 1:
+            title = f"`{topic}` has {count} {kind}s ({type_name(msg_type)})"
+
+        def number() -> int:
+            return len(self._ends(topic, msg_type, kind, node))
+
+        if not self.wait(lambda: number() >= count, within):
+            found = number()
+            reason = diagnosis.why_no_endpoint(self.scene(), topic, msg_type, kind, node)
+            if found:
+                reason = Diagnosis(f"`{topic}` has {found} {kind}{'s' if found > 1 else ''}, not {count}.", "count")
+            self.fail(title, reason, expected=f"{topic} ({type_name(msg_type)})", observed=self._topics(), hint=hint)
+        if number() > count:
+            owners = Counter(
+                full_name(end.node_namespace, end.node_name) for end in self._ends(topic, msg_type, kind, node)
+            )
+            told = ", ".join(f"{owner} ({times})" for owner, times in sorted(owners.items()))
+            self.fail(
+                title,
+                Diagnosis(f"`{topic}` has {number()} {kind}s instead of {count}: {told}.", f"extra-{kind}"),
+                expected=f"{count} {kind}",
+                observed=told,
+                hint=hint,
+            )
+        outcomes.passed(title, observed=topic)
+
+    def expect_publisher(
+        self, topic: str, msg_type: type, *, node: str = "", count: int = 1, within: float = WITHIN, hint: str = ""
+    ) -> None:
+        """The topic has exactly `count` publishers of this type, of the node `node` if one is given."""
+        self._expect_end(topic, msg_type, "publisher", node, count, within, hint)
+
+    def expect_subscription(
+        self, topic: str, msg_type: type, *, node: str = "", count: int = 1, within: float = WITHIN, hint: str = ""
+    ) -> None:
+        """The topic has exactly `count` subscriptions of this type, of the node `node` if one is given."""
+        self._expect_end(topic, msg_type, "subscription", node, count, within, hint)
+
+    def _expect_no_end(self, topic: str, kind: End, within: float, hint: str) -> None:
+        gone = self.observer.wait(lambda: not self._ends(topic, None, kind, ""), within)
+        self.expect_that(
+            gone,
+            f"`{topic}` has no {kind}",
+            lambda: Diagnosis(
+                f"A {kind} on `{topic}` is still there: {', '.join(sorted({full_name(e.node_namespace, e.node_name) for e in self._ends(topic, None, kind, '')}))}.",
+                f"{kind}-present",
+            ),
+            hint=hint,
+        )
+
+    def expect_no_publisher(self, topic: str, *, within: float = GONE_WITHIN, hint: str = "") -> None:
+        """Nobody publishes on the topic."""
+        self._expect_no_end(topic, "publisher", within, hint)
+
+    def expect_no_subscription(self, topic: str, *, within: float = GONE_WITHIN, hint: str = "") -> None:
+        """Nobody subscribes to the topic."""
+        self._expect_no_end(topic, "subscription", within, hint)
+
+    def expect_qos(
+        self,
+        topic: str,
+        *,
+        of: End = "publisher",
+        node: str = "",
+        within: float = WITHIN,
+        hint: str = "",
+        **policies: str | float | None,
+    ) -> None:
+        """The endpoint has these QoS policies.
+
+        Args:
+            topic: full name.
+            of: which end.
+            node: full name of its node, if the topic has several such ends.
+            within: seconds to wait for the endpoint.
+            hint: a pointer for the student.
+            policies: any of reliability, durability, liveliness (in words) and deadline, lifespan, lease (seconds, or
+                None for "never"). History and depth are not on the graph.
+        """
+        wanted = ", ".join(f"{policy} {_value(value)}" for policy, value in policies.items())
+        title = f"The {of} on `{topic}` has {wanted}"
+        if not self.wait(lambda: self._ends(topic, None, of, node), within):
+            # The type does not matter here; the diagnosis wants one to compare, so it gets the one that is there.
+            trouble = diagnosis.program_trouble(self.scene())
+            self.fail(
+                title,
+                trouble or Diagnosis(f"There is no {of} on `{topic}`.", "no-topic"),
+                observed=self._topics(),
+                hint=hint,
+            )
+        have = qos.describe(self._ends(topic, None, of, node)[0].qos_profile)
+        wrong = [policy for policy, value in policies.items() if not _same(have[policy], value)]
+        self.expect_that(
+            not wrong,
+            title,
+            lambda: Diagnosis(
+                "; ".join(
+                    f"its {policy} is {_value(have[policy])}, not {_value(policies[policy])}" for policy in wrong
+                ).capitalize()
+                + ".",
+                f"qos-{wrong[0]}",
+            ),
+            expected=wanted,
+            observed=", ".join(f"{policy} {_value(have[policy])}" for policy in policies),
+            hint=hint,
+        )
+
+
+def _value(value: Any) -> str:
+    if value is None:
+        return "none"
+    return value.replace("_", " ") if isinstance(value, str) else f"{value:g} s"
+
+
+def _same(have: Any, want: Any) -> bool:
+    if isinstance(want, (int, float)) and isinstance(have, (int, float)):
+        return abs(have - want) <= 1e-6 + 0.001 * abs(want)
+    return bool(have == want)

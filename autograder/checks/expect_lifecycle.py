@@ -1,0 +1,155 @@
+"""Expectations of lifecycle nodes: states, transitions, and the steps they take."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import NoReturn
+
+from autograder.checks import outcomes
+from autograder.checks.base import WITHIN
+from autograder.checks.expect_graph import GraphExpectations
+from autograder.graph import diagnosis
+from autograder.graph.diagnosis import Diagnosis
+from autograder.graph.lifecycle import Change, LifecycleClient, Requested, in_order
+from autograder.graph.parameters import NoAnswer
+from autograder.graph.services import ServiceMissing
+
+
+class LifecycleExpectations(GraphExpectations):
+    """What state a node must be in, and how it got there."""
+
+    def prepare(self) -> None:
+        """Set up the lifecycle clients."""
+        super().prepare()
+        self._lifecycle_clients: dict[str, LifecycleClient] = {}
+
+    def watch_transitions(self, node: str) -> LifecycleClient:
+        """Record a node's state changes from now on; its events are volatile, so watch before it starts."""
+        if node not in self._lifecycle_clients:
+            self._lifecycle_clients[node] = LifecycleClient(self.observer, node)
+        return self._lifecycle_clients[node]
+
+    def _unreachable(self, title: str, node: str, error: Exception, hint: str) -> NoReturn:
+        scene = self.scene()
+        if isinstance(error, NoAnswer):
+            reason = diagnosis.why_no_answer(scene, f"{node}/get_state")
+        elif node in self.observer.nodes():
+            reason = diagnosis.program_trouble(scene) or Diagnosis(
+                f"`{node}` is not a lifecycle node: it offers no `{node}/get_state`.", "not-lifecycle"
+            )
+        else:
+            reason = diagnosis.why_no_node(scene, node)
+        self.fail(title, reason, expected=node, observed=", ".join(self.observer.nodes()), hint=hint)
+
+    def state(self, node: str, *, within: float = WITHIN) -> str:
+        """Label of a node's current state."""
+        try:
+            return self.watch_transitions(node).state(within, self.all_ended)
+        except (ServiceMissing, NoAnswer) as error:
+            self._unreachable(f"`{node}` tells its lifecycle state", node, error, "")
+
+    def expect_state(self, node: str, state: str, *, within: float = WITHIN, hint: str = "") -> None:
+        """A lifecycle node is in this state, or gets there within `within` seconds."""
+        title = f"`{node}` is {state}"
+        try:
+            seen = self.watch_transitions(node).wait_for_state(state, within, self.all_ended)
+        except (ServiceMissing, NoAnswer) as error:
+            self._unreachable(title, node, error, hint)
+        self.expect_that(
+            seen == state,
+            title,
+            lambda: self._why_state(node, seen, state),
+            expected=state,
+            observed=seen,
+            hint=hint,
+        )
+
+    def _why_state(self, node: str, seen: str, wanted: str) -> Diagnosis:
+        return (
+            diagnosis.program_trouble(self.scene())
+            or diagnosis.inside_reason(self.scene())
+            or Diagnosis(f"`{node}` is {seen}, not {wanted}.", "state")
+        )
+
+    def available_transitions(self, node: str, *, within: float = WITHIN) -> Mapping[str, str]:
+        """Labels of the transitions that a node offers now, each with the state it leads to."""
+        try:
+            return self.watch_transitions(node).available(within, self.all_ended)
+        except (ServiceMissing, NoAnswer) as error:
+            self._unreachable(f"`{node}` tells its transitions", node, error, "")
+
+    def transition(
+        self, node: str, label: str, *, expect: str = "success", within: float = WITHIN, hint: str = ""
+    ) -> Requested:
+        """Request a transition by its label.
+
+        Args:
+            node: full name.
+            label: `configure`, `activate`, `deactivate`, `cleanup` or `shutdown`.
+            expect: `success`, `failure` (the node answers that it did not succeed), or `any`.
+            within: seconds.
+            hint: a pointer for the student.
+        """
+        title = f"`{node}`: {label}" + {"success": " succeeds", "failure": " does not succeed", "any": ""}[expect]
+        try:
+            done = self.watch_transitions(node).transition(label, within, self.all_ended)
+        except (ServiceMissing, NoAnswer) as error:
+            self._unreachable(title, node, error, hint)
+        if not done.offered:
+            self.fail(
+                title,
+                Diagnosis(
+                    f"`{node}` is {done.before}; from there it offers {', '.join(done.available) or 'nothing'}.",
+                    "state",
+                ),
+                expected=label,
+                observed=done.before,
+                hint=hint,
+            )
+        if expect == "success" and not done.success:
+            self.fail(
+                title,
+                diagnosis.program_trouble(self.scene())
+                or diagnosis.inside_reason(self.scene())
+                or Diagnosis(
+                    f"The callback of {label} did not return SUCCESS; the node is {done.after} now.",
+                    "transition-failed",
+                ),
+                expected="success",
+                observed=f"no success, {done.after}",
+                hint=hint,
+            )
+        if expect == "failure" and done.success:
+            self.fail(
+                title,
+                Diagnosis(f"It succeeded; the node is {done.after} now.", "transition-succeeded"),
+                expected="no success",
+                observed=f"success, {done.after}",
+                hint=hint,
+            )
+        outcomes.passed(title, observed=done.after)
+        return done
+
+    def changes(self, *nodes: str) -> list[Change]:
+        """State changes of the nodes so far, in the order in which they were published."""
+        return in_order([self.watch_transitions(node) for node in nodes])
+
+    def expect_transitions(
+        self, node: str, steps: Sequence[tuple[str, str]], *, within: float = WITHIN, hint: str = ""
+    ) -> None:
+        """A node took exactly these steps (state left, state entered) since it is watched."""
+        client = self.watch_transitions(node)
+        seen = [change.step for change in client.wait_for_changes(len(steps), within, self.all_ended)]
+        told = ", ".join(f"{a} to {b}" for a, b in seen) or "no step"
+        self.expect_that(
+            seen == list(steps),
+            f"`{node}` goes " + ", ".join(f"{a} to {b}" for a, b in steps),
+            lambda: (
+                diagnosis.program_trouble(self.scene())
+                or diagnosis.inside_reason(self.scene())
+                or Diagnosis(f"It went {told}.", "transitions")
+            ),
+            expected=", ".join(f"{a} to {b}" for a, b in steps),
+            observed=told,
+            hint=hint,
+        )

@@ -1,0 +1,344 @@
+"""Expectations of messages: how many, how often, what is in them, from whom."""
+
+from __future__ import annotations
+
+import itertools
+import statistics
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from rclpy.qos import QoSProfile
+
+from autograder.checks import outcomes
+from autograder.checks.activity import Activity
+from autograder.checks.base import WITHIN
+from autograder.checks.expect_graph import GraphExpectations
+from autograder.graph import diagnosis
+from autograder.graph.diagnosis import Diagnosis
+from autograder.graph.names import full_name
+from autograder.graph.recording import Received, Recording, quiet_profile
+
+RELIABLE_DEEP = 1000
+"""Depth of the observer's own publishers, so that a burst of its own is never cut."""
+
+DECISIVE_RUNS = 6
+"""Complete runs of each callback after which "they never overlapped" is a finding, not bad luck."""
+
+
+class MessageExpectations(GraphExpectations):
+    """What must arrive, what must not, and sending."""
+
+    def prepare(self) -> None:
+        """Set up the observer's publishers."""
+        super().prepare()
+        self._publishers: dict[tuple[str, str], Any] = {}
+
+    def listen(self, topic: str, msg_type: type, qos: QoSProfile | None = None) -> Recording:
+        """Record a topic from now on; the same topic and profile share a recording."""
+        return self.observer.record(topic, msg_type, qos)
+
+    def expect_messages(
+        self,
+        topic: str,
+        msg_type: type,
+        *,
+        at_least: int = 0,
+        at_most: int | None = None,
+        exactly: int | None = None,
+        rate: float | None = None,
+        tolerance: float = 0.2,
+        window: float = 1.0,
+        where: Callable[[Any], bool] | None = None,
+        values: Callable[[list[Any]], bool | str] | None = None,
+        publisher: str = "",
+        publishers: int = 1,
+        qos: QoSProfile | None = None,
+        within: float = WITHIN,
+        hint: str = "",
+    ) -> list[Any]:
+        """Messages arrive on a topic.
+
+        Args:
+            topic: full name.
+            msg_type: message class.
+            at_least: so many (by default 1, or 10 with `rate`), counted from the first.
+            at_most: not more, looked at for `window` seconds more.
+            exactly: both at once.
+            rate: hertz; judged by the median gap of the publisher's own stamps, so that a slow grader does not matter.
+            tolerance: allowed deviation of the rate, as a share.
+            window: seconds.
+            where: counts only messages for which it is true.
+            values: looks at all counted messages; false, or a sentence that says what is wrong, fails.
+            publisher: full name of the node that they must come from.
+            publishers: how many publishers the topic may have.
+            qos: subscribe with this profile instead of one that hears everything.
+            within: seconds to wait for `at_least`.
+            hint: a pointer for the student.
+
+        Returns:
+            the counted messages.
+        """
+        need = exactly if exactly is not None else at_least or (10 if rate else 1)
+        most = exactly if exactly is not None else at_most
+        recording = self.observer.record(topic, msg_type, qos)
+
+        def counted() -> list[Received]:
+            return [r for r in recording.messages if where is None or where(r.msg)]
+
+        title = _title(topic, need, most, rate)
+        if not self.wait(lambda: len(counted()) >= need, within):
+            got = len(counted())
+            reason = diagnosis.why_silent(self.scene(), topic, msg_type, qos or quiet_profile())
+            if got and reason.code == "silent":
+                reason = Diagnosis(f"Only {got} of {need} messages came in {within:g} s.", "too-few")
+            elif where and recording.count and reason.code == "silent":
+                reason = Diagnosis(f"{recording.count} messages came, but none as expected.", "content")
+            self.fail(title, reason, expected=f"{need} messages", observed=f"{got} messages", hint=hint)
+        if most is not None:
+            self.observer.wait(lambda: len(counted()) > most, window)
+        received = counted()
+        if most is not None and len(received) > most:
+            self.fail(
+                title,
+                Diagnosis(f"{len(received)} messages came where at most {most} were expected.", "too-many"),
+                expected=f"at most {most}",
+                observed=f"{len(received)}",
+                hint=hint,
+            )
+        self._one_source(title, topic, msg_type, publisher, publishers, recording)
+        if rate is not None:
+            self._rate(title, received, rate, tolerance, hint)
+        if values is not None:
+            verdict = values([r.msg for r in received])
+            if verdict is not True:
+                told = verdict if isinstance(verdict, str) else "The content of the messages is not as expected."
+                self.fail(
+                    title,
+                    Diagnosis(told, "content"),
+                    observed=_shorten("; ".join(_text(r.msg) for r in received[:3])),
+                    hint=hint,
+                )
+        outcomes.passed(title, observed=f"{len(received)} messages")
+        return [r.msg for r in received]
+
+    def _one_source(
+        self, title: str, topic: str, msg_type: type, node: str, publishers: int, recording: Recording
+    ) -> None:
+        ends = self._ends(topic, msg_type, "publisher", "")
+        if len(ends) > publishers:
+            owners = ", ".join(sorted(full_name(end.node_namespace, end.node_name) for end in ends))
+            self.fail(
+                title,
+                Diagnosis(
+                    f"`{topic}` has {len(ends)} publishers ({owners}): it cannot be told whose messages these are.",
+                    "extra-publisher",
+                    "Publish on this topic from one place only.",
+                ),
+                expected=f"{publishers} publisher",
+                observed=f"{len(ends)} publishers",
+            )
+        if publishers == 1:
+            # Each publisher counts its own messages: a second one, gone by now, shows as a number that comes again.
+            numbers = [r.sequence for r in recording.messages]
+            if any(later <= earlier for earlier, later in itertools.pairwise(numbers)):
+                self.fail(
+                    title,
+                    Diagnosis(
+                        f"The messages on `{topic}` come from more than one publisher (their sequence numbers repeat).",
+                        "extra-publisher",
+                    ),
+                    expected="one publisher",
+                )
+        if node and not any(full_name(end.node_namespace, end.node_name) == node for end in ends):
+            owners = (
+                ", ".join(sorted(full_name(end.node_namespace, end.node_name) for end in ends)) or "nobody any more"
+            )
+            self.fail(
+                title,
+                Diagnosis(f"The messages on `{topic}` come from {owners}, not from `{node}`.", "wrong-node"),
+                expected=node,
+                observed=owners,
+            )
+
+    def _rate(self, title: str, received: Sequence[Received], rate: float, tolerance: float, hint: str) -> None:
+        gaps = [b.stamp - a.stamp for a, b in itertools.pairwise(received)]
+        median = statistics.median(gaps) if gaps else 0.0
+        if not gaps or abs(median - 1 / rate) > tolerance / rate:
+            measured = f"{1 / median:.1f} Hz" if median > 0 else "all at once"
+            self.fail(
+                title,
+                Diagnosis(f"The messages come at {measured} instead of {rate:g} Hz.", "rate"),
+                expected=f"{rate:g} Hz within {tolerance:.0%}",
+                observed=measured,
+                hint=hint,
+            )
+
+    def expect_silence(self, topic: str, msg_type: type, *, seconds: float = 1.0, hint: str = "") -> None:
+        """Nothing arrives on the topic for `seconds`, after what is already under way."""
+        recording = self.observer.record(topic, msg_type)
+        self.observer.wait(lambda: False, 0.15)  # messages sent before this moment may still arrive
+        before = recording.count
+        came = self.observer.wait(lambda: recording.count > before, seconds)
+        self.expect_that(
+            not came,
+            f"Nothing is published on `{topic}`",
+            lambda: Diagnosis(f"Messages came on `{topic}` that should not.", "not-silent"),
+            expected="no message",
+            observed=f"{recording.count - before} messages",
+            hint=hint,
+        )
+
+    def publish(
+        self,
+        topic: str,
+        *messages: Any,
+        qos: QoSProfile | int = RELIABLE_DEEP,
+        within: float = WITHIN,
+        hint: str = "",
+    ) -> None:
+        """Send messages to the student's node, after its subscription has matched.
+
+        A missing or incompatible subscription is a failed outcome with its reason.
+        """
+        msg_type = type(messages[0])
+        profile = qos if isinstance(qos, QoSProfile) else QoSProfile(depth=qos)
+        key = (topic, repr(profile))
+        if key not in self._publishers:
+            self._publishers[key] = self.observer.publisher(topic, msg_type, profile)
+        publisher = self._publishers[key]
+        if not self.wait(lambda: publisher.get_subscription_count() > 0, within):
+            reason = diagnosis.why_not_matched(
+                self.scene(), topic, profile, "subscription"
+            ) or diagnosis.why_no_endpoint(self.scene(), topic, msg_type, "subscription")
+            self.fail(
+                f"A node listens to `{topic}`",
+                reason,
+                expected=f"a subscription on {topic}",
+                observed=self._topics(),
+                hint=hint,
+            )
+        for message in messages:
+            publisher.publish(message)
+
+    def activity(self, topic: str) -> Activity:
+        """Begins and ends of callbacks that have arrived on a topic so far."""
+        from std_msgs.msg import String
+
+        return Activity(self.observer.record(topic, String).messages)
+
+    def _wait_for_runs(self, topic: str, names: Sequence[str], runs: int, title: str, within: float, hint: str) -> None:
+        if self.wait(lambda: all(self.activity(topic).runs(name) >= runs for name in names), within):
+            return
+        from std_msgs.msg import String
+
+        found = self.activity(topic)
+        counts = {name: found.runs(name) for name in names}
+        told = ", ".join(f"{name} {count}" for name, count in counts.items())
+        reason = diagnosis.why_silent(self.scene(), topic, String, quiet_profile())
+        if any(counts.values()):
+            starved = [name for name, count in counts.items() if count < runs]
+            serial = diagnosis.why_serial(self.scene())
+            reason = diagnosis.program_trouble(self.scene()) or Diagnosis(
+                f"{', '.join(starved)} did not run {runs} times while others did. "
+                + (serial.because if serial else ""),
+                "starved",
+                serial.hint if serial else "",
+            )
+        self.fail(title, reason, expected=f"{runs} complete runs of each", observed=told or "no run", hint=hint)
+
+    def expect_runs(
+        self, topic: str, names: Sequence[str], *, runs: int = 2, within: float = WITHIN, hint: str = ""
+    ) -> None:
+        """Each of the named callbacks runs completely at least `runs` times."""
+        title = f"{', '.join(names)} run, each at least {runs} times"
+        self._wait_for_runs(topic, names, runs, title, within, hint)
+        outcomes.passed(title)
+
+    def expect_overlap(
+        self,
+        topic: str,
+        names: Sequence[str],
+        others: Sequence[str] = (),
+        *,
+        itself: bool = False,
+        within: float = WITHIN,
+        hint: str = "",
+    ) -> None:
+        """Callbacks run at the same time.
+
+        Args:
+            topic: where they publish `NAME begin` and `NAME end` (`std_msgs/String`).
+            names: two different ones of these are under way at once; with `others`, one of these and one of those.
+            others: the other side.
+            itself: one of `names` overlaps itself instead.
+            within: seconds to wait.
+            hint: a pointer for the student.
+        """
+        if itself:
+            title = f"{' and '.join(names)} overlap{'s' if len(names) == 1 else ''} itself"
+        elif others:
+            title = f"{', '.join(names)} and {', '.join(others)} overlap each other"
+        else:
+            title = f"{', '.join(names)} overlap each other"
+
+        def holds() -> bool:
+            found = self.activity(topic)
+            if itself:
+                return all(found.overlap([name]) >= 2 for name in names)
+            return found.crossed(names, others) if others else found.distinct_overlap(names) >= 2
+
+        def decided() -> bool:
+            found = self.activity(topic)
+            return holds() or all(found.runs(name) >= DECISIVE_RUNS for name in [*names, *others])
+
+        self.wait(decided, within)
+        if holds():
+            outcomes.passed(title)
+            return
+        if not all(self.activity(topic).runs(name) for name in [*names, *others]):
+            self._wait_for_runs(topic, [*names, *others], 1, title, 0.1, hint)
+        self.fail(
+            title,
+            diagnosis.program_trouble(self.scene())
+            or diagnosis.why_serial(self.scene())
+            or Diagnosis("They ran one after another in every case.", "no-overlap"),
+            expected="two at once",
+            observed="one at a time",
+            hint=hint,
+        )
+
+    def expect_no_overlap(
+        self, topic: str, names: Sequence[str], *, runs: int = 3, within: float = WITHIN, hint: str = ""
+    ) -> None:
+        """The named callbacks never run at the same time; each must have run at least `runs` times to count."""
+        title = f"{', '.join(names)} never overlap"
+        self._wait_for_runs(topic, names, runs, title, within, hint)
+        most = self.activity(topic).overlap(names)
+        self.expect_that(
+            most <= 1,
+            title,
+            lambda: Diagnosis(
+                f"Up to {most} of them ran at once: they are not all in one mutually exclusive group.",
+                "overlap",
+                "Callbacks exclude each other only within the same MutuallyExclusiveCallbackGroup object.",
+            ),
+            expected="one at a time",
+            observed=f"{most} at once",
+            hint=hint,
+        )
+
+
+def _title(topic: str, need: int, most: int | None, rate: float | None) -> str:
+    number = f"exactly {need}" if most == need else f"at least {need}" + (f", at most {most}," if most else "")
+    return f"{number} message{'s' if need != 1 else ''} arrive on `{topic}`".capitalize() + (
+        f" at {rate:g} Hz" if rate else ""
+    )
+
+
+def _text(message: Any) -> str:
+    data = getattr(message, "data", None)
+    return str(data) if isinstance(data, (str, int, float, bool)) else str(message)
+
+
+def _shorten(text: str, length: int = 200) -> str:
+    return text if len(text) <= length else text[: length - 3] + "..."

@@ -1,0 +1,186 @@
+"""Expectations of services, parameters and actions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NoReturn
+
+from rcl_interfaces.srv import GetParameters
+
+from autograder.checks import outcomes
+from autograder.checks.base import WITHIN
+from autograder.checks.expect_graph import GraphExpectations
+from autograder.graph import actions, diagnosis, parameters
+from autograder.graph.diagnosis import Diagnosis
+from autograder.graph.names import type_name
+from autograder.graph.services import Answer, OfferedService, ServiceMissing, call_all
+
+ANSWER_WITHIN = 5.0
+"""Seconds that an answer may take: a local round trip takes 1 to 4 ms, a stuck node takes for ever."""
+
+
+class ServiceExpectations(GraphExpectations):
+    """What must answer, and what it must say."""
+
+    def prepare(self) -> None:
+        """Set up the offered services."""
+        super().prepare()
+        self._offered: dict[str, OfferedService] = {}
+
+    def serve(self, name: str, srv_type: type, answer: Callable[[Any, Any], Any], delay: float = 0.0) -> OfferedService:
+        """Offer a service to the student's client; each answer comes after `delay` seconds."""
+        self._offered[name] = OfferedService(self.observer, name, srv_type, answer, delay)
+        return self._offered[name]
+
+    def requests(self, name: str) -> list[Any]:
+        """Requests that have reached a service offered by `serve`."""
+        return list(self._offered[name].requests)
+
+    def expect_service(self, name: str, srv_type: type, *, within: float = WITHIN, hint: str = "") -> None:
+        """A node offers this service with this type."""
+        wanted = type_name(srv_type)
+        found = self.wait(lambda: wanted in self.observer.services().get(name, []), within)
+        self.expect_that(
+            found,
+            f"The service `{name}` ({wanted}) is offered",
+            lambda: diagnosis.why_no_service(self.scene(), name, srv_type),
+            expected=f"{name} ({wanted})",
+            hint=hint,
+        )
+
+    def call_many(
+        self, name: str, srv_type: type, requests: Sequence[Any], *, within: float = ANSWER_WITHIN, hint: str = ""
+    ) -> list[Answer]:
+        """Send all requests at once; each must be answered. Missing server or answer is a failed outcome."""
+        title = f"The service `{name}` answers"
+        try:
+            answers = call_all(self.observer, name, srv_type, requests, within, self.all_ended)
+        except ServiceMissing:
+            self.fail(title, diagnosis.why_no_service(self.scene(), name, srv_type), expected=name, hint=hint)
+        unanswered = sum(1 for answer in answers if answer.response is None)
+        if unanswered:
+            self.fail(
+                title,
+                diagnosis.why_no_answer(self.scene(), name),
+                expected=f"an answer within {within:g} s",
+                observed="no answer"
+                if len(answers) == 1
+                else f"{unanswered} of {len(answers)} calls without an answer",
+                hint=hint,
+            )
+        outcomes.passed(title)
+        return answers
+
+    def call(self, name: str, srv_type: type, request: Any, *, within: float = ANSWER_WITHIN, hint: str = "") -> Any:
+        """Call a service of the student's and give the response."""
+        return self.call_many(name, srv_type, [request], within=within, hint=hint)[0].response
+
+    def _no_parameters(self, title: str, node: str, error: Exception, hint: str) -> NoReturn:
+        if isinstance(error, ServiceMissing):
+            if node in self.observer.nodes():
+                reason = diagnosis.why_no_service(self.scene(), f"{node}/get_parameters", GetParameters)
+            else:
+                reason = diagnosis.why_no_node(self.scene(), node)
+        else:
+            reason = diagnosis.why_no_answer(self.scene(), f"{node}/get_parameters")
+        self.fail(title, reason, expected=node, observed=", ".join(self.observer.nodes()), hint=hint)
+
+    def get_parameters(self, node: str, names: Sequence[str], *, within: float = WITHIN) -> Mapping[str, Any]:
+        """Values of a node's parameters; those it has not declared are left out."""
+        try:
+            return parameters.get_parameters(self.observer, node, names, within, self.all_ended)
+        except (ServiceMissing, parameters.NoAnswer) as error:
+            self._no_parameters(f"`{node}` tells its parameters", node, error, "")
+
+    def list_parameters(self, node: str, *, within: float = WITHIN) -> list[str]:
+        """Names of the parameters that a node has declared."""
+        try:
+            return parameters.list_parameters(self.observer, node, within, self.all_ended)
+        except (ServiceMissing, parameters.NoAnswer) as error:
+            self._no_parameters(f"`{node}` tells its parameters", node, error, "")
+
+    def set_parameter(self, node: str, name: str, value: Any, *, within: float = WITHIN) -> Any:
+        """Ask a node to set a parameter; gives its SetParametersResult."""
+        try:
+            return parameters.set_parameter(self.observer, node, name, value, within, self.all_ended)
+        except (ServiceMissing, parameters.NoAnswer) as error:
+            self._no_parameters(f"`{node}` answers when `{name}` is set to {value!r}", node, error, "")
+
+    def expect_parameter(self, node: str, name: str, value: Any, *, within: float = WITHIN, hint: str = "") -> None:
+        """A node has a parameter with this value and type."""
+        title = f"Parameter `{name}` of `{node}` is {value!r}"
+        try:
+            have = parameters.get_parameters(self.observer, node, [name], within, self.all_ended)
+        except (ServiceMissing, parameters.NoAnswer) as error:
+            self._no_parameters(title, node, error, hint)
+        if name not in have:
+            declared = parameters.list_parameters(self.observer, node, within, self.all_ended)
+            own = [p for p in declared if p != "use_sim_time" and "qos_overrides" not in p]
+            self.fail(
+                title,
+                Diagnosis(
+                    f"`{node}` has not declared a parameter `{name}`" + (f"; it has {', '.join(own)}." if own else "."),
+                    "parameter-undeclared",
+                    "A value given at the start reaches declared parameters only.",
+                ),
+                expected=repr(value),
+                hint=hint,
+            )
+        same = type(have[name]) is type(value) and (
+            abs(have[name] - value) < 1e-9 if isinstance(value, float) else have[name] == value
+        )
+        if not isinstance(value, (bool, int, float, str)):
+            same = list(have[name]) == list(value)
+        self.expect_that(
+            same,
+            title,
+            lambda: Diagnosis(f"It is {have[name]!r} ({type(have[name]).__name__}).", "parameter-value"),
+            expected=repr(value),
+            observed=repr(have[name]),
+            hint=hint,
+        )
+
+    def expect_parameter_refused(
+        self, node: str, name: str, value: Any, *, within: float = WITHIN, hint: str = ""
+    ) -> None:
+        """A node refuses a value with a reason, keeps the old one and lives on."""
+        title = f"`{node}` refuses `{name}` = {value!r} with a reason and lives on"
+        before = self.get_parameters(node, [name], within=within)
+        try:
+            reply = parameters.set_parameter(self.observer, node, name, value, within, self.all_ended)
+        except (ServiceMissing, parameters.NoAnswer) as error:
+            self._no_parameters(title, node, error, hint)
+        reason = ""
+        if reply.successful:
+            reason = "It was accepted."
+        elif not reply.reason:
+            reason = "It was refused without a reason."
+        elif self.get_parameters(node, [name], within=within) != before:
+            reason = "It was refused, yet the value has changed."
+        self.expect_that(
+            not reason,
+            title,
+            lambda: Diagnosis(reason, "parameter-accepted" if reply.successful else "parameter-refusal"),
+            observed=reply.reason,
+            hint=hint,
+        )
+
+    def send_goal(
+        self, name: str, action_type: type, goal: Any, *, within: float = WITHIN, hint: str = ""
+    ) -> actions.Goal:
+        """Send a goal and wait for the server's decision; a missing server or decision is a failed outcome."""
+        title = f"The action `{name}` decides about a goal"
+        try:
+            sent = actions.send_goal(self.observer, name, action_type, goal, within, self.all_ended)
+        except actions.ServerMissing:
+            self.fail(
+                title,
+                diagnosis.program_trouble(self.scene())
+                or Diagnosis(f"No node offers the action `{name}`.", "no-action"),
+                expected=name,
+                hint=hint,
+            )
+        if sent.accepted is None:
+            self.fail(title, diagnosis.why_no_answer(self.scene(), name), expected="accepted or rejected", hint=hint)
+        outcomes.passed(title, observed="accepted" if sent.accepted else "rejected")
+        return sent

@@ -1,0 +1,208 @@
+"""`launch`: starts a student's programs and an observer on a ROS domain of their own.
+
+The arguments are those of a ROS launch description: program, namespace, name, remappings, parameters.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from types import TracebackType
+from typing import Any
+
+import yaml
+
+from autograder.checks import outcomes, session
+from autograder.checks.expect_graph import GraphExpectations
+from autograder.checks.expect_lifecycle import LifecycleExpectations
+from autograder.checks.expect_messages import MessageExpectations
+from autograder.checks.expect_programs import ProgramExpectations
+from autograder.checks.expect_services import ServiceExpectations
+from autograder.checks.scoring import score
+from autograder.checks.session import Score
+from autograder.graph.observer import Observer
+from autograder.results import NodeLog
+from autograder.sandbox.environment import profile_environment
+from autograder.sandbox.nodes import Program
+
+
+@dataclass(frozen=True)
+class Node:
+    """One program of the student's and the ROS arguments it is started with, named as in a launch description."""
+
+    program: str
+    namespace: str = ""
+    name: str = ""
+    remappings: Sequence[tuple[str, str]] = ()
+    parameters: Mapping[str, Any] = field(default_factory=dict)
+    params_file: str = ""
+    """A parameter file of the student's; it comes before `parameters`, which win."""
+    ros_arguments: Sequence[str] = ()
+    """Further words after `--ros-args`, as typed on a command line."""
+    cores: int = 2
+    """CPUs that the program may use: the same number on every machine that has them."""
+
+    def arguments(self) -> list[str]:
+        """The program's command line."""
+        words: list[str] = []
+        for rule in self.rules():
+            words += ["-r", rule]
+        if self.params_file:
+            words += ["--params-file", self.params_file]
+        for name, value in self.parameters.items():
+            words += ["-p", f"{name}:={_yaml_value(value)}"]
+        words += self.ros_arguments
+        return ["--ros-args", *words] if words else []
+
+    def rules(self) -> list[str]:
+        """The remap rules in the order in which they are given: the first that matches wins."""
+        rules = [f"{old}:={new}" for old, new in self.remappings]
+        if self.namespace:
+            rules.append(f"__ns:={self.namespace}")
+        if self.name:
+            rules.append(f"__node:={self.name}")
+        return rules
+
+
+def _yaml_value(value: Any) -> str:
+    """A parameter value as the command line wants it; strings are quoted so that `40` stays a string."""
+    if isinstance(value, str):
+        return '"' + value.replace("\\", "\\\\").replace('"', '\\"') + '"'
+    if isinstance(value, float):
+        return repr(value)  # keeps the point: 40.0 is a double, 40 an integer
+    return yaml.safe_dump(value, default_flow_style=True, width=10_000).splitlines()[0]
+
+
+class Launch(GraphExpectations, MessageExpectations, ServiceExpectations, LifecycleExpectations, ProgramExpectations):
+    """A running launch: `ros` in a check cell."""
+
+    def __init__(
+        self,
+        nodes: Sequence[Node],
+        listen: Iterable[tuple[str, type]],
+        serve: Iterable[tuple[Any, ...]],
+        lifecycle: Iterable[str],
+    ) -> None:
+        """Use `launch`."""
+        self.nodes = list(nodes)
+        self._listen, self._serve, self._lifecycle = list(listen), list(serve), list(lifecycle)
+        self.programs: list[tuple[Node, Program]] = []
+        self._missing: list[str] = []
+
+    def __enter__(self) -> Launch:
+        self.domain_id = session.current.next_domain()
+        # The middleware reads its profile once, before the first participant of the process.
+        os.environ.update(profile_environment())
+        os.environ.pop("ROS_AUTOMATIC_DISCOVERY_RANGE", None)
+        self.observer = Observer(self.domain_id)
+        self.prepare()
+        try:
+            for topic, msg_type in self._listen:
+                self.observer.record(topic, msg_type)
+            for offer in self._serve:
+                self.serve(*offer)
+            for node in self._lifecycle:
+                self.watch_transitions(node)
+            for launched in self.nodes:
+                self.start(launched)
+        except BaseException:
+            self._end()
+            raise
+        return self
+
+    def start(self, node: Node | str) -> None:
+        """Start one more program.
+
+        Args:
+            node: a program's name, or a `Node` with arguments.
+        """
+        launched = Node(node) if isinstance(node, str) else node
+        if not (session.current.folder / f"{launched.program}.py").is_file():
+            self._missing.append(launched.program)
+            return
+        environment = {**profile_environment(), "ROS_DOMAIN_ID": str(self.domain_id)}
+        program = session.current.sandbox.start(
+            launched.program, launched.arguments(), environment, cores=launched.cores
+        )
+        self.programs.append((launched, program))
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> bool:
+        if error is not None and not isinstance(error, outcomes.CheckEnded) and isinstance(error, Exception):
+            # A check that breaks says nothing about the student: the instructor decides.
+            outcomes.unknown("The check itself broke", f"{type(error).__name__}: {error}")
+        self._end()
+        return error is None or isinstance(error, Exception)
+
+    def score(self, points: float) -> Score:
+        """The score of the cell, over all its launches since the last score."""
+        return score(points)
+
+    def _end(self) -> None:
+        try:
+            session.current.sandbox.end_all()
+        finally:
+            self.observer.close()
+        for launched, program in self.programs:
+            session.current.logs.append(
+                NodeLog(
+                    program=launched.program,
+                    text=program.output(),
+                    truncated=program.truncated(),
+                    exit_status=program.exit_status(),
+                    stopped_by=program.stopped_by(),
+                )
+            )
+
+
+def launch(
+    *programs: str | Node,
+    namespace: str = "",
+    name: str = "",
+    remappings: Sequence[tuple[str, str]] = (),
+    parameters: Mapping[str, Any] | None = None,
+    params_file: str = "",
+    use_sim_time: bool = False,
+    ros_arguments: Sequence[str] = (),
+    cores: int = 2,
+    listen: Iterable[tuple[str, type]] = (),
+    serve: Iterable[tuple[str, type, Callable[[Any, Any], Any], float] | tuple[Any, ...]] = (),
+    lifecycle: Iterable[str] = (),
+) -> Launch:
+    """Describe a launch; `with` starts it and ends it.
+
+    Args:
+        programs: names of programs (`%%node NAME`), or `Node`s with arguments of their own.
+        namespace: for all programs, such as `/rear_camera`.
+        name: node name, as `-r __node:=NAME`.
+        remappings: remap rules, first match wins.
+        parameters: initial values.
+        params_file: a parameter file of the student's.
+        use_sim_time: take time from `/clock`, which `ros.advance` drives.
+        ros_arguments: further words after `--ros-args`.
+        cores: CPUs that each program may use.
+        listen: (topic, message class) to record from before the start.
+        serve: (service, class, answer, delay in seconds) that the observer offers.
+        lifecycle: full names of lifecycle nodes whose transition events are recorded from before the start.
+    """
+    given = dict(parameters or {})
+    if use_sim_time:
+        given["use_sim_time"] = True
+    nodes = []
+    for program in programs:
+        node = Node(program) if isinstance(program, str) else program
+        nodes.append(
+            replace(
+                node,
+                namespace=node.namespace or namespace,
+                name=node.name or name,
+                remappings=[*node.remappings, *remappings],
+                parameters={**given, **node.parameters},
+                params_file=node.params_file or params_file,
+                ros_arguments=[*node.ros_arguments, *ros_arguments],
+                cores=min(node.cores, cores),
+            )
+        )
+    return Launch(nodes, listen, serve, lifecycle)
