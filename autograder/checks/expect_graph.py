@@ -97,7 +97,7 @@ class GraphExpectations(ExpectationBase):
         owners = sorted({full_name(end.node_namespace, end.node_name) for end in ends})
         if any(end.node_namespace != "/" and not topic.startswith(end.node_namespace + "/") for end in ends):
             return Diagnosis(
-                f"{', '.join(owners)} uses `{topic}`, which lies outside the node's own namespace: the name is absolute.",
+                f"{', '.join(owners)} uses `{topic}`, outside the node's own namespace: the name is absolute.",
                 "absolute-name",
                 "A topic name with a leading slash is absolute: no namespace reaches it. Write it without the slash.",
             )
@@ -158,13 +158,17 @@ class GraphExpectations(ExpectationBase):
         """The topic has exactly `count` subscriptions of this type, of the node `node` if one is given."""
         self._expect_end(topic, msg_type, "subscription", node, count, within, hint)
 
+    def _owners(self, topic: str, kind: End) -> str:
+        ends = self._ends(topic, None, kind, "")
+        return ", ".join(sorted({full_name(end.node_namespace, end.node_name) for end in ends}))
+
     def _expect_no_end(self, topic: str, kind: End, within: float, hint: str) -> None:
         gone = self.observer.wait(lambda: not self._ends(topic, None, kind, ""), within)
         self.expect_that(
             gone,
             f"`{topic}` has no {kind}",
             lambda: Diagnosis(
-                f"A {kind} on `{topic}` is still there: {', '.join(sorted({full_name(e.node_namespace, e.node_name) for e in self._ends(topic, None, kind, '')}))}.",
+                f"A {kind} on `{topic}` is still there, of {self._owners(topic, kind)}.",
                 f"{kind}-present",
             ),
             hint=hint,

@@ -172,7 +172,7 @@ class ServiceExpectations(GraphExpectations):
         title = f"The action `{name}` decides about a goal"
         try:
             sent = actions.send_goal(self.observer, name, action_type, goal, within, self.all_ended)
-        except actions.ServerMissing:
+        except ServiceMissing:
             self.fail(
                 title,
                 diagnosis.program_trouble(self.scene())

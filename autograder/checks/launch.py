@@ -14,7 +14,6 @@ from typing import Any
 import yaml
 
 from autograder.checks import outcomes, session
-from autograder.checks.expect_graph import GraphExpectations
 from autograder.checks.expect_lifecycle import LifecycleExpectations
 from autograder.checks.expect_messages import MessageExpectations
 from autograder.checks.expect_programs import ProgramExpectations
@@ -74,7 +73,7 @@ def _yaml_value(value: Any) -> str:
     return yaml.safe_dump(value, default_flow_style=True, width=10_000).splitlines()[0]
 
 
-class Launch(GraphExpectations, MessageExpectations, ServiceExpectations, LifecycleExpectations, ProgramExpectations):
+class Launch(MessageExpectations, ServiceExpectations, LifecycleExpectations, ProgramExpectations):
     """A running launch: `ros` in a check cell."""
 
     def __init__(

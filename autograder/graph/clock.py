@@ -19,7 +19,7 @@ class ClockDriver:
     def __init__(self, observer: Observer) -> None:
         """Start at 1 s: rclpy takes time 0 for "not set"."""
         self._observer = observer
-        self._publisher = observer.publisher("/clock", Clock, 10)  # type: ignore[arg-type]
+        self._publisher = observer.publisher("/clock", Clock, 10)
         self.now = 1.0
         """Simulated seconds."""
 

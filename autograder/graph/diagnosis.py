@@ -1,7 +1,7 @@
 """Why something did not happen: walks the chain from the program to the message and names the first broken link.
 
-What the graph shows is evidence. What the student's process says about itself (its output, its probe's events, its thread
-stacks) is used here for the *reason* only; points never depend on it.
+What the graph shows is evidence. What the student's process says about itself (its output, its probe's events, its
+thread stacks) is used here for the *reason* only; points never depend on it.
 """
 
 from __future__ import annotations
