@@ -1,1 +1,1 @@
-"""Keeps a student's programs away from the checks, the machine and other students."""
+"""The walls around a student's programs, and the launcher that starts them."""
