@@ -48,7 +48,9 @@ class LifecycleExpectations(GraphExpectations):
         except (ServiceMissing, NoAnswer) as error:
             self._unreachable(f"`{node}` tells its lifecycle state", node, error, "")
 
-    def expect_state(self, node: str, state: str, *, within: float = WITHIN, hint: str = "") -> None:
+    def expect_state(
+        self, node: str, state: str, *, within: float = WITHIN, because: str = "", code: str = "", hint: str = ""
+    ) -> None:
         """A lifecycle node is in this state, or gets there within `within` seconds."""
         title = f"`{node}` is {state}"
         try:
@@ -58,7 +60,7 @@ class LifecycleExpectations(GraphExpectations):
         self.expect_that(
             seen == state,
             title,
-            lambda: self._why_state(node, seen, state),
+            lambda: Diagnosis(because, code or "state") if because else self._why_state(node, seen, state),
             expected=state,
             observed=seen,
             hint=hint,
@@ -79,22 +81,24 @@ class LifecycleExpectations(GraphExpectations):
             self._unreachable(f"`{node}` tells its transitions", node, error, "")
 
     def transition(
-        self, node: str, label: str, *, expect: str = "success", within: float = WITHIN, hint: str = ""
+        self, node: str, label: str, *, expect: str | None = "success", within: float = WITHIN, hint: str = ""
     ) -> Requested:
         """Request a transition by its label.
 
         Args:
             node: full name.
             label: `configure`, `activate`, `deactivate`, `cleanup` or `shutdown`.
-            expect: `success`, `failure` (the node answers that it did not succeed), or `any`.
+            expect: `success`, `failure` (the node answers that it did not succeed), or None: look only, no outcome.
             within: seconds.
             hint: a pointer for the student.
         """
-        title = f"`{node}`: {label}" + {"success": " succeeds", "failure": " does not succeed", "any": ""}[expect]
+        title = f"`{node}`: {label}" + {"success": " succeeds", "failure": " does not succeed", None: ""}[expect]
         try:
             done = self.watch_transitions(node).transition(label, within, self.all_ended)
         except (ServiceMissing, NoAnswer) as error:
             self._unreachable(title, node, error, hint)
+        if expect is None:
+            return done
         if not done.offered:
             self.fail(
                 title,
@@ -131,8 +135,8 @@ class LifecycleExpectations(GraphExpectations):
         return done
 
     def changes(self, *nodes: str) -> list[Change]:
-        """State changes of the nodes so far, in the order in which they were published."""
-        return in_order([self.watch_transitions(node) for node in nodes])
+        """State changes so far of the nodes (by default of all that are watched), in the order of publication."""
+        return in_order([self.watch_transitions(node) for node in nodes or self._lifecycle_clients])
 
     def expect_transitions(
         self, node: str, steps: Sequence[tuple[str, str]], *, within: float = WITHIN, hint: str = ""

@@ -173,8 +173,13 @@ class MessageExpectations(GraphExpectations):
                 hint=hint,
             )
 
-    def expect_silence(self, topic: str, msg_type: type, *, seconds: float = 1.0, hint: str = "") -> None:
-        """Nothing arrives on the topic for `seconds`, after what is already under way."""
+    def expect_silence(
+        self, topic: str, msg_type: type, *, seconds: float = 1.0, because: str = "", code: str = "", hint: str = ""
+    ) -> None:
+        """Nothing arrives on the topic for `seconds`, after what is already under way.
+
+        `because` and `code` say what a message would mean here, if the check knows better than "it should not".
+        """
         recording = self.observer.record(topic, msg_type)
         self.observer.wait(lambda: False, 0.15)  # messages sent before this moment may still arrive
         before = recording.count
@@ -182,7 +187,7 @@ class MessageExpectations(GraphExpectations):
         self.expect_that(
             not came,
             f"Nothing is published on `{topic}`",
-            lambda: Diagnosis(f"Messages came on `{topic}` that should not.", "not-silent"),
+            lambda: Diagnosis(because or f"Messages came on `{topic}` that should not.", code or "not-silent"),
             expected="no message",
             observed=f"{recording.count - before} messages",
             hint=hint,
