@@ -1,0 +1,240 @@
+"""Stage B: hands the results to nbgrader, one after another, and writes gradebook, feedback and the table of grades."""
+
+from __future__ import annotations
+
+import csv
+import io
+import logging
+import os
+import re
+import shutil
+import sys
+import tempfile
+import warnings
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any
+
+from autograder.errors import KitError
+from autograder.files import write_beside
+from autograder.grading.stage_a import result_path
+from autograder.submission.lab import Lab
+
+
+def prepare_nbgrader() -> None:
+    """Make nbgrader importable at a bearable price, and able to find its database tool."""
+    # Without this module jsonschema does not check one format of strings; with it, building its grammar takes 3 s.
+    sys.modules.setdefault("rfc3987_syntax", None)  # type: ignore[arg-type]
+    os.environ["TRAITLETS_APPLICATION_RAISE_CONFIG_FILE_ERROR"] = "1"
+    # nbgrader runs `alembic` by name.
+    tools = str(Path(sys.executable).parent)
+    if tools not in os.environ.get("PATH", "").split(os.pathsep):
+        os.environ["PATH"] = tools + os.pathsep + os.environ.get("PATH", "")
+
+
+def _api(root: Path, **directories: Any) -> Any:
+    """Return nbgrader's API with the course's stages.
+
+    Args:
+        root: of the course.
+        directories: settings of nbgrader's CourseDirectory to replace.
+    """
+    prepare_nbgrader()
+    from nbgrader.apps import NbGraderAPI
+    from nbgrader.coursedir import CourseDirectory
+    from traitlets.config import Config
+
+    from autograder.grading.stages import configure
+
+    config = Config()
+    configure(config, root)
+    config.NbGraderAPI.log_level = logging.ERROR
+    # What nbgrader logs is read from its answers; it shall not also go to the terminal.
+    logging.getLogger("traitlets").addHandler(logging.NullHandler())
+    warnings.filterwarnings("ignore", module=r"nbgrader\.api")
+    config.CourseDirectory.merge(directories)
+    (root / "build").mkdir(exist_ok=True)
+    return NbGraderAPI(CourseDirectory(config=config), config=config)
+
+
+def generate(root: Path, lab: str, into: Path, database: Path) -> Path:
+    """Generate what students receive of a lab, and note its cells in a gradebook.
+
+    Returns:
+        The folder of the generated lab.
+
+    Raises:
+        KitError: nbgrader refuses.
+    """
+    api = _api(root, release_directory=str(into), db_url=f"sqlite:///{database}", ignore=_NOT_RELEASED)
+    answer = api.generate_assignment(lab, force=True, create=True)
+    if not answer["success"]:
+        if "there are submissions associated" in answer.get("log", "") + answer["error"]:
+            raise KitError(
+                f"The graded cells of {lab} are not those that {database} has grades for.",
+                f"Move {database} away, then grade again.",
+            )
+        raise KitError(f"nbgrader could not generate {lab}.", _last_error(answer))
+    return into / lab
+
+
+_NOT_RELEASED = [".ipynb_checkpoints", "*.pyc", "__pycache__", ".*", "nodes"]
+"""Files beside a lab's source that are not part of it."""
+
+
+def _last_error(answer: dict[str, Any]) -> str:
+    """The last telling line of what nbgrader logged."""
+    text = answer.get("log", "") + "\n" + answer.get("error", "")
+    lines = [line.strip() for line in text.splitlines() if re.match(r"\s*[\w.]*(Error|Exception|Entry)\b: ", line)]
+    telling = [line for line in lines if "NbGraderException" not in line]
+    return (telling or lines or ["no reason given"])[-1]
+
+
+def release(root: Path, lab: str) -> Path:
+    """Generate `labs/<lab>` from `solutions/<lab>`; equal sources give equal files. Returns the folder.
+
+    Raises:
+        KitError: there is no such lab under `solutions`, or nbgrader refuses.
+    """
+    if not (root / "solutions" / lab / f"{lab}.ipynb").is_file():
+        raise KitError(f"There is no solutions/{lab}/{lab}.ipynb.", "Name a folder under `solutions`.")
+    with tempfile.TemporaryDirectory() as folder:
+        made = generate(root, lab, Path(folder) / "labs", Path(folder) / "gradebook.db")
+        for path in sorted(made.rglob("*")):
+            if path.is_file():
+                content = path.read_bytes()
+                if path.suffix == ".ipynb" and not content.endswith(b"\n"):
+                    content += b"\n"
+                write_beside(root / "labs" / lab / path.relative_to(made), content)
+    return root / "labs" / lab
+
+
+def register(root: Path, lab: str) -> None:
+    """Note a lab's cells in the course's gradebook; nbgrader needs them there before it grades.
+
+    Raises:
+        KitError: the gradebook has grades for other cells.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        generate(root, lab, Path(folder), root / "build" / "gradebook.db")
+
+
+def before_autograde(assignment: str, student: str, notebooks: list[str]) -> None:
+    """nbgrader's hook: note the lab's cells when `nbgrader autograde` meets a gradebook without them."""
+    from nbgrader.api import Gradebook, MissingEntry
+
+    root = Path.cwd()
+    with Gradebook(f"sqlite:///{root / 'build' / 'gradebook.db'}") as gradebook:
+        try:
+            gradebook.find_notebook(assignment, assignment)
+        except MissingEntry:
+            known = False
+        else:
+            known = True
+    if not known:
+        register(root, assignment)
+
+
+def record(
+    root: Path, lab: Lab, students: Iterable[str], force: bool, on_student: Callable[[str], None]
+) -> dict[str, str]:
+    """Record results in the gradebook and write feedback, for those that changed.
+
+    Args:
+        root: of the course.
+        lab: whose results are recorded.
+        students: in the order to record them.
+        force: record also what did not change.
+        on_student: called after each.
+
+    Returns:
+        Why it failed, by student; the others are recorded.
+    """
+    database = root / "build" / "gradebook.db"
+    touched_before = database.stat().st_mtime if database.exists() else 0.0
+    known = set() if force else _known(root, lab)
+    register(root, lab.name)
+    api = _api(root)
+    failures: dict[str, str] = {}
+    fresh: list[Path] = []
+    for student in students:
+        feedback = root / "build" / "feedback" / student / lab.name / f"{lab.name}.html"
+        if student not in known or _is_older(
+            root / "build" / "autograded" / student / lab.name / f"{lab.name}.ipynb",
+            result_path(root, lab.name, student),
+            lab.notebook,
+        ):
+            feedback.unlink(missing_ok=True)
+            answer = api.autograde(lab.name, student, force=True, create=True)
+            if not answer["success"]:
+                failures[student] = _last_error(answer)
+        if student not in failures and (
+            not feedback.exists() or feedback.stat().st_mtime < touched_before  # graded by hand since then
+        ):
+            answer = api.generate_feedback(lab.name, student, force=True)
+            if not answer["success"]:
+                failures[student] = _last_error(answer)
+        if student not in failures:
+            fresh.append(feedback)
+        on_student(student)
+    for feedback in fresh:
+        os.utime(feedback)
+    return failures
+
+
+def _is_older(path: Path, *others: Path) -> bool:
+    try:
+        return any(path.stat().st_mtime < other.stat().st_mtime for other in others)
+    except OSError:
+        return True
+
+
+def _known(root: Path, lab: Lab) -> set[str]:
+    """The students whose submission of a lab the gradebook has."""
+    database = root / "build" / "gradebook.db"
+    if not database.exists():
+        return set()
+    prepare_nbgrader()
+    from nbgrader.api import Gradebook, MissingEntry
+
+    with Gradebook(f"sqlite:///{database}") as gradebook:
+        try:
+            return {submission.student_id for submission in gradebook.find_assignment(lab.name).submissions}
+        except MissingEntry:
+            return set()
+
+
+def write_grades(root: Path) -> Path:
+    """Write `build/grades.csv` from the gradebook and return its path.
+
+    A row for each student and lab. The score stays empty as long as a check waits for an instructor's verdict.
+    """
+    prepare_nbgrader()
+    from nbgrader.api import Gradebook
+
+    rows: list[tuple[str, str, str, str]] = []
+    with Gradebook(f"sqlite:///{root / 'build' / 'gradebook.db'}") as gradebook:
+        for assignment in gradebook.assignments:
+            answers = {cell.name for notebook in assignment.notebooks for cell in notebook.solution_cells}
+            for submission in assignment.submissions:
+                grades = [grade for notebook in submission.notebooks for grade in notebook.grades]
+                undecided = any(
+                    grade.auto_score is None and grade.manual_score is None and grade.name not in answers
+                    for grade in grades
+                )
+                score = "" if undecided else f"{sum(grade.score for grade in grades):g}"
+                top = f"{sum(grade.max_score for grade in grades):g}"
+                rows.append((submission.student_id, assignment.name, score, top))
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(("student", "lab", "score", "max_score"))
+    writer.writerows(sorted(rows))
+    path = root / "build" / "grades.csv"
+    write_beside(path, text.getvalue())
+    return path
+
+
+def forget(root: Path, lab: str, student: str) -> None:
+    """Drop what earlier runs made of a submission that is no longer there."""
+    for folder in ("submitted", "autograded", "feedback"):
+        shutil.rmtree(root / "build" / folder / student / lab, ignore_errors=True)

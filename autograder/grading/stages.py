@@ -1,0 +1,291 @@
+"""The course's own stages in nbgrader's pipeline, and the configuration that puts them there.
+
+nbgrader decides points by luck in too many ways: a cell without output earns them all, a warning on stderr costs them
+all, and tests run in the process that runs the student's code. So nothing is executed here. The submission is rebuilt
+from the released notebook and the text of the answers; the outputs of check cells come from the stored result; a check
+without a result gets no automatic score.
+
+Import it through `prepare_nbgrader` where start-up time matters.
+"""
+
+from __future__ import annotations
+
+import html
+import re
+from pathlib import Path
+from typing import Any
+
+import nbformat
+from nbconvert.exporters import NotebookExporter
+from nbconvert.preprocessors import CSSHTMLHeaderPreprocessor
+from nbconvert.preprocessors.sanitize import SanitizeHTML
+from nbgrader import utils
+from nbgrader.converters import Autograde
+from nbgrader.preprocessors import (
+    AssignLatePenalties,
+    CheckCellMetadata,
+    ClearHiddenTests,
+    ClearMarkScheme,
+    ClearOutput,
+    ClearSolutions,
+    ComputeChecksums,
+    DeduplicateIds,
+    GetGrades,
+    LockCells,
+    NbGraderPreprocessor,
+    OverwriteCells,
+    OverwriteKernelspec,
+    SaveAutoGrades,
+    SaveCells,
+)
+
+from autograder.errors import KitError
+from autograder.grading.stage_a import Settings, result_path, run_submission, stored_result
+from autograder.report.html import check_html, render
+from autograder.results import CheckResult, SubmissionResult
+from autograder.submission.lab import CODE_STUB, TEXT_STUB, Lab, load_lab
+from autograder.submission.reader import Submission, read_submission
+
+_POINTS = "autograder_points"
+"""Key under which a notebook's resources hold the points by grade_id."""
+
+
+def _submitted(converter: Autograde, resources: dict[str, Any]) -> tuple[Path, str, Lab, Submission]:
+    """Read the notebook that was handed in, whichever of nbgrader's two passes is running."""
+    course = converter.coursedir
+    student, name = resources["nbgrader"]["student"], resources["nbgrader"]["assignment"]
+    lab = load_lab(Path(course.root), name)
+    folder = Path(course.format_path(course.submitted_directory, student, name))
+    return Path(course.root), student, lab, read_submission(folder / f"{name}.ipynb", lab)
+
+
+class SubmissionExporter(NotebookExporter):  # type: ignore[misc]
+    """Opens a submission for nbgrader as the released notebook with only the text of the answers in it.
+
+    It stands before the sanitizing stages because nbgrader would give up on a file that is no notebook, and so that
+    nothing else of a student's notebook, no tag, flag, output or extra cell, gets any further.
+    """
+
+    def __init__(self, *args: Any, **kwargs: Any) -> None:
+        """Refuse to take part in a pipeline with other stages than the course's."""
+        super().__init__(*args, **kwargs)
+        if not isinstance(self.parent, Autograde):
+            return
+        stages = (list(self.parent.sanitize_preprocessors), list(self.parent.autograde_preprocessors))
+        if stages != (SANITIZE, AUTOGRADE):
+            raise KitError(
+                "The stages of `nbgrader autograde` are not this course's; nothing was executed.",
+                "Remove Autograde settings from the command line and from other nbgrader_config files.",
+            )
+
+    def from_filename(self, filename: str, resources: dict[str, Any] | None = None, **kwargs: Any) -> Any:
+        """Rebuild the notebook in nbgrader's first pass; read what that pass wrote in the second."""
+        if not self.parent._sanitizing:
+            return super().from_filename(filename, resources=resources, **kwargs)
+        resources = dict(resources or {})
+        _, _, lab, submission = _submitted(self.parent, resources)
+        resources["metadata"] = {"name": lab.name, "path": str(Path(filename).parent)}
+        return self.from_notebook_node(nbformat.from_dict(submission.notebook), resources=resources, **kwargs)
+
+
+class AttachResults(NbGraderPreprocessor):  # type: ignore[misc]
+    """Puts the stored result into the outputs of the check cells, in place of execution.
+
+    If there is none of these very answers, it runs the submission in the sandbox first.
+    """
+
+    def preprocess(self, nb: Any, resources: dict[str, Any]) -> tuple[Any, dict[str, Any]]:
+        """Attach outputs and note the points for `SaveCheckedGrades`."""
+        root, student, lab, submission = _submitted(self.parent.parent, resources)
+        path = result_path(root, lab.name, student)
+        result = stored_result(path, submission.digest)
+        if result is None:
+            result = _run_now(root, student, lab, self.parent.parent.coursedir)
+        checks = {check.grade_id: check for check in result.checks}
+        points: dict[str, float | None] = {}
+        for cell in nb.cells:
+            if cell.cell_type == "code" and utils.is_grade(cell) and not utils.is_solution(cell):
+                grade_id = cell.metadata.nbgrader["grade_id"]
+                points[grade_id] = _attach(cell, checks.get(grade_id), result)
+        if result.problems:
+            note = render("problems.html", problems=result.problems).replace("\n", "")
+            nb.cells.insert(0, nbformat.v4.new_markdown_cell(note, id="problems"))
+        resources[_POINTS] = points
+        return nb, resources
+
+
+def _run_now(root: Path, student: str, lab: Lab, course: Any) -> SubmissionResult:
+    from autograder.results import Isolation
+    from autograder.sandbox.isolation import choose
+
+    settings = Settings(isolation=choose(Isolation.FULL))
+    folder = Path(course.format_path(course.submitted_directory, student, lab.name))
+    return run_submission(
+        folder / f"{lab.name}.ipynb", student, lab, settings, keep_in=result_path(root, lab.name, student)
+    )
+
+
+def _attach(cell: Any, check: CheckResult | None, result: SubmissionResult) -> float | None:
+    """Write a check's outputs into its cell and return its points; None: there is no verdict."""
+    if check is not None and check.max_points != float(cell.metadata.nbgrader["points"]):
+        check = None
+    report = ""
+    if check is not None:
+        logs = [log for log in result.logs if log.grade_id == check.grade_id]
+        report = check_html(check, audience="student", logs=logs)
+    if check is None or check.points is None:
+        # An error output: whoever grades by outputs alone must not take silence for success.
+        cell.outputs = [nbformat.v4.new_output("error", ename="CouldNotFindOut", evalue="", traceback=[_UNDECIDED])]
+        if report:
+            cell.outputs.insert(0, nbformat.v4.new_output("display_data", {"text/html": report}))
+        return None
+    data = {"text/plain": f"{check.points:g}", "text/html": report}
+    cell.outputs = [nbformat.v4.new_output("execute_result", data, execution_count=1)]
+    return check.points
+
+
+_UNDECIDED = "The grader could not find out. No points are taken: an instructor decides."
+
+
+class SaveCheckedGrades(SaveAutoGrades):  # type: ignore[misc]
+    """Records points of check cells from their results; without a verdict the cell waits for manual grading."""
+
+    def _add_score(self, cell: Any, resources: dict[str, Any]) -> None:
+        if utils.is_solution(cell) or cell.cell_type != "code":
+            super()._add_score(cell, resources)
+            return
+        grade_id = cell.metadata["nbgrader"]["grade_id"]
+        grade = self.gradebook.find_grade(grade_id, self.notebook_id, self.assignment_id, self.student_id)
+        grade.auto_score = resources[_POINTS].get(grade_id)
+        grade.needs_manual_grade = grade.auto_score is None or grade.manual_score is not None
+        self.gradebook.db.commit()
+
+
+class InertAnswers(NbGraderPreprocessor):  # type: ignore[misc]
+    """Takes the life out of HTML in students' Markdown, which feedback and formgrader would put into their pages.
+
+    A word joiner, which is invisible, parts every `<` from what would make it a tag. Unlike escaping it reads the same
+    in text and in code.
+    """
+
+    def preprocess_cell(self, cell: Any, resources: dict[str, Any], index: int) -> tuple[Any, dict[str, Any]]:
+        """Part the tags in an answer cell; the lab's own text stays as it is."""
+        if cell.cell_type != "code" and utils.is_solution(cell):
+            cell.source = inert(cell.source)
+        return cell, resources
+
+
+def inert(markdown: str) -> str:
+    """Return Markdown in which nothing can become a tag, a script link or a picture from elsewhere."""
+    parted = re.sub(r"<(?=[A-Za-z/!?])", "<\u2060", markdown)
+    # What a browser fetches by itself would tell its owner who reads the page.
+    parted = parted.replace("![", "!\u2060[")
+    return re.sub(r"(?i)(javascript|vbscript|data)(?=\s*(:|&(colon|#0*58;?|#x0*3a;?)))", "\\1\u2060", parted)
+
+
+class SanitizeOutputs(SanitizeHTML):  # type: ignore[misc]
+    """nbconvert's sanitizer for what students wrote and for outputs; the lab's own text may hold code with `<`."""
+
+    def preprocess_cell(self, cell: Any, resources: dict[str, Any], index: int) -> tuple[Any, dict[str, Any]]:
+        """Sanitize outputs, which the kit wrote, once more; answers are inert already and are made so again."""
+        if cell.cell_type != "code":
+            if utils.is_solution(cell):
+                cell.source = inert(cell.source)
+            return cell, resources
+        for output in cell.outputs:
+            if output.output_type == "error":
+                output.traceback = [html.unescape(_UNDECIDED)]
+        return super().preprocess_cell(cell, resources, index)
+
+
+class StableNotebook(NbGraderPreprocessor):  # type: ignore[misc]
+    """Leaves in a released notebook only what the lab's source decides, so that generating twice gives equal files."""
+
+    def preprocess(self, nb: Any, resources: dict[str, Any]) -> tuple[Any, dict[str, Any]]:
+        """Name the cells by grade_id or number and drop what editors leave behind."""
+        ids: set[str] = set()
+        for number, cell in enumerate(nb.cells, start=1):
+            grade_id = cell.metadata.get("nbgrader", {}).get("grade_id", "")
+            name = re.sub(r"[^A-Za-z0-9_-]", "-", grade_id)[:60] or f"text-{number:02d}"
+            cell["id"] = name if name not in ids else f"{name[:50]}-{number:02d}"
+            ids.add(cell["id"])
+            for key in ("collapsed", "scrolled", "ExecuteTime", "execution", "jupyter"):
+                cell.metadata.pop(key, None)
+            if cell.cell_type == "code":
+                cell.outputs, cell.execution_count = [], None
+        kernel = {"display_name": "Python 3 (ipykernel)", "language": "python", "name": "python3"}
+        nb.metadata = nbformat.from_dict({"kernelspec": kernel, "language_info": {"name": "python"}})
+        nb.nbformat, nb.nbformat_minor = 4, 5
+        return nb, resources
+
+
+SANITIZE = [ClearOutput, DeduplicateIds, OverwriteKernelspec, OverwriteCells, CheckCellMetadata]
+"""What nbgrader does to the rebuilt notebook; among others it puts the check cells' full source back."""
+AUTOGRADE = [AttachResults, SaveCheckedGrades, AssignLatePenalties, InertAnswers, CheckCellMetadata]
+"""In place of nbgrader's execution."""
+FEEDBACK = [GetGrades, ClearHiddenTests, ClearMarkScheme, SanitizeOutputs, CSSHTMLHeaderPreprocessor]
+RELEASE = [
+    LockCells,
+    ClearSolutions,
+    ClearOutput,
+    CheckCellMetadata,
+    ComputeChecksums,
+    SaveCells,
+    ClearHiddenTests,
+    ClearMarkScheme,
+    ComputeChecksums,
+    CheckCellMetadata,
+    StableNotebook,
+]
+
+_REPORT_TAGS = ["div", "span", "b", "code", "pre", "details", "summary", "br", "p"]
+_REPORT_STYLES = [
+    "background",
+    "border",
+    "border-left",
+    "color",
+    "font-family",
+    "font-size",
+    "font-weight",
+    "line-height",
+    "margin",
+    "margin-left",
+    "margin-top",
+    "max-height",
+    "overflow",
+    "padding",
+    "padding-left",
+    "white-space",
+]
+
+
+def configure(config: Any, root: Path) -> None:
+    """Write the course's layout and stages into an nbgrader configuration.
+
+    Args:
+        config: traitlets' Config, as `get_config()` gives it.
+        root: of the course.
+    """
+    course = config.CourseDirectory
+    course.root = str(root)
+    course.source_directory = "solutions"
+    course.release_directory = "labs"
+    course.submitted_directory = "build/submitted"
+    course.autograded_directory = "build/autograded"
+    course.feedback_directory = "build/feedback"
+    course.db_url = f"sqlite:///{root / 'build' / 'gradebook.db'}"
+    # Of a submission only the notebook is taken. A file such as ipykernel_launcher.py, lying beside a notebook that an
+    # instructor opens from formgrader, would be imported by that kernel.
+    course.ignore = ["*"]
+    config.Autograde.exporter_class = SubmissionExporter
+    config.Autograde.sanitize_preprocessors = SANITIZE
+    config.Autograde.autograde_preprocessors = AUTOGRADE
+    config.Autograde.pre_convert_hook = "autograder.grading.stage_b.before_autograde"
+    config.GenerateFeedback.preprocessors = FEEDBACK
+    config.GenerateAssignment.preprocessors = RELEASE
+    config.ClearSolutions.code_stub = {"python": CODE_STUB}
+    config.ClearSolutions.text_stub = TEXT_STUB
+    config.SanitizeHTML.enabled = True
+    config.SanitizeHTML.tags = _REPORT_TAGS
+    config.SanitizeHTML.attributes = ["style", "role", "aria-label"]
+    config.SanitizeHTML.styles = _REPORT_STYLES

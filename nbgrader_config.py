@@ -1,0 +1,25 @@
+"""nbgrader's configuration of this course: the same stages as `autograder grade`, and no others.
+
+nbgrader goes on with its own stages, which run students' code, when a configuration cannot be loaded. So whatever goes
+wrong here ends the command.
+"""
+
+import os
+import sys
+from pathlib import Path
+
+os.environ["TRAITLETS_APPLICATION_RAISE_CONFIG_FILE_ERROR"] = "1"
+try:
+    _ROOT = Path(__file__).resolve().parent
+    if str(_ROOT) not in sys.path:
+        sys.path.insert(0, str(_ROOT))
+
+    from autograder.grading.stage_b import prepare_nbgrader
+
+    prepare_nbgrader()
+
+    from autograder.grading.stages import configure
+
+    configure(get_config(), _ROOT)  # noqa: F821  traitlets provides get_config
+except BaseException as error:
+    sys.exit(f"nbgrader_config.py: {type(error).__name__}: {error}. Nothing was executed; run `make` first.")
