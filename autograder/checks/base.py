@@ -32,6 +32,8 @@ class ExpectationBase:
     def prepare(self) -> None:
         """Set up what each group needs for this launch."""
         self._ended: float | None = None
+        self.stopped: list[Program] = []
+        """Programs that the check itself has stopped."""
 
     def start(self, node: Node | str) -> None:
         """Start one more program."""

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections import Counter
 from typing import Any, Literal
 
+from rcl_interfaces.srv import ListParameters
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from autograder.checks import outcomes, session
@@ -12,8 +14,12 @@ from autograder.checks.base import WITHIN, ExpectationBase
 from autograder.graph import diagnosis, qos
 from autograder.graph.diagnosis import Diagnosis, Scene
 from autograder.graph.names import full_name, type_name
+from autograder.graph.services import ServiceMissing, call_all
 
 End = Literal["publisher", "subscription"]
+
+SETTLE = 2.0
+"""Seconds that a new node may take to show that it lives."""
 
 GONE_WITHIN = 2.0
 """Seconds that an absence may take to show, for example after a node was stopped."""
@@ -43,6 +49,15 @@ class GraphExpectations(ExpectationBase):
                 observed=", ".join(self.observer.nodes()) or "no node",
                 hint=hint,
             )
+        self._settle(name)
+        if name not in self.observer.nodes() or self._crashed():
+            self.fail(
+                title,
+                diagnosis.why_no_node(self.scene(), name),
+                expected=name,
+                observed="it was there, and went away",
+                hint=hint,
+            )
         if self.observer.nodes().count(name) > 1:
             self.fail(
                 title,
@@ -56,6 +71,29 @@ class GraphExpectations(ExpectationBase):
                 hint=hint,
             )
         outcomes.passed(title, observed=name)
+
+    def _settle(self, name: str) -> None:
+        """Wait for proof that a node which was just made also lives on: an answer from it.
+
+        A program that fails a few lines after it made its node shows the node for a moment. Whether the observer sees
+        that moment is chance, and a verdict must not depend on it. A node that nobody spins cannot answer; for it a
+        while without an end of the program has to do.
+        """
+        with contextlib.suppress(ServiceMissing):
+            call_all(
+                self.observer,
+                f"{name}/list_parameters",
+                ListParameters,
+                [ListParameters.Request()],
+                SETTLE / 2,
+                self._crashed,
+            )
+
+    def _crashed(self) -> bool:
+        """Whether a program has failed by itself; one that ended well, or that the check stopped, has not."""
+        return any(
+            program.exit_status() not in (None, 0) for _, program in self.programs if program not in self.stopped
+        )
 
     def expect_no_node(self, name: str, *, within: float = GONE_WITHIN, hint: str = "") -> None:
         """No node has this full name; use it after a positive expectation, which proves that the graph is known."""

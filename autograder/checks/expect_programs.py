@@ -36,7 +36,9 @@ class ProgramExpectations(GraphExpectations):
 
     def stop(self, name: str, *, kill: bool = False) -> None:
         """End one of several programs: politely (SIGTERM), or without a chance to clean up."""
-        self.program(name).stop(grace=0.0 if kill else 2.0)
+        program = self.program(name)
+        self.stopped.append(program)
+        program.stop(grace=0.0 if kill else 2.0)
 
     def expect_running(self, name: str, *, hint: str = "") -> None:
         """A program has not ended."""

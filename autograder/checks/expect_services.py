@@ -168,9 +168,7 @@ class ServiceExpectations(GraphExpectations):
             hint=hint,
         )
 
-    def send_goal(
-        self, name: str, action_type: type, goal: Any, *, within: float = WITHIN, hint: str = ""
-    ) -> Goal:
+    def send_goal(self, name: str, action_type: type, goal: Any, *, within: float = WITHIN, hint: str = "") -> Goal:
         """Send a goal and wait for the server's decision; a missing server or decision is a failed outcome."""
         # Actions load numpy, a quarter of a second of CPU that most labs do not need.
         from autograder.graph import actions

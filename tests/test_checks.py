@@ -1,0 +1,235 @@
+"""What `launch` and the expectations find out about real nodes, right ones and wrong ones."""
+
+from __future__ import annotations
+
+import linecache
+import textwrap
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from autograder.checks import session
+from autograder.grading.job import Cell, Job
+from autograder.grading.worker import run_job
+from autograder.results import CheckResult, Isolation, Outcome, Status
+
+SET_UP = """\
+%load_ext autograder
+from autograder.checks import Node, answers, launch, vary
+from std_msgs.msg import Int32, String
+from std_srvs.srv import Trigger
+"""
+
+TALKER = """
+import rclpy
+from rclpy.node import Node
+from std_msgs.msg import String
+from std_srvs.srv import Trigger
+
+
+class Talker(Node):
+    def __init__(self):
+        super().__init__("talker")
+        self.declare_parameter("word", "hello")
+        self.declare_parameter("period", 0.05)
+        self.count = 0
+        self.publisher = self.create_publisher(String, "chatter", 10)
+        self.create_service(Trigger, "how_many", self.how_many)
+        self.create_timer(self.get_parameter("period").value, self.tick)
+
+    def tick(self):
+        self.publisher.publish(String(data=f"{self.get_parameter('word').value} {self.count}"))
+        self.count += 1
+
+    def how_many(self, request, response):
+        response.success = True
+        response.message = str(self.count)
+        return response
+
+
+def main():
+    rclpy.init()
+    rclpy.spin(Talker())
+
+
+if __name__ == "__main__":
+    main()
+"""
+
+Grade = Callable[..., CheckResult]
+
+
+@pytest.fixture
+def grade(tmp_path: Path) -> Iterator[Grade]:
+    """Run one check cell on some programs, as the grading worker does."""
+
+    def run(check: str, **programs: str) -> CheckResult:
+        job = Job(
+            student="student",
+            lab="lab",
+            digest="",
+            isolation=Isolation.NONE,
+            seed=7,
+            files={name.replace("__", "."): text for name, text in programs.items()},
+            cells=[
+                Cell(grade_id="setup", source=SET_UP),
+                Cell(grade_id="check", points=2, source=textwrap.dedent(check)),
+            ],
+        )
+        (result,) = run_job(job, tmp_path).checks
+        return result
+
+    yield run
+    session.current.close()
+    linecache.clearcache()
+
+
+def failure(result: CheckResult) -> Outcome:
+    """The outcome that failed the check, which must have cost all points."""
+    assert result.points == 0.0, result
+    found = result.first_failure
+    assert found is not None and found.status is Status.FAILED
+    return found
+
+
+def test_a_right_node_earns_the_points_under_names_and_values_that_vary(grade: Grade) -> None:
+    result = grade(
+        """\
+        name = vary.name("robot")
+        with launch("talker", namespace=f"/{name}", parameters={"word": name}, remappings=[("chatter", "talk")]) as ros:
+            ros.expect_node(f"/{name}/talker")
+            ros.expect_publisher(f"/{name}/talk", String, node=f"/{name}/talker")
+            ros.expect_no_topic(f"/{name}/chatter")
+            ros.expect_qos(f"/{name}/talk", reliability="reliable", durability="volatile", deadline=None)
+            ros.expect_messages(f"/{name}/talk", String, at_least=10, rate=20,
+                                values=lambda heard: all(m.data.startswith(name) for m in heard))
+            ros.expect_parameter(f"/{name}/talker", "word", name)
+            ros.expect_service(f"/{name}/how_many", Trigger)
+            ros.require(ros.call(f"/{name}/how_many", Trigger, Trigger.Request()).success, "It counts")
+            ros.set_parameter(f"/{name}/talker", "word", "changed")
+            ros.expect_messages(f"/{name}/talk", String, where=lambda m: m.data.startswith("changed"))
+        ros.score(2)
+        """,
+        talker__py=TALKER,
+    )
+    assert [outcome for outcome in result.outcomes if outcome.status is not Status.PASSED] == []
+    assert result.points == 2.0
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "expectation", "code", "because"),
+    [
+        ('"talker"', '"talkr"', 'ros.expect_node("/talker")', "node-name", "/talkr"),
+        ('"chatter"', '"chattr"', 'ros.expect_publisher("/chatter", String)', "topic-name", "/chattr"),
+        ("rclpy.spin(Talker())", "node = Talker(); import threading; threading.Event().wait()",
+         'ros.expect_messages("/chatter", String, within=2)', "not-spinning", "nothing spins"),
+        ("        self.count = 0", "        self.count = nothing", 'ros.expect_node("/talker")', "crashed", "self.count = nothing"),
+        ("def main():", "def main()", 'ros.expect_node("/talker")', "syntax-error", "line"),
+        ("        return response", "        return", 'ros.call("/how_many", Trigger, Trigger.Request())', "service-no-return",
+         "did not return the response"),
+        ("response.success = True", "raise ValueError('no')", 'ros.call("/how_many", Trigger, Trigger.Request())',
+         "service-exception", "ValueError: no"),
+        ('"chatter", 10', '"chatter", rclpy.qos.qos_profile_sensor_data',
+         'ros.expect_messages("/chatter", String, qos=10 and __import__("rclpy.qos").qos.QoSProfile(depth=10), within=2)',
+         "qos-reliability", "best effort"),
+        ("", "", 'ros.expect_messages("/chatter", Int32, within=2)', "wrong-type", "std_msgs/msg/String"),
+        ("", "", 'ros.expect_messages("/chatter", String, rate=5)', "rate", "instead of 5 Hz"),
+        ("", "", 'ros.expect_parameter("/talker", "wrd", 1)', "parameter-undeclared", "word"),
+        ("", "", 'ros.expect_parameter("/talker", "period", 1.0)', "parameter-value", "0.05"),
+        ("", "", 'ros.publish("/topic", String())', "no-topic", ""),
+        ("", "", 'ros.expect_exit("talker", within=1)', "still-running", "still runs"),
+    ],
+)  # fmt: skip
+def test_a_wrong_node_loses_the_points_for_its_own_reason(
+    grade: Grade, old: str, new: str, expectation: str, code: str, because: str
+) -> None:
+    program = TALKER.replace(old, new) if old else TALKER
+    assert not old or program != TALKER
+    if "ros.publish" in expectation:
+        expectation = expectation.replace("String())", "String(), within=1)")
+    result = grade(
+        f"""\
+        with launch("talker") as ros:
+            {expectation}
+        ros.score(2)
+        """,
+        talker__py=program,
+    )
+    outcome = failure(result)
+    assert outcome.code == code, outcome
+    assert because in outcome.because, outcome
+
+
+def test_what_follows_a_failure_is_listed_as_not_checked_and_hidden_lines_stay_marked(grade: Grade) -> None:
+    result = grade(
+        """\
+        with launch("talker") as ros:
+            ros.expect_messages("/chatter", String, where=lambda m: False, within=1)
+            ros.expect_service("/how_many", Trigger)
+            ### BEGIN HIDDEN TESTS
+            ros.expect_no_node("/secret")
+            ### END HIDDEN TESTS
+        ros.score(2)
+        """,
+        talker__py=TALKER,
+    )
+    assert [(o.status, o.hidden) for o in result.outcomes] == [
+        (Status.FAILED, False),
+        (Status.NOT_CHECKED, False),
+        (Status.NOT_CHECKED, True),
+    ]
+
+
+def test_a_missing_program_is_the_students_failure(grade: Grade) -> None:
+    result = grade('with launch("talker") as ros:\n    ros.expect_node("/talker")\nros.score(2)')
+    assert failure(result).code == "program-missing"
+
+
+@pytest.mark.parametrize(
+    "check",
+    [
+        'with launch("talker") as ros:\n    ros.expect_node("/talker")\n    1 / 0\nros.score(2)',
+        'with launch("talker") as ros:\n    ros.expect_node("/talker")',
+        "ros_is_not_defined.score(2)",
+        'with launch("talker") as ros:\n    pass\nros.score(2)',
+    ],
+)
+def test_a_check_that_breaks_takes_no_points_and_gives_none(grade: Grade, check: str) -> None:
+    result = grade(check, talker__py=TALKER)
+    assert result.points is None
+    assert result.status is Status.UNKNOWN
+
+
+def test_a_second_publisher_on_a_counted_topic_is_told(grade: Grade) -> None:
+    twice = TALKER.replace(
+        "        self.count = 0\n",
+        '        self.count = 0\n        self.more = self.create_publisher(String, "chatter", 10)\n',
+    )
+    result = grade(
+        """\
+        with launch("talker") as ros:
+            ros.expect_messages("/chatter", String, at_least=3)
+        ros.score(2)
+        """,
+        talker__py=twice,
+    )
+    assert failure(result).code == "extra-publisher"
+
+
+def test_a_table_of_answers_is_compared_question_by_question(grade: Grade) -> None:
+    check = """\
+        with answers("table.yaml") as table:
+            table.expect_filled({"overlap": ["yes", "no"], "threads": [1, 2]})
+            table.expect_answer("threads", 2)
+        table.score(2)
+        """
+    assert grade(check, table__yaml="overlap: 'yes'\nthreads: 2\n").points == 2.0
+    assert failure(grade(check, table__yaml="overlap: 'yes'\nthreads: 1\n")).code == "wrong-answer"
+    assert failure(grade(check, table__yaml="overlap: ?\nthreads: 1\n")).code in (
+        "unanswered",
+        "answer-form",
+        "not-yaml",
+    )
+    assert failure(grade(check, table__yaml="overlap\n")).code == "not-yaml"
+    assert failure(grade(check.replace("table.yaml", "other.yaml"))).code == "file-missing"
