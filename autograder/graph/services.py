@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.task import Future
 
 from autograder.graph.observer import Observer
@@ -98,8 +99,9 @@ class OfferedService:
         self._observer = observer
         self._answer = answer
         self._delay = delay
-        self._timers: list[threading.Timer] = []
-        self._service = observer.node.create_service(srv_type, name, self._handle)
+        # A group of its own: while an answer is awaited, the observer goes on hearing messages and requests.
+        self._group = ReentrantCallbackGroup()
+        self._service = observer.node.create_service(srv_type, name, self._handle, callback_group=self._group)
 
     async def _handle(self, request: Any, response: Any) -> Any:
         self.requests.append(request)
@@ -107,7 +109,12 @@ class OfferedService:
         if self._delay:
             # Awaiting frees the observer's only thread; a sleep would hide messages that arrive meanwhile.
             later: Future = Future(executor=self._observer.node.executor)
-            timer = threading.Timer(self._delay, lambda: later.set_result(None))
+
+            def time_is_up() -> None:
+                later.set_result(None)
+                self._observer.node.executor.wake()  # a result alone does not wake an executor that waits
+
+            timer = threading.Timer(self._delay, time_is_up)
             timer.daemon = True
             timer.start()
             await later
