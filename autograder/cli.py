@@ -6,6 +6,7 @@ Imports stay inside the commands, for `autograder check` shall start at once.
 from __future__ import annotations
 
 import sys
+from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -47,6 +48,13 @@ def main() -> None:
         sys.exit(130)
     except BrokenPipeError:
         sys.exit(1)
+    except Exception as error:
+        import traceback
+
+        last = traceback.extract_tb(error.__traceback__)[-1]
+        print(f"error: {type(error).__name__}: {error}", file=sys.stderr)
+        print(f"  This is a defect of the kit ({Path(last.filename).name}:{last.lineno}).", file=sys.stderr)
+        sys.exit(2)
 
 
 @app.command()
@@ -112,3 +120,121 @@ def check(
         show(submission_view(result, audience))
     fine = not result.problems and all(check.status is Status.PASSED for check in result.checks)
     raise typer.Exit(0 if fine else 1)
+
+
+@app.command()
+def grade(
+    lab: Annotated[str, typer.Argument(help="The lab, such as lab2_executors.")],
+    submissions: Annotated[
+        Path | None, typer.Argument(help="Folder or zip with a folder for each student; default: the sample class.")
+    ] = None,
+    force: ForceOption = False,
+    isolation: IsolationOption = Isolation.FULL,
+    jobs: Annotated[int, typer.Option(min=0, help="How many run at once; 0 lets the machine decide.")] = 0,
+    seed: SeedOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Grade a class: gradebook, grades, feedback, and a table of who lost points why."""
+    from autograder.course import course_root
+    from autograder.grading.stage_a import Settings
+
+    root = course_root()
+    source = submissions or root / "build" / "classes" / lab
+    if not source.exists():
+        raise KitError(
+            f"There are no submissions at {source}.",
+            "Name a folder or zip." if submissions else f"Build the sample class: python tests/sample_class.py {lab}",
+        )
+    from autograder.grading.class_run import grade_class
+    from autograder.sandbox.isolation import choose
+
+    run = grade_class(root, lab, source, Settings(choose(isolation), seed, force, jobs))
+    if as_json:
+        print("[" + ",\n".join(result.model_dump_json() for result in run.results) + "]")
+        raise typer.Exit(0)
+    from rich.console import Console
+
+    from autograder.report.terminal import class_view, plain, undecided_view
+
+    console = Console(highlight=False)
+    if not console.is_terminal:
+        console.width = 120
+    console.print(class_view(run.results))
+    undecided = undecided_view(run.results)
+    if undecided is not None:
+        console.print()
+        console.print(undecided)
+    console.print()
+    for sentence in run.refused:
+        console.print(plain(sentence), markup=False)
+    for student, why in run.unrecorded.items():
+        console.print(f"{plain(student)} is not in the gradebook: {plain(why)}", markup=False)
+    console.print(
+        f"{len(run.results)} submissions: {run.seconds['run']:.1f} s running, {run.seconds['record']:.1f} s recording"
+    )
+    for label, path in (
+        ("gradebook", root / "build" / "gradebook.db"),
+        ("grades", run.grades),
+        ("feedback", root / "build" / "feedback"),
+        ("results", root / "build" / "results" / lab),
+    ):
+        console.print(f"{label:<10} {path}", markup=False, soft_wrap=True)
+    raise typer.Exit(2 if run.unrecorded else 0)
+
+
+@app.command()
+def release(
+    lab: Annotated[str | None, typer.Argument(help="The lab; default: all of them.")] = None,
+) -> None:
+    """Generate what students receive: `labs/` from `solutions/`."""
+    from autograder.course import course_root
+    from autograder.grading.stage_b import release as generate
+    from autograder.submission.lab import lab_names
+
+    root = course_root()
+    for name in [lab] if lab else lab_names(root):
+        print(f"{name} → {generate(root, name)}")
+
+
+@app.command()
+def report() -> None:
+    """Write the class report, build/report/index.html, from the stored results."""
+    from autograder.course import course_root
+    from autograder.report.class_page import load_results, write_class_page
+
+    root = course_root()
+    results = load_results(root)
+    if not results:
+        raise KitError("There are no results yet.", "Grade a class first: autograder grade LAB")
+    print(write_class_page(root, results))
+
+
+class ExportFormat(StrEnum):
+    """What `autograder export` can write."""
+
+    CSV = "csv"
+    JUNIT = "junit"
+    GRADESCOPE = "gradescope"
+
+
+@app.command()
+def export(
+    form: Annotated[ExportFormat, typer.Argument(metavar="FORMAT", help="csv, junit or gradescope.")],
+    lab: Annotated[str | None, typer.Option(help="Only this lab.")] = None,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="File to write; default: print it.")] = None,
+) -> None:
+    """Export the stored results for another program."""
+    from autograder.course import course_root
+    from autograder.files import write_beside
+    from autograder.report.class_page import load_results
+    from autograder.report.export import FORMATS
+
+    results = load_results(course_root(), lab)
+    if not results:
+        raise KitError("There are no results to export.", "Grade a class first: autograder grade LAB")
+    text = FORMATS[form.value](results)
+    if output is None:
+        print(text, end="")
+    else:
+        write_beside(output, text)
+        print(output)

@@ -84,8 +84,10 @@ _NOT_RELEASED = [".ipynb_checkpoints", "*.pyc", "__pycache__", ".*", "nodes"]
 
 def _last_error(answer: dict[str, Any]) -> str:
     """The last telling line of what nbgrader logged."""
-    text = answer.get("log", "") + "\n" + answer.get("error", "")
-    lines = [line.strip() for line in text.splitlines() if re.match(r"\s*[\w.]*(Error|Exception|Entry)\b: ", line)]
+    text = str(answer.get("log", "")) + "\n" + str(answer.get("error", ""))
+    lines: list[str] = [
+        line.strip() for line in text.splitlines() if re.match(r"\s*[\w.]*(Error|Exception|Entry)\b: ", line)
+    ]
     telling = [line for line in lines if "NbGraderException" not in line]
     return (telling or lines or ["no reason given"])[-1]
 

@@ -10,7 +10,6 @@ Import it through `prepare_nbgrader` where start-up time matters.
 
 from __future__ import annotations
 
-import html
 import re
 from pathlib import Path
 from typing import Any
@@ -194,8 +193,9 @@ class SanitizeOutputs(SanitizeHTML):  # type: ignore[misc]
             return cell, resources
         for output in cell.outputs:
             if output.output_type == "error":
-                output.traceback = [html.unescape(_UNDECIDED)]
-        return super().preprocess_cell(cell, resources, index)
+                output.traceback = [_UNDECIDED]
+        cell.outputs = self.sanitize_code_outputs(cell.outputs)
+        return cell, resources
 
 
 class StableNotebook(NbGraderPreprocessor):  # type: ignore[misc]

@@ -1,0 +1,105 @@
+"""The whole way of a class: take in, run, record, and tell what came of it."""
+
+from __future__ import annotations
+
+import sys
+import time
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+from autograder.grading import stage_a, stage_b
+from autograder.grading.collect import collect
+from autograder.grading.stage_a import Settings
+from autograder.report.terminal import points_text
+from autograder.results import SubmissionResult
+from autograder.submission.lab import load_lab
+
+
+@dataclass
+class ClassRun:
+    """What came of grading a class."""
+
+    results: list[SubmissionResult]
+    refused: list[str]
+    """What was not taken in and why."""
+    unrecorded: dict[str, str]
+    """Why nbgrader has no grade, by student."""
+    grades: Path
+    seconds: dict[str, float] = field(default_factory=dict)
+    """Durations in seconds, by stage."""
+
+
+class _Steps:
+    """Progress on a terminal; a line for each step where nobody watches."""
+
+    def __init__(self, title: str, total: int, console: Console) -> None:
+        self.console, self.total, self.done = console, total, 0
+        self.progress = Progress(
+            TextColumn(title),
+            BarColumn(),
+            MofNCompleteColumn(),
+            TimeElapsedColumn(),
+            TextColumn("{task.fields[last]}", markup=False),
+            console=console,
+            disable=not console.is_terminal,
+            transient=True,
+        )
+        self.task = self.progress.add_task(title, total=total, last="")
+
+    def __enter__(self) -> _Steps:
+        self.progress.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.progress.stop()
+
+    def step(self, last: str, announce: bool) -> None:
+        self.done += 1
+        self.progress.update(self.task, advance=1, last=last)
+        if announce and not self.console.is_terminal:
+            self.console.print(f"{self.done}/{self.total} {last}", markup=False, highlight=False)
+
+
+def grade_class(root: Path, lab_name: str, source: Path, settings: Settings) -> ClassRun:
+    """Grade every submission in a folder or zip.
+
+    Args:
+        root: of the course.
+        lab_name: the lab they answer.
+        source: folder or zip.
+        settings: how to run them.
+
+    Raises:
+        KitError: usage or set-up.
+        KeyboardInterrupt: finished results are kept, and the next run goes on from them.
+    """
+    console = Console(file=sys.stderr, highlight=False)
+    lab = load_lab(root, lab_name)
+    collected = collect(source, lab.name, root)
+    began = time.monotonic()
+    with _Steps("running", len(collected.notebooks), console) as steps:
+
+        def finished(result: SubmissionResult) -> None:
+            checks = " ".join(points_text(check) for check in result.checks)
+            steps.step(f"{result.student} {checks}", announce=True)
+
+        try:
+            results = stage_a.run_class(collected.notebooks, root, lab, settings, finished)
+        except KeyboardInterrupt:
+            steps.progress.stop()
+            console.print(f"\n{steps.done} of {steps.total} results are kept in build/results; run again to go on.")
+            raise
+    ran = time.monotonic()
+    with _Steps("recording", len(results), console) as steps:
+        unrecorded = stage_b.record(root, lab, list(results), settings.force, lambda s: steps.step(s, announce=False))
+    grades = stage_b.write_grades(root)
+    return ClassRun(
+        results=list(results.values()),
+        refused=collected.refused,
+        unrecorded=unrecorded,
+        grades=grades,
+        seconds={"run": round(ran - began, 2), "record": round(time.monotonic() - ran, 2)},
+    )
