@@ -152,12 +152,12 @@ def load_lab(root: Path, name: str) -> Lab:
         raise KitError(f"This course has no lab `{name}`.", f"Labs in {root}: {names}.")
     try:
         raw = json.loads(notebook.read_text(encoding="utf-8"))
-        return _read(name, notebook, raw)
+        return _read(name, notebook, raw, released_only=notebook == candidates[1])
     except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise KitError(f"{notebook} cannot be used as a lab: {error}", "Repair that cell.") from error
 
 
-def _read(name: str, notebook: Path, raw: dict[str, Any]) -> Lab:
+def _read(name: str, notebook: Path, raw: dict[str, Any], released_only: bool) -> Lab:
     cells: list[Cell] = []
     answers: dict[str, Answer] = {}
     given: dict[str, str] = {}
@@ -179,7 +179,8 @@ def _read(name: str, notebook: Path, raw: dict[str, Any]) -> Lab:
         blank = source
         points = float(nbgrader["points"]) if nbgrader.get("grade") else None
         if nbgrader.get("solution"):
-            blank = _without_solution(source, cell["cell_type"])
+            # A released notebook holds no solutions; whatever stands in its answers is what there is to start from.
+            blank = source if released_only else _without_solution(source, cell["cell_type"])
             answers[grade_id] = Answer(
                 grade_id, cell["cell_type"], blank, _without_markers(source), _file(grade_id, blank), points
             )

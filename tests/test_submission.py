@@ -1,0 +1,288 @@
+"""Reading labs and submissions: text in, text out, and a named outcome for everything that is wrong."""
+
+from __future__ import annotations
+
+import copy
+import json
+import os
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import pytest
+import toy
+from hypothesis import given
+from hypothesis import strategies as st
+
+from autograder.errors import KitError
+from autograder.grading.collect import collect
+from autograder.submission.lab import Lab, grade_id_of, load_lab
+from autograder.submission.magics import BadNameError, parse
+from autograder.submission.reader import NOTEBOOK_BYTES, Submission, read_submission
+
+
+@pytest.fixture
+def lab(tmp_path: Path) -> Lab:
+    return load_lab(toy.make_course(tmp_path / "course"), toy.LAB)
+
+
+def read(lab: Lab, tmp_path: Path, content: Any) -> Submission:
+    return read_submission(toy.hand_in(tmp_path, "ann", content), lab)
+
+
+def solved(lab: Lab, **sources: str) -> list[dict[str, Any]]:
+    answers = {answer.grade_id: answer.solution for answer in lab.answers.values()}
+    cells: list[dict[str, Any]] = lab.clean_notebook(answers | sources)["cells"]
+    return cells
+
+
+def by_id(cells: list[dict[str, Any]], grade_id: str) -> dict[str, Any]:
+    return next(cell for cell in cells if grade_id_of(cell) == grade_id)
+
+
+def codes(submission: Submission) -> list[str]:
+    return [problem.code for problem in submission.problems]
+
+
+@pytest.mark.parametrize(
+    ("source", "name"),
+    [
+        ("%%node talker\nx = 1", "talker.py"),
+        ("\n\n%%node talker_2  \nx", "talker_2.py"),
+        ("%%file a.yaml\nb: 1", "a.yaml"),
+        ("%%file camera.params.yml\n", "camera.params.yml"),
+        ("%%file Table-1.csv\n", "Table-1.csv"),
+    ],
+)
+def test_a_cell_names_its_file(source: str, name: str) -> None:
+    file = parse(source)
+    assert file is not None and file.file_name == name
+
+
+@pytest.mark.parametrize(
+    "source", ["", "x = 1", "# %%node talker", "x\n%%node talker", "%%nodes talker", "%node talker"]
+)
+def test_a_cell_without_the_magic_is_no_file(source: str) -> None:
+    assert parse(source) is None
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "%%node", "%%node ../talker", "%%node talker.py", "%%node Talker", "%%node 2talker", "%%node a b",
+        "%%node talker # mine", "%%node täl", "%%file", "%%file a.py", "%%file /etc/passwd.yaml", "%%file ../a.yaml",
+        "%%file a/b.yaml", "%%file a\\b.yaml", "%%file .yaml", "%%file .hidden.yaml", "%%file a.yaml.py",
+        "%%file -rf.yaml", "%%file a\x00.yaml", "%%file " + "a" * 300 + ".yaml",
+    ],
+)  # fmt: skip
+def test_a_bad_name_is_refused_with_a_reason(line: str) -> None:
+    with pytest.raises(BadNameError, match="name"):
+        parse(f"{line}\nx")
+
+
+def test_the_lab_knows_its_cells(lab: Lab) -> None:
+    assert [(cell.grade_id, cell.title, cell.points) for cell in lab.cells] == [
+        ("setup", "A toy lab", None),
+        ("check_talker", "The talker", 3),
+        ("check_answers", "The table", 2),
+    ]
+    assert lab.given == {"helper.py": "print('given')\n"}
+    assert list(lab.answers) == ["talker", "answers", "why"]
+    assert (lab.max_points, lab.max_manual_points) == (5, 4)
+    assert "secret" in lab.checks[0].source
+    assert "secret" not in json.dumps(lab.released) and "hello" not in json.dumps(lab.released)
+
+
+def test_an_unknown_lab_is_named_with_those_there_are(lab: Lab) -> None:
+    with pytest.raises(KitError, match=r"no lab `nowhere`.*\n.*toy"):
+        load_lab(lab.notebook.parent.parent.parent, "nowhere")
+
+
+def test_without_solutions_the_released_lab_serves(lab: Lab, tmp_path: Path) -> None:
+    path = tmp_path / "student" / "labs" / "toy" / "toy.ipynb"
+    path.parent.mkdir(parents=True)
+    path.write_text(json.dumps(toy.notebook(list(lab.released))))
+    released = load_lab(tmp_path / "student", "toy")
+    assert [cell.grade_id for cell in released.cells] == [cell.grade_id for cell in lab.cells]
+    assert released.answers["talker"].blank == lab.answers["talker"].blank
+
+
+def test_answers_become_files(lab: Lab, tmp_path: Path) -> None:
+    submission = read(lab, tmp_path, solved(lab, talker="%%node talker\r\nprint(1)\r\n"))
+    assert codes(submission) == []
+    assert submission.files["talker.py"] == "print(1)\n"
+    assert submission.files["answers.yaml"] == "answer: 42\n"
+    assert submission.files["helper.py"] == "print('given')\n"
+
+
+def test_sources_may_be_lists_of_lines(lab: Lab, tmp_path: Path) -> None:
+    cells = solved(lab)
+    plain = read(lab, tmp_path, cells)
+    for cell in cells:
+        cell["source"] = cell["source"].splitlines(keepends=True)
+    assert read(lab, tmp_path, cells).digest == plain.digest
+
+
+def test_only_answers_get_into_the_clean_notebook(lab: Lab, tmp_path: Path) -> None:
+    cells = solved(lab)
+    for cell in cells:
+        cell["metadata"]["tags"] = ["skip-execution"]
+        cell["attachments"] = {"x.png": {"image/png": "AAAA"}}
+        if cell["cell_type"] == "code":
+            cell["outputs"] = [{"output_type": "execute_result", "data": {"text/plain": "9753"}, "metadata": {}}]
+    cells.append(toy.cell("code", "import os", 99))
+    submission = read(lab, tmp_path, cells)
+    assert submission.notebook == lab.clean_notebook(submission.sources)
+    assert "skip-execution" not in json.dumps(submission.notebook) and "9753" not in json.dumps(submission.notebook)
+
+
+def test_defects_are_named_one_by_one(lab: Lab, tmp_path: Path) -> None:
+    def defect(change: Any) -> list[str]:
+        cells = solved(lab)
+        change(cells)
+        submission = read(lab, tmp_path, cells)
+        assert submission.readable
+        return codes(submission)
+
+    def flip(cells: list[dict[str, Any]]) -> None:
+        by_id(cells, "check_talker")["metadata"]["nbgrader"]["solution"] = True
+
+    def edit(cells: list[dict[str, Any]]) -> None:
+        by_id(cells, "check_talker")["source"] = "3"
+
+    def rename(cells: list[dict[str, Any]]) -> None:
+        by_id(cells, "talker")["metadata"]["nbgrader"]["grade_id"] = "talker2"
+
+    def say(grade_id: str, source: Any) -> Any:
+        return lambda cells: by_id(cells, grade_id).update(source=source)
+
+    assert defect(lambda cells: cells.remove(by_id(cells, "talker"))) == ["missing-cell"]
+    assert defect(lambda cells: cells.remove(by_id(cells, "check_talker"))) == []
+    assert defect(lambda cells: cells.append(copy.deepcopy(by_id(cells, "talker")))) == ["duplicated-cell"]
+    assert defect(rename) == ["forged-cell", "missing-cell"]
+    assert defect(flip) == ["forged-flags"]
+    assert defect(edit) == ["changed-cell"]
+    assert defect(say("talker", "%%node talker\n" + "x" * 70_000)) == ["oversized-cell"]
+    assert defect(say("talker", 7)) == ["not-a-notebook"]
+    assert defect(say("talker", "%%node ../../talker\nx")) == ["bad-file-name"]
+    assert defect(say("talker", "print(1)")) == ["no-file-name"]
+    assert defect(say("talker", "%%node talkr\nx")) == ["renamed-file"]
+    assert defect(say("talker", "%%node helper\nx")) == ["given-file"]
+    assert defect(say("talker", "%%file answers.yaml\nx")) == ["renamed-file", "same-file"]
+
+
+def test_a_given_program_cannot_be_replaced(lab: Lab, tmp_path: Path) -> None:
+    submission = read(lab, tmp_path, solved(lab, talker="%%node helper\nprint('mine')"))
+    assert submission.files["helper.py"] == "print('given')\n"
+
+
+@pytest.mark.parametrize(
+    ("content", "code"),
+    [
+        ("", "no-notebook"),
+        ("{", "not-json"),
+        ("[" * 100_000, "not-json"),
+        ('{"nbformat": 4, "cells": ' + "9" * 5000 + "}", "not-json"),
+        ("[]", "not-a-notebook"),
+        ('{"nbformat": 3, "worksheets": []}', "not-a-notebook"),
+        ('{"nbformat": 4, "cells": [1]}', "not-a-notebook"),
+        ('{"nbformat": 4, "cells": []}', "wrong-notebook"),
+        ('{"nbformat": 4, "cells": [{"metadata": [], "source": null}]}', "wrong-notebook"),
+        (" " * NOTEBOOK_BYTES + "{}", "oversized-notebook"),
+    ],
+)
+def test_what_is_no_notebook_of_the_lab(lab: Lab, tmp_path: Path, content: str, code: str) -> None:
+    submission = read(lab, tmp_path, content)
+    assert (codes(submission), submission.readable) == ([code], False)
+
+
+def test_a_link_or_a_fifo_is_not_read(lab: Lab, tmp_path: Path) -> None:
+    real = toy.hand_in(tmp_path, "ann", solved(lab))
+    link = tmp_path / "link.ipynb"
+    link.symlink_to(real)
+    fifo = tmp_path / "fifo.ipynb"
+    os.mkfifo(fifo)
+    for path in (link, fifo, tmp_path / "missing.ipynb", tmp_path):
+        assert codes(read_submission(path, lab)) == ["no-notebook"]
+
+
+def test_half_characters_are_replaced(lab: Lab, tmp_path: Path) -> None:
+    text = json.dumps(toy.notebook(solved(lab, talker="%%node talker\nprint('X')"))).replace("'X'", "'\\ud800'")
+    submission = read(lab, tmp_path, text)
+    assert submission.files["talker.py"] == "print('?')\n"
+
+
+def test_the_digest_follows_the_answers_and_the_lab(lab: Lab, tmp_path: Path) -> None:
+    digest = read(lab, tmp_path, solved(lab)).digest
+    assert read(lab, tmp_path, solved(lab)).digest == digest
+    assert read(lab, tmp_path, solved(lab, why="Other.")).digest != digest
+    path = lab.notebook
+    path.write_text(path.read_text().replace("secret('talker')", "secret('other')"))
+    changed = load_lab(path.parent.parent.parent, toy.LAB)
+    assert read(changed, tmp_path, solved(changed)).digest != digest
+
+
+json_values = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.text(max_size=5),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.sampled_from(
+        ["cells", "nbformat", "metadata", "nbgrader", "grade_id", "source", "cell_type", "solution", "locked"]
+    ), inner, max_size=4),
+    max_leaves=20,
+)  # fmt: skip
+marks = st.fixed_dictionaries({"nbgrader": json_values | st.fixed_dictionaries({"grade_id": st.just("talker")})})
+cell_values = json_values | st.fixed_dictionaries({"metadata": json_values | marks, "source": json_values})
+
+
+@given(cells=st.lists(cell_values, max_size=4))
+def test_no_notebook_can_stop_the_reader(cells: Any, tmp_path_factory: pytest.TempPathFactory) -> None:
+    folder = tmp_path_factory.mktemp("any")
+    lab = load_lab(toy.make_course(folder / "course"), toy.LAB)
+    submission = read(lab, folder, json.dumps({"nbformat": 4, "cells": cells}))
+    assert submission.sources.keys() == lab.answers.keys()
+
+
+def make_zip(path: Path, members: dict[str, str]) -> Path:
+    with zipfile.ZipFile(path, "w") as archive:
+        for name, text in members.items():
+            archive.writestr(name, text)
+    return path
+
+
+@pytest.mark.parametrize("form", ["{}/toy.ipynb", "{}/toy/toy.ipynb", "class/{}/toy.ipynb", "{}/toy (1).ipynb"])
+def test_a_zip_is_taken_in(tmp_path: Path, form: str) -> None:
+    members = {form.format(name): name for name in ("ann", "bob")} | {"__MACOSX/ann/._toy.ipynb": "x"}
+    found = collect(make_zip(tmp_path / "in.zip", members), toy.LAB, tmp_path / "course").notebooks
+    assert {student: path.read_text() for student, path in found.items()} == {"ann": "ann", "bob": "bob"}
+
+
+def test_a_zip_cannot_write_elsewhere(tmp_path: Path) -> None:
+    members = {"../evil/toy.ipynb": "x", "/abs/toy.ipynb": "x", "a/../../evil/toy.ipynb": "x", "ann/toy.ipynb": "ok"}
+    archive = make_zip(tmp_path / "in.zip", members | {"ann/ipykernel_launcher.py": "x", "..\\evil\\toy.ipynb": "x"})
+    found = collect(archive, toy.LAB, tmp_path / "course").notebooks
+    assert list(found) == ["ann"]
+    written = sorted(str(path.relative_to(tmp_path)) for path in tmp_path.rglob("*") if path.is_file())
+    assert written == ["course/build/submitted/ann/toy/toy.ipynb", "in.zip"]
+
+
+def test_a_folder_is_taken_in_without_following_links(tmp_path: Path) -> None:
+    toy.hand_in(tmp_path / "in", "ann", "ann")
+    (tmp_path / "in" / "bob").mkdir()
+    secret = tmp_path / "secret.ipynb"
+    secret.write_text("secret")
+    (tmp_path / "in" / "eve").mkdir()
+    (tmp_path / "in" / "eve" / "toy.ipynb").symlink_to(secret)
+    (tmp_path / "in" / "mallory").symlink_to(tmp_path)
+    toy.hand_in(tmp_path / "in", "*", "glob")
+    collected = collect(tmp_path / "in", toy.LAB, tmp_path / "course")
+    assert {student: path.read_text() for student, path in collected.notebooks.items()} == {
+        "ann": "ann", "bob": "", "eve": ""
+    }  # fmt: skip
+    assert len(collected.refused) == 1 and "'*'" in collected.refused[0]
+
+
+def test_nothing_to_take_in_is_an_error(tmp_path: Path) -> None:
+    (tmp_path / "in").mkdir()
+    with pytest.raises(KitError, match="no submissions"):
+        collect(tmp_path / "in", toy.LAB, tmp_path)
+    with pytest.raises(KitError, match="neither a folder nor a zip"):
+        collect(tmp_path / "nothing", toy.LAB, tmp_path)
