@@ -1,0 +1,75 @@
+# Works from any folder (make -C), as any user; needs make and Python 3.11 to 3.14 with venv, nothing else.
+LAB ?= lab2_executors
+SUBMISSIONS ?=
+NB ?=
+N ?= 20
+PYTHON ?=
+ARGS ?=
+
+# nbgrader starts other programs of the environment by their bare name, so its folder leads the search path.
+RUN := PATH="$(CURDIR)/.venv/bin:$$PATH"
+
+# Any Python 3 starts the set-up, which then looks for one that will do, or says what is missing.
+define set_up
+@for python in $(if $(PYTHON),"$(PYTHON)") python3 python3.14 python3.13 python3.12 python3.11; do \
+  if "$$python" -I -c 'import sys; sys.exit(sys.version_info < (3, 6))' 2>/dev/null; then \
+    exec "$$python" -I autograder/bootstrap.py --python "$(PYTHON)" $(1); fi; done; \
+echo "No Python was found. The kit needs Python 3.11 to 3.14." >&2; \
+echo "What to do: sudo apt-get install python3 python3-venv   or name one: make PYTHON=/path/to/python3.12" >&2; exit 2
+endef
+
+.PHONY: help setup setup-dev doctor grade check test lint jupyter lectures release soak bench lock clean distclean
+
+help: ## this list
+	@echo 'make TARGET [LAB=$(LAB)] [PYTHON=python3.12] [ARGS="more options"]'; echo
+	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/\1|\2/p' Makefile | while IFS='|' read -r name text; do \
+	  printf '  %-10s %s\n' "$$name" "$$text"; done
+
+setup: ## make .venv with what students and instructors need (every other target does it by itself)
+	$(call set_up)
+
+setup-dev:
+	$(call set_up,--dev)
+
+doctor: setup ## say what this machine offers, and what to do about what it lacks
+	@$(RUN) autograder doctor $(ARGS)
+
+grade: setup ## grade a class: the sample class, or SUBMISSIONS=folder-or-zip
+	@$(RUN) autograder grade $(LAB) $(if $(SUBMISSIONS),"$(SUBMISSIONS)") $(ARGS)
+
+check: setup ## report on one notebook: NB=path/to/notebook.ipynb
+	@$(RUN) autograder check "$(NB)" $(ARGS)
+
+jupyter: setup ## open the labs in JupyterLab
+	@cd labs && $(RUN) jupyter lab $(if $(filter 0,$(shell id -u)),--allow-root) $(ARGS)
+
+release: setup ## make labs/ from solutions/
+	@$(RUN) autograder release $(ARGS)
+
+lectures: setup-dev ## build the book and the slides into build/lectures
+	@$(RUN) python -m lectures $(ARGS)
+
+test: lint ## run every test
+	@$(RUN) python -m pytest $(ARGS)
+
+lint: setup-dev ## ruff and mypy --strict
+	@$(RUN) ruff check .
+	@$(RUN) mypy autograder
+
+soak: setup-dev ## grade every sample student N=20 times, half of them under load: nothing may differ
+	@$(RUN) python tests/soak.py --times $(N) $(if $(filter command line,$(origin LAB)),--lab $(LAB)) $(ARGS)
+
+bench: setup-dev ## measure this grader against stock nbgrader on the same submissions
+	@$(RUN) python tests/bench.py $(ARGS)
+
+lock: setup-dev ## pin the newest versions of pyproject.toml's dependencies, with hashes
+	@$(RUN) sh -euc 'compile="uv pip compile pyproject.toml --quiet --universal --python-version 3.11 --generate-hashes \
+	  --no-emit-index-url --no-emit-find-links --no-annotate --no-header --upgrade"; \
+	$$compile --extra lectures --extra dev -o requirements-dev.lock; \
+	$$compile --constraint requirements-dev.lock -o requirements.lock'
+
+clean: ## remove everything that was built
+	rm -rf build
+
+distclean: clean ## remove .venv too
+	rm -rf .venv
