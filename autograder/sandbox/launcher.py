@@ -1,0 +1,304 @@
+"""Starts a student's programs by forking itself, with Python, rclpy and the usual messages already loaded.
+
+It runs beside the programs, inside their sandbox, and is trusted no more than they are. It stands alone: apart from
+`probe.py` in its folder it imports nothing of the kit.
+
+Usage: launcher.py FD. FD is one end of a SOCK_SEQPACKET pair. Requests are JSON:
+    {"do": "start", "id", "path", "args", "env", "cpus", "limits"} with three descriptors (output, events, stacks)
+    {"do": "end_all", "everyone": true where the process list is the sandbox's own}
+Answers: {"ready": pid}, {"started": id, "pid"} with a pidfd, {"failed": id, "why"}, {"ended": id, "status"}, {"all_ended": true}.
+At the end of the socket everything ends.
+"""
+
+import contextlib
+import ctypes
+import faulthandler
+import gc
+import importlib
+import importlib.util
+import json
+import linecache
+import os
+import resource
+import select
+import signal
+import socket
+import sys
+import traceback
+import types
+from typing import Any
+
+STACK_SIGNAL = signal.SIGRTMIN + 10
+PR_SET_PDEATHSIG, PR_SET_DUMPABLE, PR_SET_CHILD_SUBREAPER = 1, 4, 36
+EVENTS_FD, STACKS_FD = 3, 4
+
+WARM = (
+    "rclpy",
+    "rclpy.action",
+    "rclpy.callback_groups",
+    "rclpy.executors",
+    "rclpy.lifecycle",
+    "rclpy.node",
+    "rclpy.parameter",
+    "rclpy.qos",
+    "builtin_interfaces.msg",
+    "geometry_msgs.msg",
+    "lifecycle_msgs.srv",
+    "rcl_interfaces.srv",
+    "sensor_msgs.msg",
+    "std_msgs.msg",
+    "std_srvs.srv",
+)
+WARM_TYPES = ("std_msgs.msg:String", "std_msgs.msg:Int32", "std_srvs.srv:Trigger", "std_srvs.srv:SetBool")
+
+_prctl = ctypes.CDLL(None).prctl
+
+
+def _load_probe() -> Any:
+    """Load `probe.py` by its path, under a name that no program of a student's has."""
+    path = os.path.join(os.path.dirname(os.path.abspath(__file__)), "probe.py")
+    spec = importlib.util.spec_from_file_location("_autograder_probe", path)
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+probe = _load_probe()
+
+
+class Start:
+    """A request to start one program, and the descriptors that came with it."""
+
+    def __init__(self, request: dict[str, Any], descriptors: list[int]) -> None:
+        """Keep what the request says."""
+        self.id: int = request["id"]
+        self.path: str = request["path"]
+        self.args: list[str] = request["args"]
+        self.env: dict[str, str] = request["env"]
+        self.cpus: list[int] = request["cpus"]
+        self.cores: int = request["cores"]
+        self.limits: dict[str, int] = request["limits"]
+        self.output, self.events, self.stacks = descriptors
+
+
+def warm_up() -> None:
+    """Load what programs need, without joining a ROS domain."""
+    for name in WARM:
+        with contextlib.suppress(ImportError):
+            importlib.import_module(name)
+    with contextlib.suppress(Exception):
+        import rclpy
+
+        rclpy.get_rmw_implementation_identifier()  # loads the middleware
+        for name in WARM_TYPES:
+            module, kind = name.split(":")
+            getattr(importlib.import_module(module), kind).__class__.__import_type_support__()
+    with contextlib.suppress(Exception):
+        probe.prepare()
+    gc.collect()
+    gc.freeze()  # the collector would write to every object, and so unshare every page
+
+
+def serve(channel: socket.socket) -> Start:
+    """Answer requests until the end. Returns only in a forked child, with the program it is to run."""
+    children: dict[int, int] = {}
+    wake_read, wake_write = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
+    signal.signal(signal.SIGCHLD, lambda *_: None)
+    signal.set_wakeup_fd(wake_write, warn_on_full_buffer=False)
+    poll = select.poll()
+    poll.register(channel, select.POLLIN)
+    poll.register(wake_read, select.POLLIN)
+    _send(channel, {"ready": os.getpid()})
+    while True:
+        for descriptor, _ in poll.poll():
+            if descriptor == wake_read:
+                with contextlib.suppress(BlockingIOError):
+                    os.read(wake_read, 4096)
+                continue
+            packet, passed, _, _ = socket.recv_fds(channel, 1 << 20, 3)
+            if not packet:
+                end_everything(children)
+            request = json.loads(packet)
+            if request["do"] == "end_all":
+                if request["everyone"]:
+                    with contextlib.suppress(ProcessLookupError):
+                        os.kill(-1, signal.SIGKILL)  # everything in this PID namespace but its first process and this one
+                _reap(channel, children)
+                _send(channel, {"all_ended": True})
+                continue
+            start = Start(request, passed)
+            child = _fork(channel, start, children)
+            if child == 0:
+                signal.set_wakeup_fd(-1)
+                signal.signal(signal.SIGCHLD, signal.SIG_DFL)
+                os.close(wake_read)
+                os.close(wake_write)
+                channel.close()
+                return start
+        _reap(channel, children)
+
+
+def _fork(channel: socket.socket, start: Start, children: dict[int, int]) -> int:
+    parent = os.getpid()
+    try:
+        child = os.fork()
+    except OSError as error:
+        _send(channel, {"failed": start.id, "why": str(error)})
+        child = -1
+    if child == 0:
+        _prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
+        if os.getppid() != parent:
+            os._exit(1)
+        return 0
+    for descriptor in (start.output, start.events, start.stacks):
+        os.close(descriptor)
+    if child > 0:
+        children[child] = start.id
+        handle = os.pidfd_open(child)
+        socket.send_fds(channel, [json.dumps({"started": start.id, "pid": child}).encode()], [handle])
+        os.close(handle)
+    return child
+
+
+def _reap(channel: socket.socket, children: dict[int, int]) -> None:
+    while True:
+        try:
+            pid, status = os.waitpid(-1, os.WNOHANG)
+        except ChildProcessError:
+            return
+        if pid == 0:
+            return
+        if pid in children:
+            _send(channel, {"ended": children.pop(pid), "status": os.waitstatus_to_exitcode(status)})
+
+
+def _send(channel: socket.socket, answer: dict[str, Any]) -> None:
+    try:
+        channel.send(json.dumps(answer).encode())
+    except OSError:
+        os._exit(0)  # nobody is left to answer to
+
+
+def end_everything(children: dict[int, int]) -> None:
+    """End every program and then this process. Where no PID namespace does it, descendants are found one by one."""
+    me = os.getpid()
+    while True:
+        parents: dict[int, int] = {}
+        for entry in os.listdir("/proc"):
+            with contextlib.suppress(OSError, ValueError, IndexError):
+                with open(f"/proc/{int(entry)}/stat") as stat:
+                    fields = stat.read().rpartition(")")[2].split()
+                if fields[0] != "Z":
+                    parents[int(entry)] = int(fields[1])
+        family = {me}
+        while grown := {pid for pid, parent in parents.items() if parent in family} - family:
+            family |= grown
+        if family == {me}:
+            os._exit(0)
+        for pid in family - {me}:
+            with contextlib.suppress(ProcessLookupError, PermissionError):
+                os.kill(pid, signal.SIGKILL)
+        with contextlib.suppress(ChildProcessError):
+            os.waitpid(-1, 0)
+
+
+def become(start: Start) -> None:
+    """Turn this forked child into the process that the program expects: descriptors, limits, environment."""
+    os.setsid()
+    _prctl(PR_SET_DUMPABLE, 1)
+    spare = [os.dup(descriptor) for descriptor in (start.output, start.events, start.stacks)]
+    nothing = os.open(os.devnull, os.O_RDONLY)
+    moved = [_above(descriptor) for descriptor in (nothing, *spare)]
+    os.dup2(moved[0], 0)
+    os.dup2(moved[1], 1)
+    os.dup2(moved[1], 2)
+    os.dup2(moved[2], EVENTS_FD, inheritable=False)
+    os.dup2(moved[3], STACKS_FD, inheritable=False)
+    os.closerange(STACKS_FD + 1, 4096)
+    with contextlib.suppress(OSError):
+        os.sched_setaffinity(0, start.cpus)
+    if len(start.cpus) < start.cores:  # rclpy takes as many threads as this says: the same number on every machine
+        pretended = set(range(start.cores))
+        os.sched_getaffinity = lambda _pid: pretended
+    os.environ.clear()
+    os.environ.update(start.env)
+    os.chdir(os.path.dirname(start.path))
+    for name, value in start.limits.items():
+        _limit(getattr(resource, name), value)
+    sys.stdin = open(0, closefd=False)
+    sys.stdout = open(1, "w", encoding="utf-8", errors="backslashreplace", buffering=1, closefd=False)
+    sys.stderr = open(2, "w", encoding="utf-8", errors="backslashreplace", buffering=1, closefd=False)
+    sys.__stdin__, sys.__stdout__, sys.__stderr__ = sys.stdin, sys.stdout, sys.stderr
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    faulthandler.register(STACK_SIGNAL, file=STACKS_FD, all_threads=True, chain=False)
+
+
+def _above(descriptor: int) -> int:
+    import fcntl
+
+    return fcntl.fcntl(descriptor, fcntl.F_DUPFD_CLOEXEC, 64)
+
+
+def _limit(which: int, value: int) -> None:
+    _, hard = resource.getrlimit(which)
+    if hard != resource.RLIM_INFINITY:
+        value = min(value, hard)
+    with contextlib.suppress(ValueError, OSError):
+        resource.setrlimit(which, (value, value))
+
+
+def run(start: Start) -> None:
+    """Run the program as `python NAME.py` would: its own `__main__`, its own frames in a traceback."""
+    folder = os.path.dirname(start.path)
+    sys.argv = [start.path, *start.args]
+    sys.orig_argv = [sys.executable, *sys.argv]
+    sys.path[0] = folder
+    linecache.clearcache()
+    importlib.invalidate_caches()
+    sys.excepthook = _print_own_frames
+    main = types.ModuleType("__main__")
+    main.__file__ = start.path
+    main.__builtins__ = __builtins__  # type: ignore[attr-defined]
+    sys.modules["__main__"] = main
+    with contextlib.suppress(Exception):
+        probe.install(EVENTS_FD, folder)
+    with open(start.path, "rb") as file:
+        source = file.read()
+    exec(compile(source, start.path, "exec", dont_inherit=True), main.__dict__)
+
+
+def _print_own_frames(kind: type[BaseException], error: BaseException, trace: types.TracebackType | None) -> None:
+    if isinstance(error, MemoryError):
+        probe.emit({"e": "memory_error"})
+    seen: set[int] = set()
+    link: BaseException | None = error
+    while link is not None and id(link) not in seen:
+        seen.add(id(link))
+        link.__traceback__ = _without_own(link.__traceback__)
+        link = link.__cause__ or link.__context__
+    traceback.print_exception(kind, error, error.__traceback__)
+
+
+def _without_own(trace: types.TracebackType | None) -> types.TracebackType | None:
+    own = (__file__, probe.__file__)
+    kept: list[types.TracebackType] = []
+    while trace is not None:
+        if trace.tb_frame.f_code.co_filename not in own:
+            kept.append(trace)
+        trace = trace.tb_next
+    result: types.TracebackType | None = None
+    for entry in reversed(kept):
+        result = types.TracebackType(result, entry.tb_frame, entry.tb_lasti, entry.tb_lineno)
+    return result
+
+
+if __name__ == "__main__":
+    _prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
+    sys.path.insert(0, "")  # the place of the program's folder
+    warm_up()
+    # After the imports: the programs' own ptrace and /proc access to this process ends here.
+    _prctl(PR_SET_DUMPABLE, 0)
+    wanted = serve(socket.socket(fileno=int(sys.argv[1])))
+    become(wanted)
+    run(wanted)

@@ -1,0 +1,33 @@
+"""What a student's programs may use."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+MIB = 1024 * 1024
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Limits of a launch. Sizes are in bytes, times in seconds."""
+
+    memory: int = 512 * MIB
+    """Sum over all programs of what they do not share with each other."""
+    address_space: int = 2048 * MIB
+    """Of one process. A node's threads alone reserve 0.4 GiB."""
+    processes: int = 192
+    """Processes and threads of all programs together; a node has about 12."""
+    open_files: int = 256
+    file_size: int = 16 * MIB
+    disk: int = 16 * MIB
+    """What may lie in /tmp, and again in /dev/shm."""
+    cpu_seconds: int = 30
+    """Of one process."""
+    wall_seconds: float = 180.0
+    """Of one program."""
+    output_kept: int = 256 * 1024
+    """How much of a program's output is kept: the first half and the last half of it."""
+    output_bytes: int = 8 * MIB
+    """A program that writes more is ended."""
+    events: int = 2000
+    """How many lines of the probe are kept."""

@@ -1,0 +1,165 @@
+"""One running program of a student's, as its launcher's keeper sees it."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import signal
+import threading
+import time
+from typing import Any
+
+from autograder.sandbox.limits import Limits
+from autograder.sandbox.processes import pid_of
+
+STACK_SIGNAL = signal.SIGRTMIN + 10
+"""The launcher makes a program write its threads' stacks at this signal."""
+
+_QUIET = 0.05
+"""Seconds without a further line after which a dump of stacks counts as complete: it has no end mark."""
+
+
+class Program:
+    """A program that was started. Its output is read all the time by the sandbox's own thread.
+
+    Attributes:
+        name: what `NodeSandbox.start` was asked for.
+    """
+
+    def __init__(self, name: str, limits: Limits, changed: threading.Condition) -> None:
+        """Made by `NodeSandbox.start`."""
+        self.name = name
+        self._limits = limits
+        self._changed = changed
+        self._handle = -1
+        self.pid = -1
+        """Process id as this process sees it."""
+        self.began = time.monotonic()
+        self._head = bytearray()
+        self._tail = bytearray()
+        self._written = 0
+        self._status: int | None = None
+        self._stopped_by = ""
+        self._events: list[dict[str, Any]] = []
+        self._event_rest = b""
+        self._stacks = bytearray()
+        self.readers: list[int] = []
+        """The pipes from it that are still open."""
+
+    # What the sandbox's thread tells it; all under the condition's lock.
+
+    def _started(self, handle: int) -> None:
+        self._handle = handle
+        self.pid = pid_of(handle)
+
+    def _take_output(self, data: bytes) -> None:
+        half = self._limits.output_kept // 2
+        self._written += len(data)
+        room = half - len(self._head)
+        self._head += data[:room]
+        self._tail += data[room:] if room < len(data) else b""
+        if len(self._tail) > 2 * half:
+            del self._tail[:-half]
+        if self._written > self._limits.output_bytes:
+            self._kill("output limit")
+
+    def _take_events(self, data: bytes) -> None:
+        *lines, self._event_rest = (self._event_rest + data).split(b"\n")
+        self._event_rest = self._event_rest[-8192:]
+        for line in lines:
+            if len(self._events) >= self._limits.events:
+                return
+            with contextlib.suppress(ValueError, RecursionError):
+                event = json.loads(line)
+                if isinstance(event, dict):
+                    self._events.append(event)
+
+    def _take_stacks(self, data: bytes) -> None:
+        if len(self._stacks) < self._limits.output_kept:
+            self._stacks += data
+
+    def _ended(self, status: int) -> None:
+        if self._status is not None:
+            return
+        self._status = status
+        if not self._stopped_by and status == -signal.SIGXCPU:
+            self._stopped_by = "CPU time limit"
+        if not self._stopped_by and status != 0 and any(event.get("e") == "memory_error" for event in self._events):
+            self._stopped_by = "memory limit"
+        if self._handle >= 0:
+            os.close(self._handle)
+            self._handle = -1
+
+    def _kill(self, why: str) -> None:
+        """End it because of a limit."""
+        if self._status is None and not self._stopped_by:
+            self._stopped_by = why
+        self.signal(signal.SIGKILL)
+
+    # What others ask of it.
+
+    def running(self) -> bool:
+        """Whether it has not ended."""
+        return self._status is None
+
+    def exit_status(self) -> int | None:
+        """Return None while it runs; negative: the number of the signal that ended it."""
+        return self._status
+
+    def stopped_by(self) -> str:
+        """Return which limit ended it (`memory limit`, `output limit`, `time limit`, `process limit`…), or "" for none."""
+        return self._stopped_by
+
+    def output(self) -> str:
+        """Return what it has printed so far: of a long output the beginning and the end."""
+        with self._changed:
+            half = self._limits.output_kept // 2
+            tail = bytes(self._tail[-half:])
+            cut = b"\n[...]\n" if self.truncated() else b""
+            return (bytes(self._head) + cut + tail).decode("utf-8", "replace")
+
+    def truncated(self) -> bool:
+        """Whether `output` has a gap."""
+        return self._written > self._limits.output_kept // 2 * 2
+
+    def events(self) -> list[dict[str, Any]]:
+        """Return what the probe inside it noted, in order. The program can forge it: for hints, never for points."""
+        with self._changed:
+            return list(self._events)
+
+    def wait(self, timeout: float) -> bool:
+        """Wait until it has ended, at most `timeout` seconds; return whether it has."""
+        with self._changed:
+            return self._changed.wait_for(lambda: self._status is not None, timeout)
+
+    def signal(self, number: int) -> None:
+        """Send it a signal, if it still runs."""
+        with self._changed, contextlib.suppress(ProcessLookupError):
+            if self._status is None and self._handle >= 0:
+                signal.pidfd_send_signal(self._handle, number)
+
+    def stop(self, grace: float = 1.0) -> None:
+        """Ask it to end (SIGTERM); after `grace` seconds make it end (SIGKILL)."""
+        self.signal(signal.SIGTERM)
+        if not self.wait(grace):
+            self.signal(signal.SIGKILL)
+            self.wait(1.0)
+
+    def stacks(self, timeout: float = 1.0) -> str:
+        """Return what each of its threads is doing now, as a traceback each, newest call first; "" if it does not say."""
+        with self._changed:
+            self._stacks.clear()
+            if self._status is not None:
+                return ""
+            self.signal(STACK_SIGNAL)
+            deadline = time.monotonic() + timeout
+            while True:
+                size = len(self._stacks)
+                left = deadline - time.monotonic()
+                grown = self._changed.wait_for(
+                    lambda: len(self._stacks) > size or self._status is not None,  # noqa: B023
+                    min(left, _QUIET) if size else left,
+                )
+                if not grown or self._status is not None:
+                    return self._stacks.decode("utf-8", "replace")
