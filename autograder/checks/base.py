@@ -39,6 +39,10 @@ class ExpectationBase:
         """Start one more program."""
         raise NotImplementedError
 
+    def served(self, name: str) -> list[tuple[float, float]]:
+        """When requests to an offered service arrived and were answered, seconds on the system clock."""
+        raise NotImplementedError
+
     def all_ended(self) -> bool:
         """Whether nothing can come any more: every program has ended (or none could be started), a moment ago."""
         import time

@@ -266,6 +266,7 @@ class MessageExpectations(GraphExpectations):
         others: Sequence[str] = (),
         *,
         itself: bool = False,
+        at_least: int = 2,
         within: float = WITHIN,
         hint: str = "",
     ) -> None:
@@ -275,22 +276,25 @@ class MessageExpectations(GraphExpectations):
             topic: where they publish `NAME begin` and `NAME end` (`std_msgs/String`).
             names: two different ones of these are under way at once; with `others`, one of these and one of those.
             others: the other side.
-            itself: one of `names` overlaps itself instead.
+            itself: each of `names` overlaps itself instead.
+            at_least: so many of them at once; with `others`, one of each is enough.
             within: seconds to wait.
             hint: a pointer for the student.
         """
         if itself:
-            title = f"{' and '.join(names)} overlap{'s' if len(names) == 1 else ''} itself"
+            title = f"{' and '.join(names)} overlap{'s' if len(names) == 1 else ''} itself" + (
+                f", {at_least} runs at once" if at_least > 2 else ""
+            )
         elif others:
             title = f"{', '.join(names)} and {', '.join(others)} overlap each other"
         else:
-            title = f"{', '.join(names)} overlap each other"
+            title = f"{', '.join(names)} overlap each other" + (f", {at_least} at once" if at_least > 2 else "")
 
         def holds() -> bool:
             found = self.activity(topic)
             if itself:
-                return all(found.overlap([name]) >= 2 for name in names)
-            return found.crossed(names, others) if others else found.distinct_overlap(names) >= 2
+                return all(found.overlap([name]) >= at_least for name in names)
+            return found.crossed(names, others) if others else found.distinct_overlap(names) >= at_least
 
         def decided() -> bool:
             found = self.activity(topic)
@@ -302,13 +306,15 @@ class MessageExpectations(GraphExpectations):
             return
         if not all(self.activity(topic).runs(name) for name in [*names, *others]):
             self._wait_for_runs(topic, [*names, *others], 1, title, 0.1, hint)
+        found = self.activity(topic)
+        most = max(found.overlap([name]) for name in names) if itself else found.distinct_overlap([*names, *others])
         self.fail(
             title,
             diagnosis.program_trouble(self.scene())
             or diagnosis.why_serial(self.scene())
-            or Diagnosis("They ran one after another in every case.", "no-overlap"),
-            expected="two at once",
-            observed="one at a time",
+            or Diagnosis(f"There were never more than {most} at once.", "no-overlap"),
+            expected=f"{at_least} at once",
+            observed=f"{most} at once" if most > 1 else "one at a time",
             hint=hint,
         )
 
@@ -331,6 +337,81 @@ class MessageExpectations(GraphExpectations):
             observed=f"{most} at once",
             hint=hint,
         )
+
+    def messages_during(
+        self, topic: str, msg_type: type, *, callback: str = "", activity: str = "", service: str = ""
+    ) -> list[int]:
+        """How many messages on `topic` were published during each run of a callback or each call of a service so far.
+
+        Args:
+            topic: full name of the topic whose messages are counted, by the publisher's stamps.
+            msg_type: their class.
+            callback: a callback that publishes `NAME begin` and `NAME end` (`std_msgs/String`) ...
+            activity: ... on this topic.
+            service: or a service that the check offers (`serve`): from a request's arrival to its answer.
+        """
+        if service:
+            spans = self.served(service)
+        else:
+            spans = [(span.begin, span.end) for span in self.activity(activity).spans() if span.name == callback]
+        stamps = [received.stamp for received in self.observer.record(topic, msg_type).messages]
+        return [sum(1 for stamp in stamps if begin < stamp < end) for begin, end in spans]
+
+    def expect_messages_during(
+        self,
+        topic: str,
+        msg_type: type,
+        *,
+        callback: str = "",
+        activity: str = "",
+        service: str = "",
+        at_least: int = 1,
+        runs: int = 3,
+        within: float = WITHIN,
+        hint: str = "",
+    ) -> None:
+        """Messages go on while a slow callback runs, or while the node waits for a service.
+
+        One run with enough messages is enough: a busy machine may have stopped the whole node during another.
+
+        Args:
+            topic: as for `messages_during`, like `msg_type`, `callback`, `activity` and `service`.
+            msg_type: message class.
+            callback: name in `activity`.
+            activity: topic of begins and ends.
+            service: full name of an offered service, instead of a callback.
+            at_least: messages.
+            runs: complete runs (or answered calls) to look at before giving up.
+            within: seconds.
+            hint: a pointer for the student.
+        """
+        title = f"`{topic}` goes on while " + (f"`{service}` is being called" if service else f"`{callback}` runs")
+
+        def counts() -> list[int]:
+            return self.messages_during(topic, msg_type, callback=callback, activity=activity, service=service)
+
+        def enough() -> bool:
+            return max(counts(), default=0) >= at_least
+
+        self.wait(lambda: enough() or len(counts()) >= runs, within)
+        self.observer.wait(enough, 0.2)  # the last messages may come after the end that lies behind them
+        seen = counts()
+        if not enough():
+            if not service and not seen:
+                self._wait_for_runs(activity, [callback], 1, title, 0.0, hint)
+            told = ", ".join(str(count) for count in seen) or "no complete run"
+            self.fail(
+                title,
+                diagnosis.program_trouble(self.scene())
+                or diagnosis.inside_reason(self.scene())
+                or diagnosis.why_serial(self.scene())
+                or Diagnosis(f"Nothing came on `{topic}` meanwhile: both wait for each other's end.", "starved"),
+                expected=f"at least {at_least} messages in one run",
+                observed=told,
+                hint=hint,
+            )
+        self._one_source(title, topic, msg_type, "", 1, self.observer.record(topic, msg_type))
+        outcomes.passed(title, observed=", ".join(str(count) for count in seen))
 
 
 def _title(topic: str, need: int, most: int | None, rate: float | None) -> str:

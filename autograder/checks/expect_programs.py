@@ -70,7 +70,9 @@ class ProgramExpectations(GraphExpectations):
             status is None or ended == status,
             title,
             lambda: (
-                diagnosis.program_trouble(self.scene()) or Diagnosis(f"It ended with status {ended}.", "exit-status")
+                diagnosis.shut_down_inside(self.scene())
+                or diagnosis.program_trouble(self.scene())
+                or Diagnosis(f"It ended with status {ended}.", "exit-status")
             ),
             expected=str(status),
             observed=str(ended),

@@ -39,6 +39,10 @@ class ServiceExpectations(GraphExpectations):
         """Requests that have reached a service offered by `serve`."""
         return list(self._offered[name].requests)
 
+    def served(self, name: str) -> list[tuple[float, float]]:
+        """When requests to a service offered by `serve` arrived and were answered, seconds on the system clock."""
+        return list(self._offered[name].served)
+
     def expect_service(self, name: str, srv_type: type, *, within: float = WITHIN, hint: str = "") -> None:
         """A node offers this service with this type."""
         wanted = type_name(srv_type)

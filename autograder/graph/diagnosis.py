@@ -228,6 +228,12 @@ def inside_reason(scene: Scene) -> Diagnosis | None:
         for event in events:
             if event.get("e") == "in_callback":
                 what = str(event.get("what", ""))
+                if what == "client.call" and _shares_a_group(events):
+                    return Diagnosis(
+                        f"`{program.name}`, {event.get('line', '')} (`{event.get('code', '')}`): {_SAME_GROUP}",
+                        "call-same-group",
+                        "Give the client, or the callback that calls, a callback group of its own.",
+                    )
                 code, because, hint = _IN_CALLBACK.get(_SAME_LINK.get(what, what), ("", "", ""))
                 if code:
                     return Diagnosis(
@@ -235,8 +241,8 @@ def inside_reason(scene: Scene) -> Diagnosis | None:
                     )
             if event.get("e") == "rate_sleep_unspun":
                 return Diagnosis(
-                    f"`{program.name}`, {event.get('line', '')} (`{event.get('code', '')}`): `rate.sleep()` waits for a "
-                    "timer of the node, and nothing spins the node.",
+                    f"`{program.name}`, {event.get('line', '')} (`{event.get('code', '')}`): `rate.sleep()` waits for "
+                    "a timer of the node, and nothing spins the node.",
                     "rate-unspun",
                     "Spin the node in another thread, or better: use a timer and `rclpy.spin`.",
                 )
@@ -248,6 +254,42 @@ def inside_reason(scene: Scene) -> Diagnosis | None:
                 "not-spinning",
                 "Call `rclpy.spin(node)`, or `spin()` of the executor that the node was added to.",
             )
+    return None
+
+
+_SAME_GROUP = (
+    "`call()` blocks this callback until the answer is taken, but the client is in the same mutually exclusive group "
+    "as the callback: more threads do not help, the answer must wait for the callback's end."
+)
+
+
+def _shares_a_group(events: Sequence[dict[str, Any]]) -> bool:
+    """Whether several threads spin, and a client shares a mutually exclusive group with some other callback."""
+    if not any("MultiThreaded" in str(event.get("executor", "")) for event in events if event.get("e") == "spin"):
+        return False
+    members: dict[Any, set[str]] = {}
+    for event in events:
+        if event.get("e") == "entity" and event.get("group") == "MutuallyExclusiveCallbackGroup":
+            members.setdefault(event.get("group_id"), set()).add(str(event.get("kind")))
+    return any("client" in kinds and len(kinds) > 1 for kinds in members.values())
+
+
+def shut_down_inside(scene: Scene) -> Diagnosis | None:
+    """Why a program that shut down inside a callback did not end well."""
+    for program in scene.programs:
+        for event in program.events():
+            if event.get("e") == "in_callback" and str(event.get("what")) in ("rclpy.shutdown", "executor.shutdown"):
+                error = last_traceback(program.output(), program.name)
+                return Diagnosis(
+                    f"`{program.name}`, {event.get('line', '')} (`{event.get('code', '')}`) shuts down inside a "
+                    "callback, "
+                    + (
+                        f"and what comes after finds it done already: {error.because}"
+                        if error
+                        else "so what spins the node is pulled away under it."
+                    ),
+                    *_IN_CALLBACK["shutdown"][::2],
+                )
     return None
 
 

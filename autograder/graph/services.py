@@ -96,6 +96,8 @@ class OfferedService:
             delay: seconds until each answer; other calls are answered meanwhile.
         """
         self.requests: list[Any] = []
+        self.served: list[tuple[float, float]] = []
+        """Of each answered request: its arrival and its answer, seconds on the system clock as message stamps are."""
         self._observer = observer
         self._answer = answer
         self._delay = delay
@@ -104,6 +106,7 @@ class OfferedService:
         self._service = observer.node.create_service(srv_type, name, self._handle, callback_group=self._group)
 
     async def _handle(self, request: Any, response: Any) -> Any:
+        arrived = time.time()
         self.requests.append(request)
         self._observer.notify()
         if self._delay:
@@ -118,4 +121,7 @@ class OfferedService:
             timer.daemon = True
             timer.start()
             await later
-        return self._answer(request, response)
+        answer = self._answer(request, response)
+        self.served.append((arrived, time.time()))
+        self._observer.notify()
+        return answer
