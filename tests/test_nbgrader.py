@@ -1,0 +1,359 @@
+"""Grades in nbgrader: the stored result decides, nothing is executed, nobody earns or loses points by luck."""
+
+from __future__ import annotations
+
+import copy
+import html.parser
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+import toy
+
+from autograder.errors import KitError
+from autograder.grading import stage_a, stage_b
+from autograder.grading.stage_a import Settings, result_path
+from autograder.submission.lab import Lab, grade_id_of, load_lab
+
+KIT = Path(__file__).resolve().parent.parent
+LIVE = (
+    "<img src=x onerror=alert(1)> <ScRiPt>alert(2)</sCrIpT> <a href='javascript:alert(3)'>a</a>"
+    " [b](javascript:alert(4)) [c](JaVaScRiPt&colon;alert(5)) [d](java&#9;script:alert(6)) [e]( javascript:alert(7))"
+    " ![f](http://example.org/track.png) <svg/onload=alert(8)> <javascript:alert(9)> [g](data:text/html,alert(10))\n\n"
+    "</textarea><iframe srcdoc='<script>alert(11)</script>'></iframe>\n\n"
+    "```\n</code></pre><img src=x onerror=alert(12)>\n```\n\n    <script>alert(13)</script>\n\n"
+    "`<img onerror=alert(14)>`\n\n[h]: javascript:alert(15)\n[i]:\n  java&Tab;script:alert(16)\n\n[h] [i]\n\n"
+    "[fine](https://docs.ros.org) 1 < 2 <3"
+)
+
+
+class Course:
+    """A course in a folder of its own whose worker is `toy.judge`."""
+
+    def __init__(self, root: Path) -> None:
+        self.root = toy.make_course(root)
+        self.lab: Lab = load_lab(self.root, toy.LAB)
+
+    def cells(self, talker: str = "print('hello')", why: str = "Because.") -> list[dict[str, Any]]:
+        sources = {"talker": f"%%node talker\n{talker}", "answers": "%%file answers.yaml\nanswer: 42", "why": why}
+        cells: list[dict[str, Any]] = self.lab.clean_notebook(sources)["cells"]
+        return cells
+
+    def hand_in(self, student: str, cells: list[dict[str, Any]] | str) -> Path:
+        path = self.root / "build" / "submitted" / student / toy.LAB / f"{toy.LAB}.ipynb"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(cells if isinstance(cells, str) else json.dumps(toy.notebook(cells)), encoding="utf-8")
+        return path
+
+    def run(self, student: str) -> None:
+        path = self.root / "build" / "submitted" / student / toy.LAB / f"{toy.LAB}.ipynb"
+        stage_a.run_submission(path, student, self.lab, Settings(), keep_in=result_path(self.root, toy.LAB, student))
+
+    def grade(self, *students: str, force: bool = False) -> list[str]:
+        """Run and record; return whom nbgrader was asked to record."""
+        for student in students:
+            self.run(student)
+        before = {student: self._stamp(student) for student in students}
+        assert stage_b.record(self.root, self.lab, students, force, lambda _: None) == {}
+        return [student for student in students if self._stamp(student) != before[student]]
+
+    def _stamp(self, student: str) -> float:
+        path = self.root / "build" / "autograded" / student / toy.LAB / f"{toy.LAB}.ipynb"
+        return path.stat().st_mtime_ns if path.exists() else 0.0
+
+    def grades(self, student: str) -> dict[str, tuple[float | None, bool]]:
+        """Automatic score and whether it waits for a person, by grade_id."""
+        stage_b.prepare_nbgrader()
+        from nbgrader.api import Gradebook
+
+        with Gradebook(f"sqlite:///{self.root / 'build' / 'gradebook.db'}") as gradebook:
+            notebook = gradebook.find_submission_notebook(toy.LAB, toy.LAB, student)
+            return {grade.name: (grade.auto_score, grade.needs_manual_grade) for grade in notebook.grades}
+
+    def autograded(self, student: str) -> str:
+        return (self.root / "build" / "autograded" / student / toy.LAB / f"{toy.LAB}.ipynb").read_text()
+
+    def feedback(self, student: str) -> str:
+        return (self.root / "build" / "feedback" / student / toy.LAB / f"{toy.LAB}.html").read_text()
+
+
+@pytest.fixture(scope="module")
+def course(tmp_path_factory: pytest.TempPathFactory) -> Any:
+    """One course for the module, for a fresh gradebook takes seconds."""
+    patch = pytest.MonkeyPatch()
+    patch.setattr(stage_a, "run_in_worker", lambda job: stage_a.believed(job, toy.judge(job)))
+    yield Course(tmp_path_factory.mktemp("nbgrader") / "course")
+    patch.undo()
+
+
+class Tags(html.parser.HTMLParser):
+    """Collects what a browser would act on."""
+
+    def __init__(self, page: str) -> None:
+        super().__init__()
+        self.live: list[str] = []
+        self.feed(page)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        for name, value in attrs:
+            # A browser drops control characters and spaces before it looks for the scheme.
+            link = "".join(character for character in value or "" if character > " ").lower()
+            scheme = link.split(":")[0] if name in ("href", "action", "formaction") else ""
+            if (
+                name.startswith("on")
+                or scheme in ("javascript", "data", "vbscript")
+                or (name == "src" and "example" in link)
+            ):
+                self.live.append(f"{tag} {name}={value}")
+        if tag in ("iframe", "svg", "object", "embed", "base", "form"):
+            self.live.append(tag)
+
+    def handle_data(self, data: str) -> None:
+        if self.cdata_elem == "script" and "alert(" in data:
+            self.live.append(f"script {data}")
+
+
+def test_points_come_from_the_result(course: Course) -> None:
+    course.hand_in("solved", course.cells())
+    course.hand_in("wrong", course.cells(talker="print('no')"))
+    course.hand_in("blank", list(course.lab.released))
+    course.grade("solved", "wrong", "blank")
+    assert course.grades("solved") == {"check_talker": (3, False), "check_answers": (2, False), "why": (None, True)}
+    assert course.grades("wrong") == {"check_talker": (0, False), "check_answers": (2, False), "why": (None, True)}
+    assert course.grades("blank") == {"check_talker": (0, False), "check_answers": (0, False), "why": (0, False)}
+
+
+def test_no_verdict_means_manual_grading(course: Course) -> None:
+    course.hand_in("died", course.cells(talker="die"))
+    course.grade("died")
+    assert course.grades("died")["check_talker"] == (None, True)
+    rows = stage_b.write_grades(course.root).read_text().splitlines()
+    assert rows[0] == "student,lab,score,max_score" and "died,toy,,9" in rows
+    assert "an instructor decides" in course.feedback("died")
+
+
+def test_a_result_that_lost_a_check_means_manual_grading(course: Course) -> None:
+    course.hand_in("lost", course.cells())
+    course.run("lost")
+    path = result_path(course.root, toy.LAB, "lost")
+    result = json.loads(path.read_text())
+    del result["checks"][0]
+    result["checks"][0]["max_points"] = 1000
+    result["checks"][0]["points"] = 1000
+    path.write_text(json.dumps(result))
+    assert stage_b.record(course.root, course.lab, ["lost"], False, lambda _: None) == {}
+    assert course.grades("lost") == {"check_talker": (None, True), "check_answers": (None, True), "why": (None, True)}
+
+
+def test_broken_submissions_fail_with_their_reason_and_stop_nobody(course: Course) -> None:
+    course.hand_in("broken", "{")
+    course.hand_in("empty", "")
+    course.hand_in("fine", course.cells())
+    course.grade("broken", "empty", "fine")
+    for student, reason in (("broken", "not valid JSON"), ("empty", "handed in")):
+        assert course.grades(student) == {"check_talker": (0, False), "check_answers": (0, False), "why": (0, False)}
+        assert reason in course.feedback(student)
+    assert course.grades("fine")["check_talker"] == (3, False)
+
+
+def test_attacks_on_the_notebook_change_nothing(course: Course) -> None:
+    def by_id(cells: list[dict[str, Any]], grade_id: str) -> dict[str, Any]:
+        return next(cell for cell in cells if grade_id_of(cell) == grade_id)
+
+    def skip(cells: list[dict[str, Any]]) -> None:
+        for cell in cells:
+            cell["metadata"]["tags"] = ["skip-execution"]
+
+    def flip(cells: list[dict[str, Any]]) -> None:
+        by_id(cells, "check_talker")["metadata"]["nbgrader"].update(solution=True, locked=False)
+        by_id(cells, "check_talker")["source"] = "3"
+
+    def manual(cells: list[dict[str, Any]]) -> None:
+        by_id(cells, "why")["metadata"]["nbgrader"].update(solution=False, points=100)
+        by_id(cells, "talker")["metadata"]["nbgrader"].update(grade=True, points=100)
+
+    def duplicate(cells: list[dict[str, Any]]) -> None:
+        cells.append(copy.deepcopy(by_id(cells, "check_talker")) | {"source": "3"})
+
+    def forge(cells: list[dict[str, Any]]) -> None:
+        cells.append(toy.cell("code", "3", 99, grade_id="bonus", grade=True, locked=True, points=100))
+
+    def delete(cells: list[dict[str, Any]]) -> None:
+        cells.remove(by_id(cells, "check_talker"))
+        cells.remove(by_id(cells, "why"))
+
+    def outputs(cells: list[dict[str, Any]]) -> None:
+        by_id(cells, "check_talker")["outputs"] = [
+            {"output_type": "execute_result", "data": {"text/plain": "3"}, "metadata": {}, "execution_count": 1}
+        ]
+
+    attacks = (skip, flip, manual, duplicate, forge, delete, outputs)
+    for attack in attacks:
+        cells = course.cells(talker="print('no')")
+        attack(cells)
+        path = course.hand_in(attack.__name__, cells)
+        (path.parent / "ipykernel_launcher.py").write_text("open('/tmp/planted', 'w')")
+    course.grade(*(attack.__name__ for attack in attacks))
+    for attack in attacks:
+        grades = course.grades(attack.__name__)
+        assert grades["check_talker"] == (0, False), attack.__name__
+        assert grades["check_answers"] == (2, False), attack.__name__
+        assert grades.keys() == {"check_talker", "check_answers", "why"}
+        folder = course.root / "build" / "autograded" / attack.__name__ / toy.LAB
+        assert [path.name for path in folder.iterdir()] == ["toy.ipynb"], attack.__name__
+        assert "skip-execution" not in course.autograded(attack.__name__)
+
+
+def test_nothing_of_a_students_is_live_in_feedback_or_formgrader(course: Course) -> None:
+    talker = "print('no')  # <img src=x onerror=alert(20)></script><script>alert(21)</script>"
+    cells = course.cells(talker=talker, why=LIVE)
+    cells.append(toy.cell("code", "1", 98, grade_id="<img src=x onerror=alert(22)>", grade=True, locked=True, points=1))
+    course.hand_in("live", cells)
+    course.grade("live")
+    assert Tags("<img src=x onerror=alert(1)><script>alert(2)</script>").live == [
+        "img onerror=alert(1)", "script alert(2)"
+    ]  # fmt: skip
+    page = course.feedback("live")
+    assert Tags(page).live == [] and 'href="https://docs.ros.org"' in page and "alert(1)" in page
+    from nbconvert.exporters import HTMLExporter
+    from nbgrader.server_extensions.formgrader import handlers
+    from traitlets.config import Config
+
+    from autograder.grading.stages import configure
+
+    # As formgrader makes its exporter.
+    config = Config()
+    configure(config, course.root)
+    config.HTMLExporter.template_name = "formgrade"
+    config.HTMLExporter.extra_template_basedirs = [handlers.template_path]
+    path = course.root / "build" / "autograded" / "live" / toy.LAB / "toy.ipynb"
+    resources = {"nbgrader": {"assignment": toy.LAB, "notebook": toy.LAB, "student": "live"}, "unique_key": "x"}
+    markdown = [cell for cell in json.loads(path.read_text())["cells"] if grade_id_of(cell) == "why"]
+    assert "1 < 2 <3" in markdown[0]["source"]
+    names = ("submission_id", "index", "total", "notebook_id", "first_name", "last_name", "base_url", "mathjax_url")
+    resources |= dict.fromkeys((*names, "assignment_id", "filename", "prev", "next"), "0")
+    page, _ = HTMLExporter(config=config).from_filename(str(path), resources=resources)
+    assert "Because" not in page and "alert(1)" in page
+    assert Tags(page).live == []
+
+
+def test_feedback_shows_no_hidden_check(course: Course) -> None:
+    course.hand_in("curious", course.cells(talker="print('no')"))
+    course.grade("curious")
+    page = course.feedback("curious")
+    assert "A hidden check failed" in page and "Read on." in page and "It says something else" in page
+    for secret in ("secret", "BEGIN HIDDEN"):
+        assert secret not in page
+    assert "aria-label" in page and "border-left" in page
+
+
+def test_unchanged_submissions_are_not_recorded_again(course: Course) -> None:
+    course.hand_in("same", course.cells())
+    course.hand_in("other", course.cells())
+    assert course.grade("same", "other") == ["same", "other"]
+    assert course.grade("same", "other") == []
+    course.hand_in("other", course.cells(talker="print('no')"))
+    assert course.grade("same", "other") == ["other"]
+    assert course.grade("same", force=True) == ["same"]
+
+
+def test_a_manual_grade_stays_and_reaches_the_feedback(course: Course) -> None:
+    course.hand_in("manual", course.cells(talker="die"))
+    course.grade("manual")
+    from nbgrader.api import Gradebook
+
+    with Gradebook(f"sqlite:///{course.root / 'build' / 'gradebook.db'}") as gradebook:
+        for name, points in (("check_talker", 1.5), ("why", 4)):
+            gradebook.find_grade(name, toy.LAB, toy.LAB, "manual").manual_score = points
+        gradebook.db.commit()
+    os.utime(course.root / "build" / "gradebook.db")
+    course.grade("manual")
+    assert "(Score: 7.5 / 9.0)" in course.feedback("manual")
+    course.grade("manual", force=True)
+    assert "manual,toy,7.5,9" in stage_b.write_grades(course.root).read_text()
+
+
+def test_changed_graded_cells_are_refused_with_a_way_out(course: Course, tmp_path: Path) -> None:
+    copied = tmp_path / "course"
+    shutil.copytree(course.root, copied)
+    path = copied / "solutions" / toy.LAB / "toy.ipynb"
+    path.write_text(path.read_text().replace("check_answers", "check_renamed"))
+    with pytest.raises(KitError, match=r"gradebook\.db away"):
+        stage_b.register(copied, toy.LAB)
+
+
+def test_releasing_twice_gives_the_same_files(course: Course) -> None:
+    folder = stage_b.release(course.root, toy.LAB)
+    path = folder / "toy.ipynb"
+    first = path.read_bytes()
+    cells = json.loads(first)["cells"]
+    source = course.root / "solutions" / toy.LAB / "toy.ipynb"
+    noisy = json.loads(source.read_text())
+    for number, cell in enumerate(noisy["cells"]):
+        cell["id"] = f"noise{number}"
+        if cell["cell_type"] == "code":
+            cell.update(execution_count=7, outputs=[{"output_type": "stream", "name": "stdout", "text": "x"}])
+    before = source.read_text()
+    source.write_text(json.dumps(noisy))
+    try:
+        stage_b.release(course.root, toy.LAB)
+    finally:
+        source.write_text(before)
+    assert path.read_bytes() == first
+    assert b"secret" not in first and b"hello" not in first and b"answer: 42" not in first
+    # What students receive is what the reader takes for a blank submission.
+    assert [cell["source"] for cell in cells] == [cell["source"].rstrip("\n") for cell in course.lab.released] or [
+        "".join(cell["source"]) for cell in cells
+    ] == [cell["source"] for cell in course.lab.released]
+    assert sorted(path.name for path in folder.iterdir()) == ["toy.ipynb"]
+
+
+def nbgrader(root: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    environment = os.environ | {
+        "PYTHONPATH": str(KIT),
+        "PATH": "/usr/bin:/bin",
+        "JUPYTER_CONFIG_DIR": str(root / "none"),
+    }
+    environment.pop("TRAITLETS_APPLICATION_RAISE_CONFIG_FILE_ERROR", None)
+    return subprocess.run(
+        [sys.executable, "-m", "nbgrader", *arguments],
+        cwd=root, env=environment, capture_output=True, text=True, timeout=120,
+    )  # fmt: skip
+
+
+def test_nbgraders_own_commands_give_the_same_grades(course: Course, tmp_path: Path) -> None:
+    root = tmp_path / "a course"
+    own = Course(root)
+    shutil.copy(KIT / "nbgrader_config.py", root)
+    own.hand_in("ann", own.cells(why=LIVE))
+    own.hand_in("broken", "{")
+    for student in ("ann", "broken"):
+        own.run(student)
+    done = nbgrader(root, "autograde", toy.LAB)
+    assert done.returncode == 0, done.stderr
+    assert own.grades("ann") == {"check_talker": (3, False), "check_answers": (2, False), "why": (None, True)}
+    assert own.grades("broken")["check_talker"] == (0, False)
+    done = nbgrader(root, "generate_feedback", toy.LAB)
+    assert done.returncode == 0, done.stderr
+    assert "A hidden check passed" in own.feedback("ann") and Tags(own.feedback("ann")).live == []
+
+
+def test_nbgrader_refuses_stock_execution(course: Course, tmp_path: Path) -> None:
+    root = tmp_path / "course"
+    own = Course(root)
+    own.hand_in("ann", own.cells())
+    own.run("ann")
+    shutil.copy(KIT / "nbgrader_config.py", root)
+    stages = '--Autograde.autograde_preprocessors=["nbgrader.preprocessors.Execute"]'
+    done = nbgrader(root, "autograde", toy.LAB, stages)
+    assert done.returncode != 0 and not (root / "build" / "autograded").exists()
+    broken = (root / "nbgrader_config.py").read_text().replace("autograder.grading.stages", "autograder.nowhere")
+    (root / "nbgrader_config.py").write_text(broken)
+    done = nbgrader(root, "autograde", toy.LAB)
+    assert done.returncode != 0 and "Nothing was executed" in done.stderr
+    assert not (root / "build" / "autograded").exists()
