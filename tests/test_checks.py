@@ -17,6 +17,7 @@ from autograder.results import CheckResult, Isolation, Outcome, Status
 SET_UP = """\
 %load_ext autograder
 from autograder.checks import Node, answers, launch, vary
+from rclpy.qos import QoSProfile
 from std_msgs.msg import Int32, String
 from std_srvs.srv import Trigger
 """
@@ -124,14 +125,16 @@ def test_a_right_node_earns_the_points_under_names_and_values_that_vary(grade: G
         ('"chatter"', '"chattr"', 'ros.expect_publisher("/chatter", String)', "topic-name", "/chattr"),
         ("rclpy.spin(Talker())", "node = Talker(); import threading; threading.Event().wait()",
          'ros.expect_messages("/chatter", String, within=2)', "not-spinning", "nothing spins"),
-        ("        self.count = 0", "        self.count = nothing", 'ros.expect_node("/talker")', "crashed", "self.count = nothing"),
+        ("        self.count = 0", "        self.count = nothing", 'ros.expect_node("/talker")', "crashed",
+         "self.count = nothing"),
         ("def main():", "def main()", 'ros.expect_node("/talker")', "syntax-error", "line"),
-        ("        return response", "        return", 'ros.call("/how_many", Trigger, Trigger.Request())', "service-no-return",
+        ("        return response", "        return", 'ros.call("/how_many", Trigger, Trigger.Request())',
+         "service-no-return",
          "did not return the response"),
         ("response.success = True", "raise ValueError('no')", 'ros.call("/how_many", Trigger, Trigger.Request())',
          "service-exception", "ValueError: no"),
         ('"chatter", 10', '"chatter", rclpy.qos.qos_profile_sensor_data',
-         'ros.expect_messages("/chatter", String, qos=10 and __import__("rclpy.qos").qos.QoSProfile(depth=10), within=2)',
+         'ros.expect_messages("/chatter", String, qos=QoSProfile(depth=10), within=2)',
          "qos-reliability", "best effort"),
         ("", "", 'ros.expect_messages("/chatter", Int32, within=2)', "wrong-type", "std_msgs/msg/String"),
         ("", "", 'ros.expect_messages("/chatter", String, rate=5)', "rate", "instead of 5 Hz"),
