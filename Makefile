@@ -35,6 +35,7 @@ doctor: setup ## say what this machine offers, and what to do about what it lack
 	@$(RUN) autograder doctor $(ARGS)
 
 grade: setup ## grade a class: the sample class, or SUBMISSIONS=folder-or-zip
+	@$(if $(SUBMISSIONS),:,$(RUN) python tests/sample_class.py $(LAB) >/dev/null)
 	@$(RUN) autograder grade $(LAB) $(if $(SUBMISSIONS),"$(SUBMISSIONS)") $(ARGS)
 
 check: setup ## report on one notebook: NB=path/to/notebook.ipynb
@@ -47,7 +48,9 @@ release: setup ## make labs/ from solutions/
 	@$(RUN) autograder release $(ARGS)
 
 lectures: setup-dev ## build the book and the slides into build/lectures
-	@$(RUN) python -m lectures $(ARGS)
+	@$(RUN) sphinx-build -q -W --keep-going -b html lectures build/lectures/book $(ARGS)
+	@$(RUN) sphinx-build -q -W --keep-going -b revealjs lectures build/lectures/slides $(ARGS)
+	@echo build/lectures/book/index.html build/lectures/slides/index.html
 
 test: lint ## run every test
 	@$(RUN) python -m pytest $(ARGS)
