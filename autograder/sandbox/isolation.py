@@ -1,0 +1,100 @@
+"""What isolation this machine offers, tried and not guessed; and the refusal to grade with less than was asked for."""
+
+from __future__ import annotations
+
+import functools
+import os
+import platform
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+from autograder.errors import KitError
+from autograder.results import Isolation
+from autograder.sandbox import bubblewrap, landlock
+from autograder.sandbox.outer import run_in_sandbox
+
+_TIME_LIMIT = 60.0
+
+
+@dataclass(frozen=True)
+class Preflight:
+    """What this machine offers, and why not more."""
+
+    full: bool
+    reduced: bool
+    why_not_full: str = ""
+    do: str = ""
+    """What to do to get full isolation."""
+
+
+@functools.cache
+def preflight() -> Preflight:
+    """Try a program in the two nested sandboxes, exactly as grading does; takes about half a second, once."""
+    why = _why_not_full()
+    return Preflight(full=not why, reduced=_reduced(), why_not_full=why, do=_remedy(why) if why else "")
+
+
+def choose(wanted: Isolation) -> Isolation:
+    """Return `wanted`, if this machine offers it. Nothing is ever weakened silently.
+
+    Raises:
+        KitError: it does not; says what to do, and which weaker isolation may be asked for.
+    """
+    if wanted is Isolation.NONE:
+        return wanted
+    found = preflight()
+    if wanted is Isolation.FULL and not found.full:
+        weaker = "--isolation reduced" if found.reduced else "--isolation none"
+        raise KitError(
+            f"Students' programs cannot be isolated on this machine: {found.why_not_full}",
+            f"{found.do} Or accept less, at your own risk: {weaker} (it is recorded in every result).",
+        )
+    if wanted is Isolation.REDUCED and not found.reduced:
+        raise KitError(
+            "This kernel offers no Landlock of version 6 or later, which reduced isolation needs.",
+            "Use Linux 6.12 or later, full isolation, or, at your own risk, --isolation none.",
+        )
+    return wanted
+
+
+def _why_not_full() -> str:
+    if not sys.platform.startswith("linux") or platform.machine() != "x86_64":
+        return f"it is {sys.platform} on {platform.machine()}, not Linux on x86_64"
+    if not bubblewrap.bwrap():
+        return "bubblewrap is missing from the virtual environment"
+    try:
+        run = run_in_sandbox(["autograder.sandbox.trial"], b"", Isolation.FULL, _TIME_LIMIT)
+    except OSError as error:
+        return f"bubblewrap does not start ({error})"
+    if run.status == 0 and run.stdout.strip() == b"isolated":
+        return ""
+    said = run.stderr.strip().splitlines()
+    return said[-1] if said else f"the trial ended with status {run.status}"
+
+
+def _reduced() -> bool:
+    return platform.machine() == "x86_64" and landlock.version() >= landlock.NEEDED_VERSION
+
+
+def _remedy(why: str) -> str:
+    if "virtual environment" in why:
+        return "Delete .venv and set up again."
+    if _setting("kernel/apparmor_restrict_unprivileged_userns") == "1":
+        return "Run `sudo sysctl -w kernel.apparmor_restrict_unprivileged_userns=0`."
+    if _setting("kernel/unprivileged_userns_clone") == "0":
+        return "Run `sudo sysctl -w kernel.unprivileged_userns_clone=1`."
+    if _setting("user/max_user_namespaces") == "0":
+        return "Run `sudo sysctl -w user.max_user_namespaces=10000`."
+    if Path("/.dockerenv").exists() or Path("/run/.containerenv").exists():
+        return "Start the container with user namespaces allowed (Docker: --security-opt seccomp=unconfined --security-opt systempaths=unconfined)."
+    if os.getuid() == 0 and "Permission denied" in why:
+        return "Make the virtual environment readable for everyone (`chmod -R go+rX .venv`), or run as an ordinary user."
+    return "Allow unprivileged user namespaces on this machine."
+
+
+def _setting(name: str) -> str:
+    try:
+        return (Path("/proc/sys") / name).read_text().strip()
+    except OSError:
+        return ""

@@ -1,0 +1,88 @@
+"""Reduced isolation: the kernel's Landlock hides files and signals where there are no user namespaces.
+
+It hides neither the network nor the process list. Run as a module it confines itself and becomes another program:
+`python -m autograder.sandbox.landlock READ_ONLY… -- WRITABLE… -- COMMAND…`.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import struct
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from autograder.sandbox import seccomp
+from autograder.sandbox.environment import HERE, SYSTEM_FILES, SYSTEM_FOLDERS, python_folders
+
+NEEDED_VERSION = 6
+"""The first that also keeps signals and abstract sockets inside."""
+
+_CREATE_RULESET, _ADD_RULE, _RESTRICT_SELF = 444, 445, 446
+_EXECUTE, _WRITE_FILE, _READ_FILE, _READ_DIR = 1 << 0, 1 << 1, 1 << 2, 1 << 3
+_ALL_FILES = (1 << 16) - 1  # all accesses of the file system that version 5 and later know
+_FILE_ONLY = _EXECUTE | _WRITE_FILE | _READ_FILE | 1 << 14 | 1 << 15
+_READ = _EXECUTE | _READ_FILE | _READ_DIR
+_SCOPED = 1 << 0 | 1 << 1  # abstract sockets, signals
+_DEVICES = ("/dev/null", "/dev/zero", "/dev/full", "/dev/random", "/dev/urandom")
+
+_libc = ctypes.CDLL(None, use_errno=True)
+
+
+def version() -> int:
+    """Return the kernel's version of Landlock; 0 if it has none."""
+    return max(0, int(_libc.syscall(_CREATE_RULESET, None, ctypes.c_size_t(0), 1)))
+
+
+def confined(command: Sequence[str], folder: Path, scratch: Path) -> list[str]:
+    """Return `command` so that it sees Python, ROS and `folder`, and writes only to `scratch`."""
+    readable = [*SYSTEM_FOLDERS, *SYSTEM_FILES, *map(str, python_folders()), str(folder), "/proc"]
+    readable += [str(HERE / name) for name in ("launcher.py", "probe.py", "fastdds.xml")]
+    return [
+        sys.executable, "-I", "-c", f"import sys; sys.path.append({str(HERE.parent.parent)!r}); "
+        "from autograder.sandbox.landlock import main; main()",
+        *readable, "--", str(scratch), *_DEVICES, "--", *command,
+    ]  # fmt: skip
+
+
+def confine(readable: Sequence[str], writable: Sequence[str]) -> None:
+    """Put this process, and all that it starts, under Landlock and the filter of system calls.
+
+    Raises:
+        OSError: the kernel refuses.
+    """
+    handled = struct.pack("QQQ", _ALL_FILES, 0, _SCOPED)
+    ruleset = _checked(_libc.syscall(_CREATE_RULESET, handled, ctypes.c_size_t(len(handled)), 0))
+    for paths, access in ((readable, _READ), (writable, _ALL_FILES)):
+        for path in paths:
+            if not Path(path).exists():
+                continue
+            allowed = access if Path(path).is_dir() else access & _FILE_ONLY
+            descriptor = os.open(path, os.O_PATH | os.O_CLOEXEC)
+            rule = struct.pack("=Qi", allowed, descriptor)
+            _checked(_libc.syscall(_ADD_RULE, ruleset, 1, rule, 0))
+            os.close(descriptor)
+    _checked(_libc.prctl(38, 1, 0, 0, 0))
+    _checked(_libc.syscall(_RESTRICT_SELF, ruleset, 0))
+    os.close(ruleset)
+    seccomp.apply_to_self()
+
+
+def _checked(result: int) -> int:
+    if result < 0:
+        raise OSError(ctypes.get_errno(), os.strerror(ctypes.get_errno()))
+    return result
+
+
+def main() -> None:
+    """Confine this process, and become the command."""
+    readable, rest = _split(sys.argv[1:])
+    writable, command = _split(rest)
+    confine(readable, writable)
+    os.execve(command[0], command, dict(os.environ))
+
+
+def _split(words: list[str]) -> tuple[list[str], list[str]]:
+    place = words.index("--")
+    return words[:place], words[place + 1 :]

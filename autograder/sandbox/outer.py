@@ -1,0 +1,130 @@
+"""Runs a trusted module of this package in the grading sandbox: one process tree, input by stdin, output by stdout."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import selectors
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from autograder.results import Isolation
+from autograder.sandbox import bubblewrap
+from autograder.sandbox.environment import python_environment
+from autograder.sandbox.limits import MIB
+
+OUTPUT_LIMIT = 64 * MIB
+"""Bytes of stdout after which the run is ended."""
+STDERR_KEPT = MIB
+
+DROPPED_ID = 61771
+"""The user and group that root becomes for grading: one that owns nothing."""
+
+_DROP = (
+    "import os,sys;os.setgroups([]);os.setresgid({0},{0},{0});os.setresuid({0},{0},{0});"
+    "os.execve(sys.argv[1],sys.argv[1:],{{}})"
+).format(DROPPED_ID)
+
+
+@dataclass
+class OuterRun:
+    """What came out of a run in the sandbox."""
+
+    stdout: bytes
+    stderr: str
+    status: int
+    """Exit status; negative: the number of the signal that ended it."""
+    timed_out: bool
+
+
+def run_in_sandbox(module_args: list[str], stdin: bytes, isolation: Isolation, time_limit: float) -> OuterRun:
+    """Run `python -m <module_args…>` in the grading sandbox and wait for it.
+
+    The module sees this virtual environment, the `autograder` package and an empty /tmp; no labs, no submissions, no
+    gradebook, no network. With reduced or no isolation it is a plain child process.
+
+    Args:
+        module_args: module name and its arguments.
+        stdin: what it reads.
+        isolation: as `isolation.choose` returned it.
+        time_limit: seconds after which everything in the sandbox is ended.
+
+    Raises:
+        OSError: the sandbox cannot be started at all.
+    """
+    process = start_in_sandbox(module_args, isolation)
+    try:
+        return _exchange(process, stdin, time_limit)
+    finally:
+        with contextlib.suppress(ProcessLookupError):
+            process.kill()
+        process.wait()
+        for stream in (process.stdin, process.stdout, process.stderr):
+            if stream is not None:
+                with contextlib.suppress(OSError):
+                    stream.close()
+
+
+def start_in_sandbox(module_args: list[str], isolation: Isolation) -> subprocess.Popen[bytes]:
+    """Start what `run_in_sandbox` waits for; it ends with the thread that calls this."""
+    variables = {
+        **python_environment(),
+        "PYTHONPATH": str(bubblewrap.PACKAGE.parent),
+        "PYTHONSAFEPATH": "1",
+        "HOME": "/tmp",
+    }
+    command = [sys.executable, "-m", *module_args]
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    if isolation is not Isolation.FULL:
+        return subprocess.Popen(command, env=variables, start_new_session=True, **pipes)  # type: ignore[call-overload,no-any-return]
+    around = None
+    if os.getuid() == 0:
+        # Namespaces nest only for an ordinary user, and only root may read below /root: give up root inside a mount
+        # tree of our own, in which this Python lies under folders that everyone may enter.
+        around = (bubblewrap.level_zero_options(), [sys.executable, "-I", "-S", "-c", _DROP])
+    return bubblewrap.start_bwrap(bubblewrap.outer_options(variables), command, around=around, **pipes)
+
+
+def _exchange(process: subprocess.Popen[bytes], stdin: bytes, time_limit: float) -> OuterRun:
+    assert process.stdin is not None and process.stdout is not None and process.stderr is not None
+    deadline = time.monotonic() + time_limit
+    taken: dict[str, bytearray] = {"stdout": bytearray(), "stderr": bytearray()}
+    waiting = memoryview(stdin)
+    timed_out = False
+    with selectors.DefaultSelector() as selector:
+        for stream, name in ((process.stdin, "stdin"), (process.stdout, "stdout"), (process.stderr, "stderr")):
+            os.set_blocking(stream.fileno(), False)
+            selector.register(
+                stream, selectors.EVENT_WRITE if name == "stdin" else selectors.EVENT_READ, (name, stream)
+            )
+        while any(key.data[0] != "stdin" for key in selector.get_map().values()):
+            left = deadline - time.monotonic()
+            if left <= 0 or len(taken["stdout"]) > OUTPUT_LIMIT:
+                timed_out = left <= 0
+                process.kill()
+                break
+            for key, _ in selector.select(left):
+                name, stream = key.data
+                if name == "stdin":
+                    try:
+                        waiting = waiting[os.write(stream.fileno(), waiting[: 1 << 16]) :]
+                    except BrokenPipeError:
+                        waiting = waiting[:0]
+                    if not waiting:
+                        selector.unregister(stream)
+                        stream.close()
+                    continue
+                data = os.read(stream.fileno(), 1 << 18)
+                if not data:
+                    selector.unregister(stream)
+                elif name == "stdout" or len(taken["stderr"]) < STDERR_KEPT:
+                    taken[name] += data
+    try:
+        status = process.wait(max(0.5, deadline - time.monotonic()))
+    except subprocess.TimeoutExpired:
+        process.kill()
+        status, timed_out = process.wait(), True
+    return OuterRun(bytes(taken["stdout"]), taken["stderr"].decode("utf-8", "replace"), status, timed_out)
