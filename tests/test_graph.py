@@ -1,0 +1,117 @@
+"""The parts that the expectations stand on: names, QoS matching, overlaps, parameter values on a command line."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from types import SimpleNamespace
+
+import pytest
+import rclpy
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from rclpy.context import Context
+from rclpy.duration import Duration
+from rclpy.qos import (
+    QoSCompatibility,
+    QoSDurabilityPolicy,
+    QoSLivelinessPolicy,
+    QoSProfile,
+    QoSReliabilityPolicy,
+    qos_check_compatible,
+)
+
+from autograder.checks.activity import Activity
+from autograder.checks.launch import Node
+from autograder.graph.names import nearest
+from autograder.graph.qos import first_mismatch
+from autograder.graph.recording import Received
+
+
+def profiles() -> st.SearchStrategy[QoSProfile]:
+    periods = st.sampled_from([None, 0.1, 0.2])
+
+    def build(
+        reliability: int, durability: int, liveliness: int, deadline: float | None, lease: float | None
+    ) -> QoSProfile:
+        profile = QoSProfile(depth=1, reliability=reliability, durability=durability, liveliness=liveliness)
+        if deadline:
+            profile.deadline = Duration(seconds=deadline)
+        if lease:
+            profile.liveliness_lease_duration = Duration(seconds=lease)
+        return profile
+
+    return st.builds(
+        build,
+        st.sampled_from([QoSReliabilityPolicy.RELIABLE, QoSReliabilityPolicy.BEST_EFFORT]),
+        st.sampled_from([QoSDurabilityPolicy.VOLATILE, QoSDurabilityPolicy.TRANSIENT_LOCAL]),
+        st.sampled_from([QoSLivelinessPolicy.AUTOMATIC, QoSLivelinessPolicy.MANUAL_BY_TOPIC]),
+        periods,
+        periods,
+    )
+
+
+@given(profiles(), profiles())
+def test_the_mismatch_named_is_one_that_the_middleware_sees_too(offered: QoSProfile, requested: QoSProfile) -> None:
+    compatible, reason = qos_check_compatible(offered, requested)
+    mismatch = first_mismatch(offered, requested)
+    assert (mismatch is None) == (compatible != QoSCompatibility.ERROR), reason
+
+
+def received(events: Sequence[str]) -> list[Received]:
+    return [Received(SimpleNamespace(data=text), 0.0, float(i), i) for i, text in enumerate(events)]
+
+
+@given(st.lists(st.tuples(st.sampled_from("abc"), st.integers(0, 50), st.integers(1, 20)), max_size=12))
+def test_overlap_counts_the_runs_that_are_under_way_together(runs: list[tuple[str, int, int]]) -> None:
+    # Ends before begins at the same moment: runs that only touch do not overlap.
+    events = sorted(
+        [(start, 1, f"{name} begin") for name, start, _ in runs]
+        + [(start + length, 0, f"{name} end") for name, start, length in runs]
+    )
+    activity = Activity(received([text for _, _, text in events]))
+    most = max((sum(s <= t < s + n for _, s, n in runs) for t in range(80)), default=0)
+    assert activity.overlap("abc") == most
+    assert activity.distinct_overlap("abc") == max(
+        (len({name for name, s, n in runs if s <= t < s + n}) for t in range(80)), default=0
+    )
+    assert sum(activity.runs(name) for name in "abc") == len(runs)
+
+
+def test_the_order_of_publication_decides_not_the_order_of_arrival() -> None:
+    messages = received(["a begin", "a end", "b begin", "b end"])
+    assert Activity([messages[i] for i in (0, 2, 1, 3)]).overlap("ab") == 1
+
+
+@pytest.mark.parametrize(
+    ("wanted", "names", "meant"),
+    [
+        ("/rear/camera", ["/camera", "/talker"], "/camera"),
+        ("/talker", ["/talkr", "/listener"], "/talkr"),
+        ("/talker", ["/xyz"], None),
+        ("/talker", [], None),
+    ],
+)
+def test_the_nearest_name_is_the_one_that_was_meant(wanted: str, names: list[str], meant: str | None) -> None:
+    assert nearest(wanted, names) == meant
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    st.one_of(
+        st.booleans(),
+        st.integers(-(2**40), 2**40),
+        st.floats(allow_nan=False, allow_infinity=False),
+        st.text(st.characters(codec="ascii", categories=("L", "N", "P", "S", "Zs")), max_size=12),
+    )
+)
+def test_a_parameter_keeps_its_type_on_the_command_line(value: bool | int | float | str) -> None:
+    context = Context()
+    rclpy.init(args=Node("talker", parameters={"p": value}).arguments(), context=context, domain_id=99)
+    try:
+        node = rclpy.create_node("talker", context=context, automatically_declare_parameters_from_overrides=True)
+        read = node.get_parameter("p").value
+        node.destroy_node()
+    finally:
+        context.try_shutdown()
+    assert type(read) is type(value)
+    assert read == value
