@@ -2,6 +2,7 @@
 
 from autograder.checks import vary
 from autograder.checks.answers import answers
-from autograder.checks.launch import Node, launch
+from autograder.checks.command_line import command_line
+from autograder.checks.launch import Node, launch, launch_file
 
-__all__ = ["Node", "answers", "launch", "vary"]
+__all__ = ["Node", "answers", "command_line", "launch", "launch_file", "vary"]

@@ -28,6 +28,7 @@ class ExpectationBase:
     programs: list[tuple[Node, Program]]
     domain_id: int
     _missing: list[str]
+    _trouble: list[Diagnosis]
 
     def prepare(self) -> None:
         """Set up what each group needs for this launch."""

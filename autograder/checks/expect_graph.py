@@ -35,7 +35,8 @@ class GraphExpectations(ExpectationBase):
             [program for _, program in self.programs],
             self._missing,
             session.current.folder,
-            [rule for node, _ in self.programs for rule in node.rules()],
+            [rule for node, _ in self.programs for rule in node.all_rules()],
+            self._trouble,
         )
 
     def expect_node(self, name: str, *, within: float = WITHIN, hint: str = "") -> None:

@@ -8,19 +8,24 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from types import TracebackType
 from typing import Any
 
 import yaml
 
 from autograder.checks import outcomes, session
+from autograder.checks.command_line import CommandLine, CommandLineError
 from autograder.checks.expect_lifecycle import LifecycleExpectations
 from autograder.checks.expect_messages import MessageExpectations
 from autograder.checks.expect_programs import ProgramExpectations
 from autograder.checks.expect_services import ServiceExpectations
 from autograder.checks.scoring import score
 from autograder.checks.session import Score
+from autograder.graph import remap_rules
+from autograder.graph.diagnosis import Diagnosis
 from autograder.graph.observer import Observer
+from autograder.launch_files import LaunchFileError, read_launch_file
 from autograder.results import NodeLog
 from autograder.sandbox.environment import profile_environment
 from autograder.sandbox.nodes import Program
@@ -37,8 +42,10 @@ class Node:
     parameters: Mapping[str, Any] = field(default_factory=dict)
     params_file: str = ""
     """A parameter file of the student's; it comes before `parameters`, which win."""
-    ros_arguments: Sequence[str] = ()
+    ros_arguments: Sequence[str] | CommandLine = ()
     """Further words after `--ros-args`, as typed on a command line."""
+    arguments_of_its_own: Sequence[str] = ()
+    """Words before `--ros-args`."""
     cores: int = 2
     """CPUs that the program may use: the same number on every machine that has them."""
 
@@ -51,8 +58,16 @@ class Node:
             words += ["--params-file", self.params_file]
         for name, value in self.parameters.items():
             words += ["-p", f"{name}:={_yaml_value(value)}"]
-        words += self.ros_arguments
-        return ["--ros-args", *words] if words else []
+        words += self._typed()
+        return [*self.arguments_of_its_own, *(["--ros-args", *words] if words else [])]
+
+    def _typed(self) -> Sequence[str]:
+        typed = self.ros_arguments
+        return typed.words() if isinstance(typed, CommandLine) else typed
+
+    def all_rules(self) -> list[str]:
+        """The remap rules, those that were typed included."""
+        return self.rules() + remap_rules.rules_in(self._typed())
 
     def rules(self) -> list[str]:
         """The remap rules in the order in which they are given: the first that matches wins."""
@@ -82,12 +97,15 @@ class Launch(MessageExpectations, ServiceExpectations, LifecycleExpectations, Pr
         listen: Iterable[tuple[str, type]],
         serve: Iterable[tuple[Any, ...]],
         lifecycle: Iterable[str],
+        file: tuple[str, Mapping[str, str], str] | None = None,
     ) -> None:
-        """Use `launch`."""
+        """Use `launch` or `launch_file`."""
         self.nodes = list(nodes)
+        self._file = file
         self._listen, self._serve, self._lifecycle = list(listen), list(serve), list(lifecycle)
         self.programs: list[tuple[Node, Program]] = []
         self._missing: list[str] = []
+        self._trouble: list[Diagnosis] = []
 
     def __enter__(self) -> Launch:
         self.domain_id = session.current.next_domain()
@@ -103,12 +121,34 @@ class Launch(MessageExpectations, ServiceExpectations, LifecycleExpectations, Pr
                 self.serve(*offer)
             for node in self._lifecycle:
                 self.watch_transitions(node)
-            for launched in self.nodes:
+            for launched in self.nodes or self._from_file():
                 self.start(launched)
         except BaseException:
             self._end()
             raise
         return self
+
+    def _from_file(self) -> list[Node]:
+        """What the student's launch file starts; nothing when it cannot be read, which every expectation then tells."""
+        if self._file is None:
+            return []
+        name, arguments, package = self._file
+
+        def find(wanted: str) -> Path:
+            if wanted != package:
+                raise KeyError(wanted)
+            return folder
+
+        folder = session.current.folder.resolve()
+        try:
+            found = read_launch_file(folder / name, arguments, find)
+        except LaunchFileError as error:
+            self._trouble.append(Diagnosis(str(error), "launch-file", error.hint))
+            return []
+        self.nodes = [
+            Node(one.program, ros_arguments=one.ros_arguments(), arguments_of_its_own=one.arguments) for one in found
+        ]
+        return self.nodes
 
     def start(self, node: Node | str) -> None:
         """Start one more program.
@@ -121,9 +161,12 @@ class Launch(MessageExpectations, ServiceExpectations, LifecycleExpectations, Pr
             self._missing.append(launched.program)
             return
         environment = {**profile_environment(), "ROS_DOMAIN_ID": str(self.domain_id)}
-        program = session.current.sandbox.start(
-            launched.program, launched.arguments(), environment, cores=launched.cores
-        )
+        try:
+            words = launched.arguments()
+        except CommandLineError as error:
+            self._trouble.append(Diagnosis(error.because, error.code, error.hint))
+            return
+        program = session.current.sandbox.start(launched.program, words, environment, cores=launched.cores)
         self.programs.append((launched, program))
 
     def __exit__(
@@ -164,7 +207,7 @@ def launch(
     parameters: Mapping[str, Any] | None = None,
     params_file: str = "",
     use_sim_time: bool = False,
-    ros_arguments: Sequence[str] = (),
+    ros_arguments: Sequence[str] | CommandLine = (),
     cores: int = 2,
     listen: Iterable[tuple[str, type]] = (),
     serve: Iterable[tuple[str, type, Callable[[Any, Any], Any], float] | tuple[Any, ...]] = (),
@@ -180,7 +223,8 @@ def launch(
         parameters: initial values.
         params_file: a parameter file of the student's.
         use_sim_time: take time from `/clock`, which `ros.advance` drives.
-        ros_arguments: further words after `--ros-args`.
+        ros_arguments: further words after `--ros-args`, for programs that have none of their own; a `command_line` is
+            what the student typed.
         cores: CPUs that each program may use.
         listen: (topic, message class) to record from before the start.
         serve: (service, class, answer, delay in seconds) that the observer offers.
@@ -200,8 +244,28 @@ def launch(
                 remappings=[*node.remappings, *remappings],
                 parameters={**given, **node.parameters},
                 params_file=node.params_file or params_file,
-                ros_arguments=[*node.ros_arguments, *ros_arguments],
+                ros_arguments=node.ros_arguments or ros_arguments,
                 cores=min(node.cores, cores),
             )
         )
     return Launch(nodes, listen, serve, lifecycle)
+
+
+def launch_file(
+    file: str,
+    arguments: Mapping[str, str] | None = None,
+    *,
+    package: str,
+    listen: Iterable[tuple[str, type]] = (),
+    lifecycle: Iterable[str] = (),
+) -> Launch:
+    """Describe the launch that a student's launch file describes; `with` starts it and ends it.
+
+    Args:
+        file: a launch file in ROS 2's YAML schema, such as `vehicle.launch.yaml`.
+        arguments: launch arguments, as `name:=value` after `ros2 launch PACKAGE FILE`.
+        package: the name of the package that the student's programs are said to be in.
+        listen: (topic, message class) to record from before the start.
+        lifecycle: full names of lifecycle nodes whose transition events are recorded from before the start.
+    """
+    return Launch([], listen, (), lifecycle, (file, dict(arguments or {}), package))

@@ -14,7 +14,7 @@ from typing import Any, Protocol
 
 from rclpy.qos import QoSProfile
 
-from autograder.graph import qos
+from autograder.graph import qos, remap_rules
 from autograder.graph.names import full_name, nearest, type_name
 from autograder.graph.observer import Observer
 
@@ -67,6 +67,8 @@ class Scene:
     """Where the programs' sources are."""
     rules: Sequence[str] = ()
     """The remap rules given, as on the command line."""
+    trouble: Sequence[Diagnosis] = ()
+    """What kept programs from being started at all."""
 
 
 _IN_CALLBACK = {
@@ -110,9 +112,14 @@ def program_trouble(scene: Scene) -> Diagnosis | None:
             "program-missing",
             "Check the first line of the cell; it must stand there unchanged.",
         )
+    for trouble in scene.trouble:
+        return trouble
     for program in scene.programs:
         if program.running():
             continue
+        refused = remap_rules.refused(scene.rules)
+        if refused and "arse remap rule" in program.output():
+            return Diagnosis(*refused)
         found = _death(scene, program)
         if found:
             return found
@@ -319,6 +326,15 @@ def why_no_node(scene: Scene, wanted: str) -> Diagnosis:
     if not names:
         inside = inside_reason(scene)
         return inside or Diagnosis("The program runs, but it has not made any node.", "no-node")
+    renaming = [rule for rule in map(remap_rules.parse, scene.rules) if rule and not rule.renames_topics]
+    doubles = [name for name in names if names.count(name) > 1]
+    if doubles and any(rule.left != "__ns" and not rule.prefix for rule in renaming):
+        rule = next(rule for rule in renaming if rule.left != "__ns" and not rule.prefix)
+        return Diagnosis(
+            f"`{rule.text}` renames every node of its process: now {len(doubles)} nodes are called `{doubles[0]}`.",
+            "one-name-for-all",
+            "Say which node is meant by its name in the code: `NODE:__node:=NEW`.",
+        )
     base = wanted.rsplit("/", 1)[-1]
     for name in names:
         if name.rsplit("/", 1)[-1] == base:
@@ -351,6 +367,9 @@ def why_no_endpoint(scene: Scene, topic: str, msg_type: type, kind: str, node: s
         return Diagnosis(f"The {kind} on `{topic}` belongs to {', '.join(owners)}, not to `{node}`.", "wrong-node")
     if not observer.nodes():
         return inside_reason(scene) or Diagnosis("The program runs, but it has not made any node.", "no-node")
+    idle = remap_rules.without_effect(scene.rules, topic, observer.nodes(), list(observer.topics()))
+    if idle:
+        return Diagnosis(*idle)
     opposite = observer.subscriptions(topic) if kind == "publisher" else observer.publishers(topic)
     names = [name for name in observer.topics() if not name.startswith(("/rosout", "/parameter_events"))]
     reach = observer.publishers if kind == "publisher" else observer.subscriptions

@@ -1,0 +1,94 @@
+"""Command lines that a student wrote: a `%%file NAME.yaml` cell of `entry: words after --ros-args` lines."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import yaml
+
+from autograder.checks import session
+
+_OPTIONS = {"-r", "--remap", "-p", "--param", "--params-file"}
+_LONGEST = 2000
+
+
+class CommandLineError(Exception):
+    """The words cannot be used; `because`, a short `code` and a `hint` for the student."""
+
+    def __init__(self, because: str, code: str, hint: str = "") -> None:
+        """Keep the parts."""
+        super().__init__(because)
+        self.because, self.code, self.hint = because, code, hint
+
+
+@dataclass(frozen=True)
+class CommandLine:
+    """One entry of the file; it is read when a program is started with it."""
+
+    file: str
+    entry: str
+    then: tuple[str, ...] = ()
+    """Words that the course adds after the student's."""
+
+    def words(self) -> list[str]:
+        """The words after `--ros-args`.
+
+        Raises:
+            CommandLineError: there is no such entry, or it holds something else than ROS arguments.
+        """
+        text = self._text()
+        example = f"`{self.entry}: -r camera:=front_camera`"
+        try:
+            words = shlex.split(text)
+        except ValueError as error:
+            raise CommandLineError(f"`{self.entry}` in `{self.file}`: {error}.", "command-line") from None
+        if words[:1] == ["--ros-args"]:
+            words = words[1:]
+        if not words:
+            raise CommandLineError(f"`{self.entry}` in `{self.file}` has no words.", "unanswered", f"Write {example}.")
+        for number, word in enumerate(words):
+            if (word in _OPTIONS) != (number % 2 == 0):
+                raise CommandLineError(
+                    f"`{self.entry}` in `{self.file}` is not a list of ROS arguments: `{word}` is not expected there.",
+                    "command-line",
+                    f"Every rule has its own `-r`, every parameter its own `-p`: {example}.",
+                )
+        if len(words) % 2:
+            raise CommandLineError(f"`{self.entry}` in `{self.file}` ends with `{words[-1]}`.", "command-line")
+        return [*words, *self.then]
+
+    def _text(self) -> str:
+        path = session.current.folder / self.file
+        if not path.is_file():
+            raise CommandLineError(
+                f"No cell that begins with `%%file {self.file}` was found.",
+                "file-missing",
+                "Check the first line of the cell; it must stand there unchanged.",
+            )
+        try:
+            table = yaml.safe_load(path.read_text(encoding="utf-8"))
+        except (yaml.YAMLError, RecursionError) as error:
+            mark = getattr(error, "problem_mark", None)
+            line = f" in line {mark.line + 1}" if mark else ""
+            raise CommandLineError(f"`{self.file}` is not YAML{line}.", "not-yaml", "Write `entry: words`.") from None
+        text = table.get(self.entry) if isinstance(table, dict) else None
+        if text is None or text == "?":
+            raise CommandLineError(f"`{self.entry}` in `{self.file}` has no answer yet.", "unanswered")
+        if not isinstance(text, str) or len(text) > _LONGEST:
+            raise CommandLineError(
+                f"`{self.entry}` in `{self.file}` is not a command line.", "command-line", "Put it in quotes."
+            )
+        return text
+
+
+def command_line(file: str, entry: str, *, then: Sequence[str] = ()) -> CommandLine:
+    """The words that a student wants after `--ros-args`, for `launch(…, ros_arguments=…)`.
+
+    Args:
+        file: the student's `%%file` of `entry: words` lines.
+        entry: which of them.
+        then: words that follow the student's.
+    """
+    return CommandLine(file, entry, tuple(then))
