@@ -1,8 +1,8 @@
 """What a remap rule does to a node's names, and why one did nothing: the rules of rcl (Jazzy), told to a student.
 
 Measured on rclpy 7.1.6. A rule is matched against a *full* name, the one the code gives after namespace and node name
-are settled. The first rule that matches a name wins, and its result is not looked at again. The prefix of a node-specific
-rule is the name that the node has after `__node`; only for `__node` itself it is the name in the code.
+are settled. The first rule that matches a name wins, and its result is not looked at again. The prefix of a
+node-specific rule is the name that the node has after `__node`; only for `__node` itself it is the name in the code.
 """
 
 from __future__ import annotations
