@@ -291,7 +291,7 @@ def settings_for_uv(pip: "List[str]") -> "Dict[str, str]":
 
 
 def fill(pip: "List[str]", lock: str) -> None:
-    """Install exactly what `lock` pins: by uv, or by pip where uv does not manage.
+    """Install what `lock` pins: by uv, or by pip where uv does not manage.
 
     Raises SetUpError if neither manages.
     """
@@ -305,8 +305,9 @@ def fill(pip: "List[str]", lock: str) -> None:
     elif not pip:
         uv = shutil.which("uv") or uv
     if Path(uv).exists():
-        options = ("--quiet", "--python", str(PYTHON), "--require-hashes", "--compile-bytecode")
-        status, text = output_of(uv, "pip", "sync", *options, str(ROOT / lock), **settings_for_uv(pip))
+        # Not `uv pip sync`: it takes the egg-infos that the ROS wheels carry for packages to be removed, files and all.
+        options = ("--quiet", "--python", str(PYTHON), "--no-deps", "--require-hashes", "--compile-bytecode")
+        status, text = output_of(uv, "pip", "install", *options, "-r", str(ROOT / lock), **settings_for_uv(pip))
         if status == 0:
             return
         trouble = text.strip()
