@@ -25,7 +25,9 @@ def cell(kind: str, source: str, number: int, **nbgrader: Any) -> dict[str, Any]
 
 CELLS = [
     cell("markdown", "# A toy lab\nwith `a < b` in it", 1),
-    cell("code", "%load_ext autograder\nfrom autograder.checks import *", 2, grade_id="setup", locked=True),
+    cell(
+        "code", "%load_ext autograder\nfrom autograder.checks import answers, launch", 2, grade_id="setup", locked=True
+    ),
     cell("code", "%%node helper\nprint('given')", 3, grade_id="helper", locked=True),
     cell("markdown", "## The talker\nWrite it.", 4),
     cell(
@@ -37,7 +39,12 @@ CELLS = [
     ),
     cell(
         "code",
-        "check('talker')\n### BEGIN HIDDEN TESTS\nsecret('talker')\n### END HIDDEN TESTS\nscore(3)",
+        """with launch("talker") as ros:
+    ros.expect_exit("talker")
+    ### BEGIN HIDDEN TESTS
+    ros.expect_exit("talker", status=0, hint="no secret")
+    ### END HIDDEN TESTS
+ros.score(3)""",
         6,
         grade_id="check_talker",
         grade=True,
@@ -52,7 +59,15 @@ CELLS = [
         grade_id="answers",
         solution=True,
     ),
-    cell("code", "check('answers')\nscore(2)", 9, grade_id="check_answers", grade=True, locked=True, points=2),
+    cell(
+        "code",
+        'with answers("answers.yaml") as table:\n    table.expect_answer("answer", 42)\ntable.score(2)',
+        9,
+        grade_id="check_answers",
+        grade=True,
+        locked=True,
+        points=2,
+    ),
     cell("markdown", "Because.", 10, grade_id="why", grade=True, solution=True, points=4),
 ]
 

@@ -153,35 +153,40 @@ def record(
         Why it failed, by student; the others are recorded.
     """
     database = root / "build" / "gradebook.db"
-    touched_before = database.stat().st_mtime if database.exists() else 0.0
-    known = set() if force else _known(root, lab)
-    register(root, lab.name)
-    api = _api(root)
+    if not database.exists():
+        # What was recorded went with the gradebook.
+        shutil.rmtree(root / "build" / "autograded", ignore_errors=True)
+    todo = {student: _due(root, lab, student, force) for student in students}
     failures: dict[str, str] = {}
-    fresh: list[Path] = []
-    for student in students:
-        feedback = root / "build" / "feedback" / student / lab.name / f"{lab.name}.html"
-        if student not in known or _is_older(
-            root / "build" / "autograded" / student / lab.name / f"{lab.name}.ipynb",
-            result_path(root, lab.name, student),
-            lab.notebook,
-        ):
+    if any(todo.values()):
+        register(root, lab.name)
+        api = _api(root)
+    for student, steps in todo.items():
+        feedback = _feedback(root, lab, student)
+        if steps:
             feedback.unlink(missing_ok=True)
-            answer = api.autograde(lab.name, student, force=True, create=True)
+        for step in steps:
+            answer = getattr(api, step)(lab.name, student, force=True)
             if not answer["success"]:
                 failures[student] = _last_error(answer)
-        if student not in failures and (
-            not feedback.exists() or feedback.stat().st_mtime < touched_before  # graded by hand since then
-        ):
-            answer = api.generate_feedback(lab.name, student, force=True)
-            if not answer["success"]:
-                failures[student] = _last_error(answer)
-        if student not in failures:
-            fresh.append(feedback)
+                break
         on_student(student)
-    for feedback in fresh:
-        os.utime(feedback)
+    for student in todo.keys() - failures.keys():
+        os.utime(_feedback(root, lab, student))
     return failures
+
+
+def _feedback(root: Path, lab: Lab, student: str) -> Path:
+    return root / "build" / "feedback" / student / lab.name / f"{lab.name}.html"
+
+
+def _due(root: Path, lab: Lab, student: str, force: bool) -> list[str]:
+    """The steps of nbgrader's that a student needs; none if neither the result nor a grade changed."""
+    recorded = root / "build" / "autograded" / student / lab.name / f"{lab.name}.ipynb"
+    if force or _is_older(recorded, result_path(root, lab.name, student), lab.notebook):
+        return ["autograde", "generate_feedback"]
+    # The gradebook is younger than the feedback where somebody graded by hand since.
+    return ["generate_feedback"] if _is_older(_feedback(root, lab, student), root / "build" / "gradebook.db") else []
 
 
 def _is_older(path: Path, *others: Path) -> bool:
@@ -191,26 +196,14 @@ def _is_older(path: Path, *others: Path) -> bool:
         return True
 
 
-def _known(root: Path, lab: Lab) -> set[str]:
-    """The students whose submission of a lab the gradebook has."""
-    database = root / "build" / "gradebook.db"
-    if not database.exists():
-        return set()
-    prepare_nbgrader()
-    from nbgrader.api import Gradebook, MissingEntry
-
-    with Gradebook(f"sqlite:///{database}") as gradebook:
-        try:
-            return {submission.student_id for submission in gradebook.find_assignment(lab.name).submissions}
-        except MissingEntry:
-            return set()
-
-
 def write_grades(root: Path) -> Path:
     """Write `build/grades.csv` from the gradebook and return its path.
 
     A row for each student and lab. The score stays empty as long as a check waits for an instructor's verdict.
     """
+    path = root / "build" / "grades.csv"
+    if not _is_older(path, root / "build" / "gradebook.db"):
+        return path
     prepare_nbgrader()
     from nbgrader.api import Gradebook
 
@@ -231,12 +224,5 @@ def write_grades(root: Path) -> Path:
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(("student", "lab", "score", "max_score"))
     writer.writerows(sorted(rows))
-    path = root / "build" / "grades.csv"
     write_beside(path, text.getvalue())
     return path
-
-
-def forget(root: Path, lab: str, student: str) -> None:
-    """Drop what earlier runs made of a submission that is no longer there."""
-    for folder in ("submitted", "autograded", "feedback"):
-        shutil.rmtree(root / "build" / folder / student / lab, ignore_errors=True)

@@ -33,6 +33,8 @@ def run_job(job: Job, folder: Path) -> SubmissionResult:
     for name, text in job.files.items():
         (folder / name).write_text(text, encoding="utf-8")
     session.current.configure(folder, job.isolation, job.seed)
+    if job.files:
+        _ = session.current.sandbox  # it warms up while the set-up cells import their messages
     result = SubmissionResult(
         student=job.student,
         lab=job.lab,
