@@ -270,6 +270,23 @@ class GraphExpectations(ExpectationBase):
             hint=hint,
         )
 
+    def expect_match(self, topic: str, *, within: float = WITHIN, hint: str = "") -> None:
+        """Every subscription to the topic accepts the QoS that every publisher of it offers."""
+        title = f"Publishers and subscriptions on `{topic}` match"
+
+        def ends(kind: End) -> list[TopicEndpointInfo]:
+            return self._ends(topic, None, kind, "")
+
+        if not self.wait(lambda: ends("publisher") and ends("subscription"), within):
+            missing = "subscription" if ends("publisher") else "publisher"
+            trouble = diagnosis.program_trouble(self.scene())
+            self.fail(title, trouble or Diagnosis(f"There is no {missing} on `{topic}`.", "no-topic"), hint=hint)
+        reasons = [
+            diagnosis.why_not_matched(self.scene(), topic, end.qos_profile, "publisher") for end in ends("subscription")
+        ]
+        reason = next((found for found in reasons if found), None)
+        self.expect_that(not reason, title, lambda: reason, hint=hint)
+
 
 def _value(value: Any) -> str:
     if value is None:
