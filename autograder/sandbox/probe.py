@@ -14,7 +14,7 @@ import os
 import sys
 import threading
 import weakref
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any
 
 _MOST = 500
@@ -119,24 +119,28 @@ def _node_name(node: Any) -> str:
     return ""
 
 
-@contextlib.contextmanager
-def _callback(kind: str, node: str) -> Iterator[None]:
+class _Callback:
     """While a callback runs; an error that leaves it is noted."""
-    before = _here.in_callback, _here.depth
-    _here.in_callback, _here.depth = True, 0
-    try:
-        yield
-    except Exception as error:
+
+    def __init__(self, kind: str, node: str) -> None:
+        self.kind, self.node = kind, node
+        self.before = (False, 0)
+
+    def __enter__(self) -> None:
+        self.before = _here.in_callback, _here.depth
+        _here.in_callback, _here.depth = True, 0
+
+    def __exit__(self, kind: Any, error: BaseException | None, trace: Any) -> None:
+        _here.in_callback, _here.depth = self.before
+        if not isinstance(error, Exception) or isinstance(error, StopIteration):
+            return
         with _quiet():
             if type(error).__name__ != "ExternalShutdownException":
                 emit(
-                    {"e": "callback_error", "node": node, "kind": kind, "type": type(error).__name__}
+                    {"e": "callback_error", "node": self.node, "kind": self.kind, "type": type(error).__name__}
                     | {"text": str(error)}
                     | _error_line(error)
                 )
-        raise
-    finally:
-        _here.in_callback, _here.depth = before
 
 
 class _Steps:
@@ -149,7 +153,7 @@ class _Steps:
         sent = None
         while True:
             try:
-                with _callback(self.kind, self.node):
+                with _Callback(self.kind, self.node):
                     wanted = self.steps.send(sent)
             except StopIteration as end:
                 return end.value
@@ -164,7 +168,7 @@ async def _await_or_execute(callback: Any, *args: Any) -> Any:
     if inspect.iscoroutinefunction(callback):
         result = await _Steps(callback(*args), kind, node)
     else:
-        with _callback(kind, node):
+        with _Callback(kind, node):
             result = callback(*args)
     with _quiet():
         _check_return(callback, kind, args, result)
@@ -190,7 +194,7 @@ def _bad_return(kind: str, callback: Any, result: Any, expected: type) -> None:
 def _checked(kind: str, callback: Callable[..., Any], node: str, expected: type) -> Callable[..., Any]:
     @functools.wraps(callback)
     def call(*args: Any, **kwargs: Any) -> Any:
-        with _callback(kind, node):
+        with _Callback(kind, node):
             result = callback(*args, **kwargs)
         with _quiet():
             if not isinstance(result, expected):
@@ -311,6 +315,8 @@ def _entity_note(kind: str, name_of: Callable[[Any, Any], str]) -> Callable[...,
         if _here.building:
             return
         group = getattr(entity, "callback_group", None)
+        if group is not None and group is getattr(node, "_rate_group", None):
+            return  # the timer below a Rate
         event = {"e": "entity", "kind": kind, "name": "", "node": _node_name(node)}
         with _quiet():
             event["name"] = name_of(entity, node)
