@@ -207,7 +207,7 @@ class MessageExpectations(GraphExpectations):
         """
         msg_type = type(messages[0])
         profile = qos if isinstance(qos, QoSProfile) else QoSProfile(depth=qos)
-        key = (topic, repr(profile))
+        key = (topic, str(profile))  # its repr would tell objects apart, not policies
         if key not in self._publishers:
             self._publishers[key] = self.observer.publisher(topic, msg_type, profile)
         publisher = self._publishers[key]

@@ -133,7 +133,7 @@ class Observer:
                 every publisher whatever it offers.
         """
         profile = qos or quiet_profile()
-        key = (topic, repr(profile))
+        key = (topic, str(profile))  # its repr would tell objects apart, not policies
         if key not in self._recordings:
             self._recordings[key] = Recording(self, topic, msg_type, profile)
         return self._recordings[key]
