@@ -48,6 +48,7 @@ class MessageExpectations(GraphExpectations):
         rate: float | None = None,
         tolerance: float = 0.2,
         window: float = 1.0,
+        after: int = 0,
         where: Callable[[Any], bool] | None = None,
         values: Callable[[list[Any]], bool | str] | None = None,
         publisher: str = "",
@@ -67,6 +68,7 @@ class MessageExpectations(GraphExpectations):
             rate: hertz; judged by the median gap of the publisher's own stamps, so that a slow grader does not matter.
             tolerance: allowed deviation of the rate, as a share.
             window: seconds.
+            after: leaves out the first so many messages of the topic, for example those of a node's first life.
             where: counts only messages for which it is true.
             values: looks at all counted messages; false, or a sentence that says what is wrong, fails.
             publisher: full name of the node that they must come from.
@@ -83,7 +85,7 @@ class MessageExpectations(GraphExpectations):
         recording = self.observer.record(topic, msg_type, qos)
 
         def counted() -> list[Received]:
-            return [r for r in recording.messages if where is None or where(r.msg)]
+            return [r for r in recording.messages[after:] if where is None or where(r.msg)]
 
         title = _title(topic, need, most, rate)
         if not self.wait(lambda: len(counted()) >= need, within):
@@ -105,7 +107,7 @@ class MessageExpectations(GraphExpectations):
                 observed=f"{len(received)}",
                 hint=hint,
             )
-        self._one_source(title, topic, msg_type, publisher, publishers, recording)
+        self._one_source(title, topic, msg_type, publisher, publishers, recording.messages[after:])
         if rate is not None:
             self._rate(title, received, rate, tolerance, hint)
         if values is not None:
@@ -122,7 +124,7 @@ class MessageExpectations(GraphExpectations):
         return [r.msg for r in received]
 
     def _one_source(
-        self, title: str, topic: str, msg_type: type, node: str, publishers: int, recording: Recording
+        self, title: str, topic: str, msg_type: type, node: str, publishers: int, received: Sequence[Received]
     ) -> None:
         ends = self._ends(topic, msg_type, "publisher", "")
         if len(ends) > publishers:
@@ -139,7 +141,7 @@ class MessageExpectations(GraphExpectations):
             )
         if publishers == 1:
             # Each publisher counts its own messages: a second one, gone by now, shows as a number that comes again.
-            numbers = [r.sequence for r in recording.messages]
+            numbers = [r.sequence for r in received]
             if any(later <= earlier for earlier, later in itertools.pairwise(numbers)):
                 self.fail(
                     title,
