@@ -412,7 +412,7 @@ class MessageExpectations(GraphExpectations):
                 observed=told,
                 hint=hint,
             )
-        self._one_source(title, topic, msg_type, "", 1, self.observer.record(topic, msg_type))
+        self._one_source(title, topic, msg_type, "", 1, self.observer.record(topic, msg_type).messages)
         outcomes.passed(title, observed=", ".join(str(count) for count in seen))
 
 
