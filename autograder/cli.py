@@ -115,9 +115,9 @@ def check(
     if as_json:
         print(result_for(result, audience).model_dump_json(indent=1))
     else:
-        from autograder.report.terminal import show, submission_view
+        from autograder.report.terminal import console, submission_view
 
-        show(submission_view(result, audience))
+        console().print(submission_view(result, audience))
     fine = not result.problems and all(check.status is Status.PASSED for check in result.checks)
     raise typer.Exit(0 if fine else 1)
 
@@ -152,24 +152,20 @@ def grade(
     if as_json:
         print("[" + ",\n".join(result.model_dump_json() for result in run.results) + "]")
         raise typer.Exit(0)
-    from rich.console import Console
+    from autograder.report.terminal import class_view, console, plain, undecided_view
 
-    from autograder.report.terminal import class_view, plain, undecided_view
-
-    console = Console(highlight=False)
-    if not console.is_terminal:
-        console.width = 120
-    console.print(class_view(run.results))
+    screen = console()
+    screen.print(class_view(run.results))
     undecided = undecided_view(run.results)
     if undecided is not None:
-        console.print()
-        console.print(undecided)
-    console.print()
+        screen.print()
+        screen.print(undecided)
+    screen.print()
     for sentence in run.refused:
-        console.print(plain(sentence), markup=False)
+        screen.print(plain(sentence), markup=False)
     for student, why in run.unrecorded.items():
-        console.print(f"{plain(student)} is not in the gradebook: {plain(why)}", markup=False)
-    console.print(
+        screen.print(f"{plain(student)} is not in the gradebook: {plain(why)}", markup=False)
+    screen.print(
         f"{len(run.results)} submissions: {run.seconds['run']:.1f} s running, {run.seconds['record']:.1f} s recording"
     )
     for label, path in (
@@ -178,7 +174,7 @@ def grade(
         ("feedback", root / "build" / "feedback"),
         ("results", root / "build" / "results" / lab),
     ):
-        console.print(f"{label:<10} {path}", markup=False, soft_wrap=True)
+        screen.print(f"{label:<10} {path}", markup=False, soft_wrap=True)
     raise typer.Exit(2 if run.unrecorded else 0)
 
 

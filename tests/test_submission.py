@@ -217,7 +217,7 @@ def test_the_digest_follows_the_answers_and_the_lab(lab: Lab, tmp_path: Path) ->
     assert read(lab, tmp_path, solved(lab)).digest == digest
     assert read(lab, tmp_path, solved(lab, why="Other.")).digest != digest
     path = lab.notebook
-    path.write_text(path.read_text().replace("no secret", "no other secret"))
+    path.write_text(path.read_text().replace("secret = 0", "secret = 1"))
     changed = load_lab(path.parent.parent.parent, toy.LAB)
     assert read(changed, tmp_path, solved(changed)).digest != digest
 

@@ -42,7 +42,8 @@ CELLS = [
         """with launch("talker") as ros:
     ros.expect_exit("talker")
     ### BEGIN HIDDEN TESTS
-    ros.expect_exit("talker", status=0, hint="no secret")
+    secret = 0
+    ros.expect_exit("talker", status=secret, hint="Mind the status.")
     ### END HIDDEN TESTS
 ros.score(3)""",
         6,

@@ -167,6 +167,8 @@ def record(
             feedback.unlink(missing_ok=True)
         for step in steps:
             answer = getattr(api, step)(lab.name, student, force=True)
+            if "KeyboardInterrupt" in answer.get("error", ""):  # nbgrader catches even this
+                raise KeyboardInterrupt
             if not answer["success"]:
                 failures[student] = _last_error(answer)
                 break

@@ -159,6 +159,9 @@ def undecided_view(results: Sequence[SubmissionResult]) -> RenderableType | None
     return Group(Text("The grader could not find out; these wait for manual grading:", "bold magenta"), *lines)
 
 
-def show(view: RenderableType, console: Console | None = None) -> None:
-    """Print a view."""
-    (console or Console(highlight=False)).print(view)
+def console() -> Console:
+    """Return a console for standard output; in a pipe or a log it is 120 columns wide."""
+    made = Console(highlight=False)
+    if not made.is_terminal:
+        made.width = 120
+    return made

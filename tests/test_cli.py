@@ -1,0 +1,173 @@
+"""The command from outside: exit status, what it prints, what it writes."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+import toy
+from junitparser import JUnitXml
+
+from autograder.submission.lab import load_lab
+
+KIT = Path(__file__).resolve().parent.parent
+MAIN = "import sys; sys.argv[0] = 'autograder'; from autograder.cli import main; main()"
+STUCK = "import time\ntime.sleep(1000)"
+
+
+def start(root: Path, *arguments: str, **more: object) -> subprocess.Popen[str]:
+    return subprocess.Popen(
+        [sys.executable, "-c", MAIN, *arguments],
+        cwd=root, env=os.environ | {"PYTHONPATH": str(KIT)}, text=True,
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, **more,
+    )  # type: ignore[call-overload, no-any-return]  # fmt: skip
+
+
+def run(root: Path, *arguments: str) -> tuple[int, str, str]:
+    process = start(root, *arguments)
+    out, err = process.communicate(timeout=180)
+    assert "Traceback" not in err, err
+    return process.returncode, out, err
+
+
+@pytest.fixture(scope="module")
+def root(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A course with a class of four, in a path with a space."""
+    root = toy.make_course(tmp_path_factory.mktemp("cli") / "a course")
+    for student, talker in (("ann", "print('hello')"), ("bob", "1 / 0"), ("cem", "print('hello'")):
+        hand_in(root, student, talker)
+    toy.hand_in(root / "class", "dan", "{")
+    return root
+
+
+def hand_in(root: Path, student: str, talker: str) -> Path:
+    sources = {"talker": f"%%node talker\n{talker}\n", "answers": "%%file answers.yaml\nanswer: 42", "why": "So."}
+    return toy.hand_in(root / "class", student, load_lab(root, toy.LAB).clean_notebook(sources)["cells"])
+
+
+def test_check_passes_with_status_0(root: Path) -> None:
+    status, out, _ = run(root, "check", "class/ann/toy.ipynb")
+    assert status == 0 and "toy: 5 of 5 points" in out
+
+
+def test_check_fails_with_status_1_and_the_reason(root: Path) -> None:
+    junit = root / "build" / "junit.xml"
+    status, out, _ = run(root, "check", "class/bob/toy.ipynb", "--json", "--junit", str(junit))
+    assert status == 1
+    result = json.loads(out)
+    assert [check["points"] for check in result["checks"]] == [0, 2]
+    assert "secret" not in out and "ZeroDivisionError" in out
+    assert JUnitXml.fromfile(str(junit)).failures == 1
+
+
+def test_check_finds_the_lab_of_a_renamed_notebook(root: Path) -> None:
+    renamed = root / "class" / "ann" / "my copy (1).ipynb"
+    renamed.write_bytes((root / "class" / "ann" / "toy.ipynb").read_bytes())
+    status, out, _ = run(root, "check", str(renamed))
+    renamed.unlink()
+    assert status == 0 and "5 of 5" in out
+
+
+def test_a_broken_notebook_fails_its_checks(root: Path) -> None:
+    status, out, _ = run(root, "check", "class/dan/toy.ipynb")
+    assert status == 1 and "not valid JSON" in out
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["check", "nowhere.ipynb"],
+        ["check", "class/ann/toy.ipynb", "--lab", "nowhere"],
+        ["grade", "nowhere", "class"],
+        ["grade", "toy", "nowhere"],
+        ["grade", "toy"],
+        ["grade", "toy", "class", "--isolation", "some"],
+        ["release", "nowhere"],
+        ["report", "--what"],
+        ["what"],
+    ],
+)
+def test_usage_errors_are_sentences_with_status_2(root: Path, arguments: list[str]) -> None:
+    status, _, err = run(root, *arguments)
+    assert status == 2 and err.strip()
+
+
+def test_help_on_each_command(root: Path) -> None:
+    for command in ("doctor", "release", "check", "grade", "report", "export"):
+        status, out, _ = run(root, command, "--help")
+        assert status == 0 and "--help" in out
+
+
+def test_a_class_is_graded_once_and_only_what_changed_again(root: Path) -> None:
+    status, out, err = run(root, "grade", "toy", "class")
+    assert status == 0, err
+    rows = {line.split()[0]: line for line in out.splitlines() if line[:4] in ("ann ", "bob ", "cem ", "dan ")}
+    assert "5/5" in rows["ann"] and "✓ passed" in rows["ann"]
+    assert "2/5" in rows["bob"] and "ZeroDivisionError" in rows["bob"]
+    assert "2/5" in rows["cem"] and "0/5" in rows["dan"] and "not valid JSON" in rows["dan"]
+    with (root / "build" / "grades.csv").open() as file:
+        scores = {row["student"]: (row["score"], row["max_score"]) for row in csv.DictReader(file)}
+    assert scores == {"ann": ("5", "9"), "bob": ("2", "9"), "cem": ("2", "9"), "dan": ("0", "9")}
+    for student in scores:
+        assert (root / "build" / "feedback" / student / "toy" / "toy.html").is_file()
+
+    stamps = {path: path.stat().st_mtime_ns for path in (root / "build" / "results" / "toy").iterdir()}
+    hand_in(root, "bob", "print('hello')")
+    began = time.monotonic()
+    status, out, _ = run(root, "grade", "toy", "class", "--json")
+    assert status == 0 and time.monotonic() - began < 60
+    assert {result["student"]: sum(check["points"] for check in result["checks"]) for result in json.loads(out)} == {
+        "ann": 5, "bob": 5, "cem": 2, "dan": 0
+    }  # fmt: skip
+    changed = {path.stem for path, stamp in stamps.items() if path.stat().st_mtime_ns != stamp}
+    assert changed == {"bob"}
+
+    status, out, _ = run(root, "report")
+    page = Path(out.strip()).read_text()
+    assert status == 0 and "3 of 4" in page and "2 of 4" in page and "bob" in page
+    assert run(root, "export", "csv")[1].count("\n") == 9
+    status, out, _ = run(root, "export", "junit", "-o", str(root / "build" / "all.xml"))
+    assert JUnitXml.fromfile(str(root / "build" / "all.xml")).tests == 9
+    assert len(json.loads(run(root, "export", "gradescope")[1])) == 4
+
+
+def test_an_interrupt_keeps_finished_results_and_leaves_nothing_running(root: Path, tmp_path: Path) -> None:
+    course = toy.make_course(tmp_path / "course")
+    hand_in(course, "ann", "print('hello')")
+    for number in range(3):
+        hand_in(course, f"stuck{number}", STUCK)
+    process = start(course, "grade", "toy", "class", "--jobs", "4", start_new_session=True)
+    assert process.stderr is not None
+    assert "ann" in process.stderr.readline()
+    os.killpg(process.pid, signal.SIGINT)
+    _, err = process.communicate(timeout=30)
+    assert process.returncode == 130 and "1 of 4 results are kept" in err and "Traceback" not in err
+    assert [path.name for path in (course / "build" / "results" / "toy").iterdir()] == ["ann.json"]
+    deadline = time.monotonic() + 10
+    while _group_lives(process.pid):
+        assert time.monotonic() < deadline, "something of the interrupted run lives on"
+        time.sleep(0.05)
+
+
+def _group_lives(group: int) -> bool:
+    try:
+        os.killpg(group, 0)
+    except ProcessLookupError:
+        return False
+    return True
+
+
+def test_release_writes_what_students_receive(root: Path) -> None:
+    status, out, _ = run(root, "release")
+    assert status == 0 and "toy" in out
+    text = (root / "labs" / "toy" / "toy.ipynb").read_text()
+    assert "YOUR CODE HERE" in text and "secret" not in text and "hello" not in text
+    status, out, _ = run(root, "check", "labs/toy/toy.ipynb")
+    assert status == 1 and "3 of 5" in out  # a program of comments ends well

@@ -1,0 +1,160 @@
+"""One result, four views: none of them shows a student what hidden tests look at, or lets a student's text act."""
+
+from __future__ import annotations
+
+import io
+import json
+import re
+from html.parser import HTMLParser
+
+import pytest
+from junitparser import JUnitXml
+from rich.console import Console
+
+from autograder.report.audience import Audience, result_for
+from autograder.report.export import to_csv, to_gradescope
+from autograder.report.html import check_html, submission_html
+from autograder.report.junit import junit_xml
+from autograder.report.terminal import class_view, submission_view, undecided_view
+from autograder.results import CheckResult, Isolation, NodeLog, Outcome, Status, SubmissionResult
+
+NASTY = "<img src=x onerror=alert(1)>\x1b[31m\x00 `code` & [link](javascript:alert(2))"
+
+
+def check(points: float | None, *outcomes: Outcome, grade_id: str = "check") -> CheckResult:
+    return CheckResult(grade_id=grade_id, title="The talker", max_points=3, points=points, outcomes=list(outcomes))
+
+
+def outcome(status: Status, **more: object) -> Outcome:
+    return Outcome.model_validate({"status": status, "title": "a title", **more})
+
+
+HIDDEN = outcome(
+    Status.FAILED,
+    title="secret-title", expected="secret-expected", observed="secret-observed", because="secret-because",
+    code="secret-code", hint="See lecture 2.", hidden=True,
+)  # fmt: skip
+FAILED = outcome(Status.FAILED, expected=NASTY, observed=NASTY, because=NASTY, hint=NASTY, code="qos")
+
+
+def result(*checks: CheckResult, student: str = "ann") -> SubmissionResult:
+    log = NodeLog(program="talker", grade_id="check", text=f"line 1\n{NASTY}\nlast line", exit_status=1)
+    return SubmissionResult(
+        student=student, lab="lab", digest="d" * 64, isolation=Isolation.FULL, checks=list(checks), logs=[log],
+        problems=[outcome(Status.FAILED, title=NASTY, because=NASTY, hint=NASTY, code="forged-cell")],
+    )  # fmt: skip
+
+
+def text_of(view: object, width: int = 120) -> str:
+    console = Console(file=io.StringIO(), width=width, highlight=False)
+    console.print(view)
+    assert isinstance(console.file, io.StringIO)
+    return console.file.getvalue()
+
+
+class Page(HTMLParser):
+    def __init__(self, page: str) -> None:
+        super().__init__()
+        self.tags: list[tuple[str, dict[str, str | None]]] = []
+        self.text = ""
+        self.feed(page)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append((tag, dict(attrs)))
+
+    def handle_data(self, data: str) -> None:
+        self.text += data
+
+
+@pytest.mark.parametrize("audience", ["student", "instructor"])
+def test_every_view_masks_hidden_checks_for_students_only(audience: Audience) -> None:
+    shown = result(check(0, HIDDEN))
+    views = [
+        submission_html(shown, audience),
+        check_html(shown.checks[0], audience),
+        junit_xml([shown], audience),
+        text_of(submission_view(shown, audience)),
+        result_for(shown, audience).model_dump_json(),
+    ]
+    for view in views:
+        assert "See lecture 2." in view
+        assert ("secret" in view) == (audience == "instructor")
+        assert ("A hidden check failed" in view) == (audience == "student")
+    assert "secret" not in to_gradescope([shown])
+
+
+def test_html_lets_nothing_of_a_students_act() -> None:
+    page = Page(submission_html(result(check(0, FAILED))))
+    known = [
+        "html",
+        "head",
+        "meta",
+        "title",
+        "body",
+        "h1",
+        "p",
+        "b",
+        "div",
+        "span",
+        "br",
+        "code",
+        "details",
+        "summary",
+        "pre",
+    ]
+    assert {tag for tag, _ in page.tags} <= set(known)
+    assert {name for _, attributes in page.tags for name in attributes} <= {
+        "lang", "charset", "http-equiv", "content", "style", "role", "aria-label"
+    }  # fmt: skip
+    assert "onerror=alert(1)" in page.text and "last line" in page.text
+
+
+def test_html_tells_a_status_by_word_symbol_and_border() -> None:
+    outcomes = [outcome(status) for status in Status]
+    page = check_html(check(None, *outcomes))
+    for word, symbol in (("passed", "✓"), ("failed", "✗"), ("not checked", "-"), ("could not find out", "?")):
+        assert f'aria-label="{word}">{symbol}</span> {word}' in page
+    assert len(set(re.findall(r"border-left:([^;\"]+)", page))) == 4
+
+
+def test_html_says_that_an_instructor_decides() -> None:
+    assert "your instructor decides" in check_html(check(None, outcome(Status.UNKNOWN)))
+    assert "0 of 3 points" in check_html(check(0, FAILED))
+
+
+def test_the_terminal_takes_no_orders_from_a_student() -> None:
+    text = text_of(submission_view(result(check(0, FAILED)), "student"))
+    assert "\x1b" not in text and "\x00" not in text
+    assert "0/3" in text and "because" in text and "last line" in text
+
+
+def test_thirty_students_are_readable_at_120_columns() -> None:
+    checks = [check(3, outcome(Status.PASSED), grade_id=f"c{number}") for number in range(9)]
+    checks.append(check(0, outcome(Status.FAILED, because="It waits for ever. " * 20), grade_id="c9"))
+    class_ = [result(*checks, student=f"student_with_long_name_{number}") for number in range(30)]
+    lines = text_of(class_view(class_)).rstrip().split("\n")
+    rows = [line for line in lines if line.startswith("student_with")]
+    assert len(rows) == 30 and max(map(len, lines)) <= 120
+    assert all("27/30" in row and "✗ failed" in row and "It waits for ever" in row for row in rows)
+
+
+def test_undecided_checks_are_listed_for_the_instructor() -> None:
+    decided = result(check(3, outcome(Status.PASSED)))
+    undecided = result(check(None, outcome(Status.UNKNOWN, because="The observer died.")), student="bob")
+    assert undecided_view([decided]) is None
+    assert "bob: The talker: The observer died." in text_of(undecided_view([decided, undecided]))
+    assert "?" in text_of(class_view([undecided]))
+
+
+def test_junit_counts_failures_and_errors() -> None:
+    xml = JUnitXml.fromstring(
+        junit_xml([result(check(3), check(0, FAILED), check(None, outcome(Status.UNKNOWN)))]).encode()
+    )
+    # One failure is the submission's own problem; a check without any outcome has passed nothing wrong.
+    assert (xml.tests, xml.failures, xml.errors) == (4, 2, 1)
+
+
+def test_csv_and_gradescope_leave_undecided_points_open() -> None:
+    class_ = [result(check(None, outcome(Status.UNKNOWN, code="grader")))]
+    assert "ann,lab,check,,3,could not find out,grader" in to_csv(class_)
+    assert "score" not in json.loads(to_gradescope(class_))["ann/lab"]["tests"][0]
