@@ -1,13 +1,14 @@
 """Which callbacks ran at the same time, from what they publish: `NAME begin` and `NAME end`.
 
-The order of publication decides, never a clock: a callback publishes its begin before its work and its end after it, so
-two callbacks overlap exactly when one's begin lies between the other's begin and end.
+A callback that may overlap itself numbers its runs: `NAME 7 begin` and `NAME 7 end`. The order of publication decides, never
+a clock: a callback publishes its begin before its work and its end after it, so two callbacks overlap exactly when one's
+begin lies between the other's begin and end.
 """
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 from autograder.graph.recording import Received
@@ -22,59 +23,79 @@ class Span:
     end: float
 
 
+@dataclass(frozen=True)
+class _Event:
+    name: str
+    run: str
+    """Name and number of the run; the name alone where runs are not numbered."""
+    begins: bool
+    stamp: float
+
+
 class Activity:
     """The begins and ends on one topic of `std_msgs/String`."""
 
     def __init__(self, received: Sequence[Received]) -> None:
         """Put the messages in the order in which they were published."""
-        ordered = sorted(received, key=lambda item: item.sequence)
-        self.events = [(item.msg.data.rpartition(" "), item.stamp) for item in ordered]
+        self._stretches: list[tuple[Counter[str], list[_Event]]] = []
+        last = None
+        for item in sorted(received, key=lambda item: item.sequence):
+            if last is None or item.sequence > last + 1:
+                self._stretches.append((Counter(), []))
+            last = item.sequence
+            run, _, what = item.msg.data.rpartition(" ")
+            if what in ("begin", "end"):
+                name = run.partition(" ")[0]
+                self._stretches[-1][1].append(_Event(name, run, what == "begin", item.stamp))
+        for under_way, events in self._stretches:
+            # What was published before the observer was matched is missing. An end without a begin tells that
+            # this run was under way when the stretch began.
+            balance: Counter[str] = Counter()
+            for event in events:
+                balance[event.run] += 1 if event.begins else -1
+                under_way[event.run] = max(under_way[event.run], -balance[event.run])
+
+    def _running(self) -> Iterator[Counter[str]]:
+        """How many runs of each callback are under way, after each event."""
+        for under_way, events in self._stretches:
+            running: Counter[str] = Counter()
+            for run, count in under_way.items():
+                running[run.partition(" ")[0]] += count
+            yield running
+            for event in events:
+                running[event.name] += 1 if event.begins else -1
+                yield running
 
     def overlap(self, names: Iterable[str]) -> int:
         """How many runs of the named callbacks were under way at once, at the most."""
-        wanted, running, most = set(names), Counter[str](), 0
-        for (name, _, what), _stamp in self.events:
-            if name in wanted:
-                if what == "begin":
-                    running[name] += 1
-                elif running[name]:
-                    running[name] -= 1
-                most = max(most, running.total())
-        return most
+        wanted = set(names)
+        return max((sum(running[name] for name in wanted) for running in self._running()), default=0)
 
     def distinct_overlap(self, names: Iterable[str]) -> int:
         """How many *different* ones of the named callbacks were under way at once, at the most."""
-        wanted, running, most = set(names), Counter[str](), 0
-        for (name, _, what), _stamp in self.events:
-            if name in wanted:
-                if what == "begin":
-                    running[name] += 1
-                elif running[name]:
-                    running[name] -= 1
-                most = max(most, sum(1 for count in running.values() if count))
-        return most
+        wanted = set(names)
+        return max((sum(1 for name in wanted if running[name]) for running in self._running()), default=0)
 
     def crossed(self, some: Iterable[str], others: Iterable[str]) -> bool:
         """Whether a callback of `some` was under way together with one of `others`."""
-        left, right, running = set(some), set(others), Counter[str]()
-        for (name, _, what), _stamp in self.events:
-            if name in left | right:
-                running[name] += 1 if what == "begin" else -min(1, running[name])
-                if any(running[n] for n in left) and any(running[n] for n in right):
-                    return True
-        return False
+        left, right = set(some), set(others)
+        return any(any(running[n] for n in left) and any(running[n] for n in right) for running in self._running())
 
     def runs(self, name: str) -> int:
         """Complete runs of one callback."""
         return sum(1 for span in self.spans() if span.name == name)
 
     def spans(self) -> list[Span]:
-        """All complete runs; a callback that overlaps itself is paired first begin, first end."""
-        open_at: dict[str, list[float]] = {}
+        """All complete runs."""
         done = []
-        for (name, _, what), stamp in self.events:
-            if what == "begin":
-                open_at.setdefault(name, []).append(stamp)
-            elif what == "end" and open_at.get(name):
-                done.append(Span(name, open_at[name].pop(0), stamp))
+        for under_way, events in self._stretches:
+            unpaired = Counter(under_way)
+            open_at: dict[str, list[float]] = {}
+            for event in events:
+                if event.begins:
+                    open_at.setdefault(event.run, []).append(event.stamp)
+                elif unpaired[event.run]:
+                    unpaired[event.run] -= 1
+                else:
+                    done.append(Span(event.name, open_at[event.run].pop(0), event.stamp))
         return done
