@@ -378,6 +378,8 @@ class NodeSandbox:
     def _reader(self, program: Program, descriptor: int, taker: Callable[[bytes], None]) -> Callable[[], None]:
         def read() -> None:
             data = b""
+            if descriptor not in program.readers:
+                return  # closed by what was handled just before, in the same batch of events
             with contextlib.suppress(BlockingIOError):
                 data = os.read(descriptor, 1 << 16)
                 if not data:
