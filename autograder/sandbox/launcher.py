@@ -51,7 +51,8 @@ WARM = (
 )
 WARM_TYPES = ("std_msgs.msg:String", "std_msgs.msg:Int32", "std_srvs.srv:Trigger", "std_srvs.srv:SetBool")
 
-_prctl = ctypes.CDLL(None).prctl
+_libc = ctypes.CDLL(None)
+_prctl = _libc.prctl
 
 
 def _load_probe() -> Any:
@@ -84,6 +85,10 @@ class Start:
 
 def warm_up() -> None:
     """Load what programs need, without joining a ROS domain."""
+    # The ROS libraries' tracer (LTTng) starts threads when it is loaded, and ends them when the process exits. A fork has
+    # not got them, and crashes at its very end. Handlers run last in first out: this one, from before anything was
+    # loaded, runs after every destructor of C++ objects and before the libraries' own finish.
+    _libc.on_exit(_libc._exit, None)
     for name in WARM:
         with contextlib.suppress(ImportError):
             importlib.import_module(name)
