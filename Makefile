@@ -52,7 +52,7 @@ lectures: setup-dev ## build the book and the slides into build/lectures
 	@$(RUN) sphinx-build -q -W --keep-going -b revealjs lectures build/lectures/slides $(ARGS)
 	@echo build/lectures/book/index.html build/lectures/slides/index.html
 
-test: lint ## run every test
+test: setup-dev ## run every test, ruff and mypy among them
 	@$(RUN) python -m pytest $(ARGS)
 
 lint: setup-dev ## ruff and mypy --strict

@@ -1,0 +1,123 @@
+"""What holds for the whole tree: its top level, its notebooks, its style, and that it stands on its own."""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import nbformat
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+FOLDERS = {"lectures", "labs", "solutions", "autograder", "tests"}
+FILES = {"Makefile", "README.md", "LICENSE"}
+DEMANDED_BY_TOOLS = {
+    ".ci",
+    ".devcontainer",
+    ".github",
+    ".gitignore",
+    "nbgrader_config.py",
+    "pyproject.toml",
+    "requirements-dev.lock",
+    "requirements.lock",
+}
+NOT_OURS = {".git", ".venv", "build", "__pycache__", ".pytest_cache", ".mypy_cache", ".ruff_cache", ".hypothesis"}
+
+
+def tree() -> list[Path]:
+    """Return every file that belongs to the project: what git knows or would take, or all where there is no git."""
+    listed = subprocess.run(
+        ["git", "-C", ROOT, "ls-files", "-z", "--cached", "--others", "--exclude-standard"], capture_output=True
+    )
+    if listed.returncode == 0 and listed.stdout:
+        paths = [ROOT / name for name in listed.stdout.decode().split("\0") if name]
+    else:
+        paths = [path for path in ROOT.rglob("*") if not NOT_OURS & set(path.relative_to(ROOT).parts)]
+    return sorted(path for path in paths if path.is_file())
+
+
+FILES_HERE = tree()
+NOTEBOOKS = [path for path in FILES_HERE if path.suffix == ".ipynb"]
+
+
+def name(path: Path) -> str:
+    return str(path.relative_to(ROOT))
+
+
+def test_the_top_level_is_as_fixed() -> None:
+    top = {path.relative_to(ROOT).parts[0] for path in FILES_HERE}
+    assert top - DEMANDED_BY_TOOLS == FOLDERS | FILES
+
+
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=name)
+def test_a_notebook_has_stable_ids_and_no_outputs(path: Path) -> None:
+    notebook = nbformat.reads(path.read_text(encoding="utf-8"), as_version=4)
+    nbformat.validate(notebook)
+    ids = [cell["id"] for cell in notebook.cells]
+    assert len(set(ids)) == len(ids)
+    grade_ids = [cell.metadata.nbgrader.grade_id for cell in notebook.cells if "nbgrader" in cell.metadata]
+    assert len(set(grade_ids)) == len(grade_ids)
+    for cell in notebook.cells:
+        if cell.cell_type == "code":
+            assert cell.outputs == []
+            assert cell.execution_count is None
+
+
+# In parts, so that this file does not name what it looks for.
+HOSTS = "|".join(("pypi" + r"\.org", "python" + "hosted", "registry" + r"\.npm", "npm" + "js", "deb" + r"ian\.org"))
+FOREIGN = re.compile(
+    "|".join((HOSTS, "/" + "work/", "/" + r"root/\.", "/opt/" + "(pypi|wheels)", "shared" + "/design"))
+)
+
+
+def test_no_file_names_a_package_host_or_a_path_of_somebody_elses() -> None:
+    found = []
+    for path in FILES_HERE:
+        try:
+            text = path.read_text(encoding="utf-8")
+        except UnicodeDecodeError:
+            continue
+        found += [f"{name(path)}: {hit.group(0)}" for hit in FOREIGN.finditer(text)]
+    assert found == []
+
+
+def test_the_locks_pin_every_package_with_hashes_and_agree() -> None:
+    versions: dict[str, dict[str, str]] = {}
+    for lock in ("requirements.lock", "requirements-dev.lock"):
+        text = (ROOT / lock).read_text()
+        blocks = re.split(r"\n(?=[a-z])", text.strip())
+        assert all("--hash=sha256:" in block for block in blocks)
+        versions[lock] = {block.split(" ", 1)[0]: block for block in blocks}
+    assert versions["requirements.lock"].items() <= versions["requirements-dev.lock"].items()
+
+
+@pytest.mark.parametrize("path", [path for path in FILES_HERE if path.suffix == ".md"], ids=name)
+def test_links_to_files_lead_somewhere(path: Path) -> None:
+    text = re.sub(r"```.*?```", "", path.read_text(encoding="utf-8"), flags=re.DOTALL)
+    for target in re.findall(r"\]\(([^)#\s]+)", text):
+        if "://" not in target:
+            assert (path.parent / target).exists(), target
+
+
+def test_the_devcontainer_and_the_workflow_can_be_read() -> None:
+    import yaml
+
+    text = (ROOT / ".devcontainer" / "devcontainer.json").read_text()
+    settings = json.loads(re.sub(r"^\s*//.*$", "", text, flags=re.MULTILINE))
+    assert "make setup" in settings["postCreateCommand"]
+    workflow = yaml.safe_load((ROOT / ".github" / "workflows" / "ci.yml").read_text())
+    assert any(step.get("run") == "bash .ci/run" for step in workflow["jobs"]["test"]["steps"])
+    assert "make test" in (ROOT / ".ci" / "run").read_text()
+
+
+@pytest.mark.parametrize(
+    "command", [("ruff", "check", "."), ("mypy", "--strict", "autograder")], ids=lambda command: command[0]
+)
+def test_the_code_is_clean(command: tuple[str, ...]) -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", *command], cwd=ROOT, capture_output=True, text=True, timeout=300, check=False
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
