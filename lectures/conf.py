@@ -73,9 +73,9 @@ html_copy_source = False
 html_use_index = False
 
 revealjs_html_theme = "revealjs-simple"
-revealjs_style_theme = "white"
+revealjs_style_theme = "course.css"
 revealjs_static_path = ["_static"]
-revealjs_css_files = ["pygments.css", "course.css"]
+revealjs_css_files = ["pygments.css"]
 revealjs_script_conf = {
     "width": 1280,
     "height": 720,

@@ -12,7 +12,10 @@ A container of class `slide` is left out of the book instead.
 from __future__ import annotations
 
 import math
+import re
+import struct
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 from docutils import nodes
@@ -24,10 +27,12 @@ from sphinx_revealjs.nodes import revealjs_break
 from sphinx_revealjs.writers import RevealjsSlideTranslator
 
 # The measures below belong to course.css, section "Slides"; they assume a wide font, so that a narrow one fits too.
-ROOM = 560  # pixels below a slide's heading
-LEAST_FIGURE = 380  # a figure is not shrunk below this height to share a slide
-TEXT_LINE, TEXT_COLUMNS, TEXT_GAP = 36, 80, 16
-CODE_LINE, CODE_COLUMNS, CODE_GAP = 25, 96, 34
+ROOM = 570  # pixels below a slide's heading
+WIDTH = 1168  # pixels between the margins
+LEAST_FIGURE = 400  # a figure is not shrunk below this height to share a slide
+LEAST_LISTING = 220  # nor does a listing begin in less room than this
+TEXT_LINE, TEXT_COLUMNS, TEXT_GAP = 38, 74, 16
+CODE_LINE, CODE_COLUMNS, CODE_GAP = 26, 93, 34
 ROW_LINE, ROW_COLUMNS, ROW_GAP = 29, 96, 15
 ADMONITION = 70  # title, padding and margin
 
@@ -54,8 +59,10 @@ def height(node: nodes.Node, columns: int = TEXT_COLUMNS) -> int:
         return lines(node.astext(), CODE_COLUMNS) * CODE_LINE + CODE_GAP
     if isinstance(node, nodes.table):
         return sum(row_height(row) for row in node.findall(nodes.row)) + TEXT_GAP
-    if holds_figure(node):
-        return LEAST_FIGURE
+    if isinstance(node, nodes.image):
+        return min(LEAST_FIGURE, full_height(node)) + TEXT_GAP
+    if isinstance(node, nodes.raw):
+        return LEAST_FIGURE if "<img" in node.astext() or "<svg" in node.astext() else 0
     if isinstance(node, (nodes.bullet_list, nodes.enumerated_list, nodes.definition_list)):
         return sum(height(item, columns - 6) for item in node.children) + TEXT_GAP
     if isinstance(node, (nodes.paragraph, nodes.term, nodes.title, nodes.rubric)):
@@ -84,11 +91,21 @@ def ancestors(node: nodes.Node) -> Iterator[nodes.Element]:
         parent = parent.parent
 
 
-def holds_figure(node: nodes.Node) -> bool:
-    """Return whether a block is a picture, drawn from a file or by raw HTML."""
-    if isinstance(node, nodes.raw):
-        return "<img" in node.astext() or "<svg" in node.astext()
-    return isinstance(node, nodes.Element) and node.next_node(nodes.image, include_self=True) is not None
+def full_height(image: nodes.image) -> int:
+    """Return how high a picture is when it is as wide as a slide, or as high as one."""
+    return min(ROOM - TEXT_GAP, int(WIDTH * image.get("aspect", 1.0)))
+
+
+def note_aspects(doctree: nodes.document, folder: Path) -> None:
+    """Write height / width into each picture, read from its file (SVG or PNG)."""
+    for image in doctree.findall(nodes.image):
+        start = (folder / image["uri"]).read_bytes()[:4096]
+        if start.startswith(b"\x89PNG"):
+            width, height_ = struct.unpack(">II", start[16:24])
+        else:
+            box = re.search(rb'viewBox="([^"]+)"', start)
+            width, height_ = map(float, box[1].split()[2:]) if box else (1, 1)
+        image["aspect"] = height_ / width
 
 
 def blocks(parent: nodes.Element) -> Iterator[nodes.Element]:
@@ -113,23 +130,23 @@ def wrapped(like: nodes.Element, children: list[nodes.Node]) -> nodes.Element:
     return copy
 
 
-def pieces(block: nodes.Element) -> Iterator[nodes.Element]:
-    """Return a block as parts that are no higher than a slide."""
-    if height(block) <= ROOM:
+def pieces(block: nodes.Element, room: int) -> Iterator[nodes.Element]:
+    """Return a block as parts that are no higher than a slide, the first part of a listing no higher than `room`."""
+    if height(block) <= room:
         yield block
     elif isinstance(block, nodes.container) and len(block.children) == 1:
-        for part in pieces(block.children[0]):
+        for part in pieces(block.children[0], room):
             yield wrapped(block, [part])
     elif isinstance(block, nodes.literal_block):
         text = block.astext().splitlines()
-        most = (ROOM - CODE_GAP) // CODE_LINE
         while text:
-            end = cut(text, most)
+            end = cut(text, (room - CODE_GAP) // CODE_LINE)
             part = block.copy()
             part += nodes.Text("\n".join(text[:end]))
             part.rawsource = part.astext()
             yield part
             text = text[end:]
+            room = ROOM
     elif isinstance(block, nodes.table):
         yield from table_pieces(block)
     elif isinstance(block, (nodes.bullet_list, nodes.enumerated_list, nodes.definition_list)):
@@ -140,6 +157,8 @@ def pieces(block: nodes.Element) -> Iterator[nodes.Element]:
                 part["start"] = start
                 start += len(group)
             yield part
+    elif height(block) <= ROOM:
+        yield block
     else:
         logger.warning("a block is higher than a slide and cannot be divided: %.60r", block.astext())
         yield block
@@ -150,6 +169,7 @@ def cut(text: list[str], most: int) -> int:
     room, end = most, 0
     while end < len(text) and (room := room - lines(text[end], CODE_COLUMNS)) >= 0:
         end += 1
+    end = max(end, 1)
     if end == len(text):
         return end
     blank = [number for number in range(end // 3, end + 1) if not text[min(number, len(text) - 1)].strip()]
@@ -194,16 +214,18 @@ def paginate(section: nodes.Element) -> None:
 
     def close() -> None:
         nonlocal page, used
-        spare = ROOM - used
-        for block in page:
-            for image in block.findall(nodes.image):
-                image["height"] = f"{LEAST_FIGURE + spare}px"
-                image.attributes.pop("width", None)
+        images = [image for block in page for image in block.findall(nodes.image)]
+        for image in images:
+            most = LEAST_FIGURE + (ROOM - used) // len(images)
+            image["height"] = f"{min(most, full_height(image))}px"
+            image.attributes.pop("width", None)
         result.extend(page)
         page, used = [], 0
 
     for block in blocks(own):
-        for part in pieces(block):
+        # A new slide for what does not fit here, but not one that leaves a lone line behind.
+        alone = len(page) == 1 and leads(page[0]) and ROOM - used >= LEAST_LISTING
+        for part in pieces(block, ROOM - used if alone else ROOM):
             need = height(part)
             if page and used + need > ROOM:
                 # A line of text that leads to what comes next goes with it.
@@ -231,6 +253,7 @@ def leads(block: nodes.Element) -> bool:
 def on_resolved(app: Sphinx, doctree: nodes.document, docname: str) -> None:
     """Prepare a document for the builder that is about to write it."""
     if app.builder.name == "revealjs":
+        note_aspects(doctree, Path(app.srcdir))
         for section in [node for node in doctree.children if isinstance(node, nodes.section)]:
             paginate(section)
     else:
