@@ -418,7 +418,7 @@ class MessageExpectations(GraphExpectations):
 
 def _title(topic: str, need: int, most: int | None, rate: float | None) -> str:
     number = f"exactly {need}" if most == need else f"at least {need}" + (f", at most {most}," if most else "")
-    return f"{number} message{'s' if need != 1 else ''} arrive on `{topic}`".capitalize() + (
+    return f"{number} message{' arrives' if need == 1 else 's arrive'} on `{topic}`".capitalize() + (
         f" at {rate:g} Hz" if rate else ""
     )
 

@@ -81,7 +81,8 @@ _IN_CALLBACK = {
     ),
     "spin": (
         "nested-spin",
-        "It spins inside a callback. That takes the node out of the executor it was in, so its other callbacks stop.",
+        "It spins inside a callback: the executor that runs this callback waits for its end, and a second spinning takes "
+        "the node away from it, so the node's other callbacks stop.",
         "Never spin inside a callback: use `call_async` and a done callback, or `await`.",
     ),
     "rate.sleep": (
@@ -235,7 +236,7 @@ def inside_reason(scene: Scene) -> Diagnosis | None:
         for event in events:
             if event.get("e") == "in_callback":
                 what = str(event.get("what", ""))
-                if what == "client.call" and _shares_a_group(events):
+                if what == "client.call" and _several_threads(events) and _client_shares_a_group(events):
                     return Diagnosis(
                         f"`{program.name}`, {event.get('line', '')} (`{event.get('code', '')}`): {_SAME_GROUP}",
                         "call-same-group",
@@ -270,15 +271,35 @@ _SAME_GROUP = (
 )
 
 
-def _shares_a_group(events: Sequence[dict[str, Any]]) -> bool:
-    """Whether several threads spin, and a client shares a mutually exclusive group with some other callback."""
-    if not any("MultiThreaded" in str(event.get("executor", "")) for event in events if event.get("e") == "spin"):
-        return False
+def _several_threads(events: Sequence[dict[str, Any]]) -> bool:
+    return any("MultiThreaded" in str(event.get("executor", "")) for event in events if event.get("e") == "spin")
+
+
+def _client_shares_a_group(events: Sequence[dict[str, Any]]) -> bool:
+    """Whether a client shares a mutually exclusive group with some other callback."""
     members: dict[Any, set[str]] = {}
     for event in events:
         if event.get("e") == "entity" and event.get("group") == "MutuallyExclusiveCallbackGroup":
             members.setdefault(event.get("group_id"), set()).add(str(event.get("kind")))
     return any("client" in kinds and len(kinds) > 1 for kinds in members.values())
+
+
+def why_await_hangs(scene: Scene) -> Diagnosis | None:
+    """Whether a callback awaits a client that shares its mutually exclusive group: that group is held while it awaits."""
+    for program in scene.programs:
+        source = scene.folder / f"{program.name}.py"
+        if not _client_shares_a_group(program.events()) or not source.is_file():
+            continue
+        for number, line in enumerate(source.read_text(encoding="utf-8", errors="replace").splitlines(), start=1):
+            if re.search(r"\bawait\b.*call_async", line):
+                return Diagnosis(
+                    f"`{program.name}`, {program.name}.py:{number} (`{line.strip()}`): the client is in the same mutually "
+                    "exclusive group as the callback that awaits it. A group is held until its callback ends, so the "
+                    "answer is never taken.",
+                    "await-same-group",
+                    "Give the client, or the callback that awaits, a callback group of its own.",
+                )
+    return None
 
 
 def shut_down_inside(scene: Scene) -> Diagnosis | None:
@@ -440,7 +461,7 @@ def why_silent(scene: Scene, topic: str, msg_type: type, profile: QoSProfile) ->
     asleep = lifecycle_silence(scene)
     if asleep:
         return asleep
-    crowded = why_serial(scene)
+    crowded = why_await_hangs(scene) or why_serial(scene)
     if crowded:
         return crowded
     for program in scene.programs:
