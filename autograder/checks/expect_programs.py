@@ -154,11 +154,15 @@ class ProgramExpectations(GraphExpectations):
     ) -> None:
         """State a fact in the check's own words: passed if `condition` is true.
 
-        Without `because`, the diagnosis says what is wrong with the programs, if it finds something.
+        Where the programs themselves went wrong, the diagnosis of that is the reason. That one of them ended is none if
+        the check gives a reason of its own: it knows whether that program had to go on.
         """
         if condition:
             outcomes.passed(title, expected=expected, observed=observed)
             return
-        trouble = diagnosis.program_trouble(self.scene()) or diagnosis.inside_reason(self.scene())
+        trouble = diagnosis.program_trouble(self.scene())
+        if because and trouble and trouble.code in ("exited", "not-spinning"):
+            trouble = None
+        trouble = trouble or diagnosis.inside_reason(self.scene())
         reason = trouble or (Diagnosis(because, code or "required") if because else None)
         self.fail(title, reason, expected=expected, observed=observed, hint=hint)

@@ -217,6 +217,13 @@ def _callback_failure(program: RunningProgram) -> Diagnosis | None:
                     "asyncio-in-callback",
                     "Await rclpy futures only (such as the one of `call_async`), or use a timer.",
                 )
+            if "ParameterAlreadyDeclared" in error:
+                return Diagnosis(
+                    f"A {kind} callback of `{program.name}`{at} declares a parameter that is declared already "
+                    f"({source}{error}). A parameter lives as long as its node.",
+                    "declared-twice",
+                    "Declare parameters in `__init__`, once for all lives of the node.",
+                )
             code = {"service": "service-exception", "lifecycle": "lifecycle-exception"}.get(kind, "callback-exception")
             after = {
                 "service": "The client gets no answer and the node no longer spins.",
