@@ -1,8 +1,8 @@
 """Which callbacks ran at the same time, from what they publish: `NAME begin` and `NAME end`.
 
 A callback that may overlap itself numbers its runs: `NAME 7 begin` and `NAME 7 end`. The order of publication decides,
-never a clock: a callback publishes its begin before its work and its end after it, so two callbacks overlap exactly when
-one's begin lies between the other's begin and end.
+never a clock: a callback publishes its begin before its work and its end after it, so two callbacks overlap exactly
+when one's begin lies between the other's begin and end.
 """
 
 from __future__ import annotations

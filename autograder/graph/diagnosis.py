@@ -81,8 +81,8 @@ _IN_CALLBACK = {
     ),
     "spin": (
         "nested-spin",
-        "It spins inside a callback: the executor that runs this callback waits for its end, and a second spinning takes "
-        "the node away from it, so the node's other callbacks stop.",
+        "It spins inside a callback: the executor that runs this callback waits for its end, and a second spinning "
+        "takes the node away from it, so the node's other callbacks stop.",
         "Never spin inside a callback: use `call_async` and a done callback, or `await`.",
     ),
     "rate.sleep": (
@@ -292,7 +292,7 @@ def _client_shares_a_group(events: Sequence[dict[str, Any]]) -> bool:
 
 
 def why_await_hangs(scene: Scene) -> Diagnosis | None:
-    """Whether a callback awaits a client that shares its mutually exclusive group: that group is held while it awaits."""
+    """Whether a callback awaits a client of its own mutually exclusive group: the group is held while it awaits."""
     for program in scene.programs:
         source = scene.folder / f"{program.name}.py"
         if not _client_shares_a_group(program.events()) or not source.is_file():
@@ -300,8 +300,8 @@ def why_await_hangs(scene: Scene) -> Diagnosis | None:
         for number, line in enumerate(source.read_text(encoding="utf-8", errors="replace").splitlines(), start=1):
             if re.search(r"\bawait\b.*call_async", line):
                 return Diagnosis(
-                    f"`{program.name}`, {program.name}.py:{number} (`{line.strip()}`): the client is in the same mutually "
-                    "exclusive group as the callback that awaits it. A group is held until its callback ends, so the "
+                    f"`{program.name}`, {program.name}.py:{number} (`{line.strip()}`): the client is in the same "
+                    "mutually exclusive group as the callback that awaits it. A group is held until its callback ends, so the "
                     "answer is never taken.",
                     "await-same-group",
                     "Give the client, or the callback that awaits, a callback group of its own.",
