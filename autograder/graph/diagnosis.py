@@ -301,8 +301,8 @@ def why_await_hangs(scene: Scene) -> Diagnosis | None:
             if re.search(r"\bawait\b.*call_async", line):
                 return Diagnosis(
                     f"`{program.name}`, {program.name}.py:{number} (`{line.strip()}`): the client is in the same "
-                    "mutually exclusive group as the callback that awaits it. A group is held until its callback ends, so the "
-                    "answer is never taken.",
+                    "mutually exclusive group as the callback that awaits it. A group is held until its "
+                    "callback ends, so the answer is never taken.",
                     "await-same-group",
                     "Give the client, or the callback that awaits, a callback group of its own.",
                 )
