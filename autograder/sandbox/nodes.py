@@ -20,6 +20,7 @@ import sys
 import tempfile
 import threading
 import time
+import traceback
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -363,13 +364,22 @@ class NodeSandbox:
             busy = launcher is not None and bool(launcher.programs)
             wait = max(0.0, look - time.monotonic()) if busy else None
             for key, _ in self._selector.select(wait):
-                key.data()
+                self._guarded(key.data)
             if busy and time.monotonic() >= look and launcher is not None and launcher is self._launcher:
                 began = time.thread_time()
-                self._watch(launcher)
+                self._guarded(lambda: self._watch(launcher))  # noqa: B023
                 # On a machine with a thousand processes a look is dear: never more than a fiftieth of the time.
                 pause = max(_WATCH, 50 * (time.thread_time() - began))
                 look = time.monotonic() + pause
+
+    def _guarded(self, action: Callable[[], None]) -> None:
+        """A launcher that talks nonsense must not end this thread, which everyone waits for."""
+        try:
+            action()
+        except Exception:
+            traceback.print_exc()
+            if self._launcher is not None:
+                self._lose(self._launcher)
 
     def _watch_pipes(self, program: Program, readers: list[tuple[int, Callable[[bytes], None]]]) -> None:
         for descriptor, taker in readers:
@@ -377,6 +387,8 @@ class NodeSandbox:
 
     def _reader(self, program: Program, descriptor: int, taker: Callable[[bytes], None]) -> Callable[[], None]:
         def read() -> None:
+            if descriptor not in program.readers:
+                return  # closed by what came before it in the same round
             data = b""
             if descriptor not in program.readers:
                 return  # closed by what was handled just before, in the same batch of events

@@ -1,0 +1,10 @@
+"""Does not end when it is asked to."""
+
+import signal
+import time
+
+for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
+    signal.signal(number, signal.SIG_IGN)
+print("ready")
+while True:
+    time.sleep(1)
