@@ -1,0 +1,81 @@
+"""Every student of every sample class is graded in the sandbox and gets exactly the expected points and reasons."""
+
+from __future__ import annotations
+
+import functools
+from pathlib import Path
+
+import kill_matrix
+import pytest
+import sample_class
+from sample_class import ROOT
+
+from autograder.grading.stage_a import Settings, run_class
+from autograder.results import SubmissionResult
+from autograder.submission.lab import Lab, load_lab
+
+LABS = kill_matrix.labs()
+MEMBERS = [(lab, student) for lab in LABS for student in sample_class.students(lab)]
+
+
+@functools.cache
+def graded(lab_name: str, into: Path) -> dict[str, SubmissionResult]:
+    """Grade a lab's whole class once, several at a time, as `autograder grade` does."""
+    lab = load_lab(ROOT, lab_name)
+    submissions = {}
+    for student in sample_class.students(lab_name):
+        folder = sample_class.build_student(lab, student, into / "submitted")
+        found = sorted(folder.glob("*.ipynb"))
+        submissions[student] = found[0] if found else folder / f"{lab_name}.ipynb"
+    return run_class(submissions, into, lab, Settings(force=True), lambda _: None)
+
+
+@pytest.fixture(scope="session")
+def class_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("class")
+
+
+def differences(lab: Lab, student: str, result: SubmissionResult) -> list[str]:
+    """Where a result is not what was expected, as lines to read."""
+    expected = sample_class.expected(lab, student)
+    found = []
+    if sorted(problem.code for problem in result.problems) != expected.problems:
+        found.append(f"problems {[p.code for p in result.problems]}, expected {expected.problems}")
+    for check in result.checks:
+        name, first = check.grade_id, check.first_failure
+        told = f"{first.code}: {first.title}: {first.because}" if first else "passed"
+        if check.points != expected.points[name]:
+            found.append(f"{name}: {check.points} points, expected {expected.points[name]} ({told})")
+        elif first and first.code != expected.codes.get(name, first.code):
+            found.append(f"{name}: expected the reason {expected.codes[name]} ({told})")
+        elif first and expected.because.get(name, "") not in first.because:
+            found.append(f"{name}: expected a reason with {expected.because[name]!r} ({told})")
+    return found
+
+
+@pytest.mark.parametrize(("lab_name", "student"), MEMBERS)
+def test_a_student_gets_exactly_the_expected_points_and_reasons(
+    lab_name: str, student: str, class_folder: Path
+) -> None:
+    result = graded(lab_name, class_folder / lab_name)[student]
+    assert differences(load_lab(ROOT, lab_name), student, result) == []
+
+
+@pytest.mark.parametrize("lab_name", LABS)
+def test_every_check_is_failed_by_some_mistake(lab_name: str) -> None:
+    assert kill_matrix.unbeaten(load_lab(ROOT, lab_name)) == []
+
+
+@pytest.mark.parametrize("lab_name", LABS)
+def test_every_mistake_names_the_reason_it_expects(lab_name: str) -> None:
+    lab = load_lab(ROOT, lab_name)
+    silent = [student.student for student in kill_matrix.one_mistake(lab) if not student.codes]
+    assert silent == []
+
+
+def test_the_table_of_mistakes_is_up_to_date(capsys: pytest.CaptureFixture[str]) -> None:
+    with capsys.disabled():
+        print()
+        for lab_name in LABS:
+            print("\n".join(kill_matrix.table(load_lab(ROOT, lab_name))))
+    assert kill_matrix.PAGE.read_text(encoding="utf-8") == kill_matrix.page(), "run `python tests/kill_matrix.py`"
