@@ -1,4 +1,4 @@
-"""The sandbox: what it does for an honest program, and that it holds against others, for root and for an ordinary user."""
+"""The sandbox: what it does for an honest program, and that it holds against others, as root and as anyone else."""
 
 from __future__ import annotations
 
@@ -26,6 +26,9 @@ from autograder.sandbox.processes import descendants
 ATTACKS = {path.stem: path.read_text() for path in (Path(__file__).parent / "attacks").glob("*.py")}
 ROOT = Path(__file__).parent.parent
 ORDINARY_USER = 12345
+
+RUN_STDIN = ("timeit", "-n1", "-r1", "exec(__import__('sys').stdin.read(), {})")
+"""A module that everyone has, and that runs what it reads."""
 
 needs_full = pytest.mark.skipif(not preflight().full, reason=f"no full isolation here: {preflight().why_not_full}")
 
@@ -68,9 +71,7 @@ print("REPORT" + json.dumps(report), flush=True)
 
 def in_sandbox(source: str, time_limit: float = 120.0) -> subprocess.CompletedProcess[str]:
     """Run Python source in the grading sandbox, through a module that everyone has."""
-    run = run_in_sandbox(
-        ["timeit", "-n1", "-r1", "exec(__import__('sys').stdin.read(), {})"], source.encode(), Isolation.FULL, time_limit
-    )
+    run = run_in_sandbox([*RUN_STDIN], source.encode(), Isolation.FULL, time_limit)
     return subprocess.CompletedProcess([], run.status, run.stdout.decode(), run.stderr)
 
 
@@ -114,13 +115,15 @@ def report(request: pytest.FixtureRequest) -> dict[str, dict[str, Any]]:
             said = in_sandbox(source)
             text, trouble = said.stdout, said.stderr
         else:
-            text, trouble = as_ordinary_user(
-                "from autograder.results import Isolation\n"
-                "from autograder.sandbox.outer import run_in_sandbox\n"
-                f"run = run_in_sandbox(['timeit','-n1','-r1',\"exec(__import__('sys').stdin.read(), {{}})\"],"
-                f" {source.encode()!r}, Isolation.FULL, 120.0)\n"
-                "print(run.stdout.decode(), run.stderr)\n"
-            ), ""
+            text, trouble = (
+                as_ordinary_user(
+                    "from autograder.results import Isolation\n"
+                    "from autograder.sandbox.outer import run_in_sandbox\n"
+                    f"run = run_in_sandbox({[*RUN_STDIN]!r}, {source.encode()!r}, Isolation.FULL, 120.0)\n"
+                    "print(run.stdout.decode(), run.stderr)\n"
+                ),
+                "",
+            )
     lines = [line for line in text.splitlines() if line.startswith("REPORT")]
     assert lines, text + trouble
     found: dict[str, dict[str, Any]] = json.loads(lines[0].removeprefix("REPORT"))
@@ -190,8 +193,7 @@ def test_when_the_parent_is_killed_nothing_remains() -> None:
     )
     outer = (
         "from autograder.results import Isolation\nfrom autograder.sandbox.outer import run_in_sandbox\n"
-        f"run_in_sandbox(['timeit','-n1','-r1',\"exec(__import__('sys').stdin.read(), {{}})\"], {inner.encode()!r},"
-        " Isolation.FULL, 600.0)\n"
+        f"run_in_sandbox({[*RUN_STDIN]!r}, {inner.encode()!r}, Isolation.FULL, 600.0)\n"
     )
     mounts = Path("/proc/self/mounts").read_text()
     parent = subprocess.Popen([sys.executable, "-c", outer], cwd=ROOT)
@@ -208,9 +210,7 @@ def test_when_the_parent_is_killed_nothing_remains() -> None:
 @needs_full
 def test_a_run_that_takes_too_long_is_ended_as_a_whole() -> None:
     began = time.monotonic()
-    run = run_in_sandbox(
-        ["timeit", "-n1", "-r1", "import time; time.sleep(60)"], b"", Isolation.FULL, time_limit=1.0
-    )
+    run = run_in_sandbox(["timeit", "-n1", "-r1", "import time; time.sleep(60)"], b"", Isolation.FULL, time_limit=1.0)
     assert run.timed_out
     assert time.monotonic() - began < 5
 
@@ -320,8 +320,9 @@ def test_reduced_isolation_hides_files_and_processes(tmp_path: Path) -> None:
     folder.mkdir()
     (folder / "peeks.py").write_text(
         "import os, signal\n"
-        f"for act in (lambda: open({str(hidden)!r}), lambda: open('new.txt', 'w'), lambda: open('/proc/{os.getpid()}/environ'),\n"
-        f"            lambda: os.kill({os.getpid()}, 0), lambda: os.listdir({str(ROOT)!r}), lambda: open({str(__file__)!r})):\n"
+        f"for act in (lambda: open({str(hidden)!r}), lambda: open('new.txt', 'w'), lambda: os.listdir({str(ROOT)!r}),\n"
+        f"            lambda: open('/proc/{os.getpid()}/environ'), lambda: os.kill({os.getpid()}, 0),\n"
+        f"            lambda: open({str(__file__)!r})):\n"
         "    try:\n        act(); print('ALLOWED')\n    except PermissionError:\n        print('refused')\n"
     )
     with NodeSandbox(folder, Isolation.REDUCED) as sandbox:

@@ -66,8 +66,8 @@ def level_zero_options() -> list[str]:
     # Made here, since bwrap makes the folders above a mount for its own user alone.
     open_folders = [part for folder in sorted(above) for part in ("--perms", "0755", "--dir", str(folder))]
     return [
-        # Its own PID namespace ends as a whole. Without it, a bwrap of root's, which has given up its capabilities, would
-        # not be allowed to take the other user's process with it.
+        # Its own PID namespace ends as a whole. Without it, a bwrap of root's, which has given up its capabilities,
+        # would not be allowed to take the other user's process with it.
         "--unshare-pid", "--die-with-parent", "--cap-drop", "ALL", "--cap-add", "CAP_SETUID", "--cap-add", "CAP_SETGID",
         "--tmpfs", "/tmp", *open_folders, *system_options(), *_read_only(shown),
         # Not `--proc`: it covers parts of /proc, and then the kernel lets no user namespace mount a new one.

@@ -87,9 +87,12 @@ def _remedy(why: str) -> str:
     if _setting("user/max_user_namespaces") == "0":
         return "Run `sudo sysctl -w user.max_user_namespaces=10000`."
     if Path("/.dockerenv").exists() or Path("/run/.containerenv").exists():
-        return "Start the container with user namespaces allowed (Docker: --security-opt seccomp=unconfined --security-opt systempaths=unconfined)."
+        return (
+            "Start the container with user namespaces allowed "
+            "(Docker: --security-opt seccomp=unconfined --security-opt systempaths=unconfined)."
+        )
     if os.getuid() == 0 and "Permission denied" in why:
-        return "Make the virtual environment readable for everyone (`chmod -R go+rX .venv`), or run as an ordinary user."
+        return "Make the virtual environment readable for all (`chmod -R go+rX .venv`), or run as an ordinary user."
     return "Allow unprivileged user namespaces on this machine."
 
 

@@ -4,9 +4,10 @@ It runs beside the programs, inside their sandbox, and is trusted no more than t
 `probe.py` in its folder it imports nothing of the kit.
 
 Usage: launcher.py FD. FD is one end of a SOCK_SEQPACKET pair. Requests are JSON:
-    {"do": "start", "id", "path", "args", "env", "cpus", "limits"} with three descriptors (output, events, stacks)
+    {"do": "start", "id", "path", "args", "env", "cpus", "cores", "limits"} with descriptors (output, events, stacks)
     {"do": "end_all", "everyone": true where the process list is the sandbox's own}
-Answers: {"ready": pid}, {"started": id, "pid"} with a pidfd, {"failed": id, "why"}, {"ended": id, "status"}, {"all_ended": true}.
+Answers: {"ready": pid}, {"started": id, "pid"} with a pidfd, {"failed": id, "why"}, {"ended": id, "status"},
+    {"all_ended": true}.
 At the end of the socket everything ends.
 """
 
@@ -85,9 +86,9 @@ class Start:
 
 def warm_up() -> None:
     """Load what programs need, without joining a ROS domain."""
-    # The ROS libraries' tracer (LTTng) starts threads when it is loaded, and ends them when the process exits. A fork has
-    # not got them, and crashes at its very end. Handlers run last in first out: this one, from before anything was
-    # loaded, runs after every destructor of C++ objects and before the libraries' own finish.
+    # The ROS libraries' tracer (LTTng) starts threads when it is loaded, and ends them when the process exits. A fork
+    # has not got them, and crashes at its very end. Handlers run last in first out: this one, from before anything
+    # was loaded, runs after every destructor of C++ objects and before the libraries' own finish.
     _libc.on_exit(_libc._exit, None)
     for name in WARM:
         with contextlib.suppress(ImportError):
@@ -128,7 +129,8 @@ def serve(channel: socket.socket) -> Start:
             if request["do"] == "end_all":
                 if request["everyone"]:
                     with contextlib.suppress(ProcessLookupError):
-                        os.kill(-1, signal.SIGKILL)  # everything in this PID namespace but its first process and this one
+                        # Everything in this PID namespace but its first process and this one.
+                        os.kill(-1, signal.SIGKILL)
                 _reap(channel, children)
                 _send(channel, {"all_ended": True})
                 continue
@@ -234,7 +236,7 @@ def become(start: Start) -> None:
     sys.stdin = open(0, closefd=False)
     sys.stdout = open(1, "w", encoding="utf-8", errors="backslashreplace", buffering=1, closefd=False)
     sys.stderr = open(2, "w", encoding="utf-8", errors="backslashreplace", buffering=1, closefd=False)
-    sys.__stdin__, sys.__stdout__, sys.__stderr__ = sys.stdin, sys.stdout, sys.stderr
+    vars(sys).update(__stdin__=sys.stdin, __stdout__=sys.stdout, __stderr__=sys.stderr)
     signal.signal(signal.SIGINT, signal.default_int_handler)
     faulthandler.register(STACK_SIGNAL, file=STACKS_FD, all_threads=True, chain=False)
 

@@ -61,8 +61,8 @@ class NodeSandbox:
     """Runs the programs of one folder.
 
     Args:
-        folder: holds the programs (`NAME.py`) and their files; the programs see it, read-only, as their working directory.
-        isolation: how they are kept apart. `Isolation.FULL` expects to be inside the grading sandbox, or an ordinary user.
+        folder: holds the programs (`NAME.py`) and their files; it is their working directory, read-only to them.
+        isolation: how they are kept apart. `Isolation.FULL` works in the grading sandbox, and for an ordinary user.
         limits: what they may use.
 
     Raises:
@@ -206,15 +206,14 @@ class NodeSandbox:
             self._changed.wait_for(lambda: launcher.ready or launcher.lost, _READY)
         if not launcher.ready:
             said = (self._scratch / "launcher.log").read_text(errors="replace").strip().splitlines()
+            why = " ".join(said[-3:]) or "no answer"
             raise KitError(
-                f"The node sandbox does not start ({self.isolation.value} isolation): {' '.join(said[-3:]) or 'no answer'}",
+                f"The node sandbox does not start ({self.isolation.value} isolation): {why}",
                 "Run `autograder doctor`.",
             )
         return launcher
 
-    def _start_in(
-        self, launcher: _Launcher, name: str, args: list[str], env: dict[str, str], cores: int
-    ) -> Program:
+    def _start_in(self, launcher: _Launcher, name: str, args: list[str], env: dict[str, str], cores: int) -> Program:
         program = Program(name, self.limits, self._changed)
         ends = [os.pipe2(os.O_CLOEXEC) for _ in range(3)]
         for ours, _ in ends:
@@ -248,7 +247,9 @@ class NodeSandbox:
         finally:
             for _, theirs in ends:
                 os.close(theirs)
-        takers = (program._take_output, program._take_events, program._take_stacks)
+        takers: tuple[Callable[[bytes], None], ...] = (
+            program._take_output, program._take_events, program._take_stacks,
+        )  # fmt: skip
         readers = [(ours, taker) for (ours, _), taker in zip(ends, takers, strict=True)]
         program.readers = [ours for ours, _ in readers]
         self._in_thread(lambda: self._watch_pipes(program, readers))

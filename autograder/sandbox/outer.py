@@ -8,7 +8,6 @@ import selectors
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 from autograder.results import Isolation
@@ -24,9 +23,9 @@ DROPPED_ID = 61771
 """The user and group that root becomes for grading: one that owns nothing."""
 
 _DROP = (
-    "import os,sys;os.setgroups([]);os.setresgid({0},{0},{0});os.setresuid({0},{0},{0});"
-    "os.execve(sys.argv[1],sys.argv[1:],{{}})"
-).format(DROPPED_ID)
+    f"import os,sys;n={DROPPED_ID};os.setgroups([]);os.setresgid(n,n,n);os.setresuid(n,n,n);"
+    "os.execve(sys.argv[1],sys.argv[1:],{})"
+)
 
 
 @dataclass
@@ -77,15 +76,19 @@ def start_in_sandbox(module_args: list[str], isolation: Isolation) -> subprocess
         "HOME": "/tmp",
     }
     command = [sys.executable, "-m", *module_args]
-    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    pipe = subprocess.PIPE
     if isolation is not Isolation.FULL:
-        return subprocess.Popen(command, env=variables, start_new_session=True, **pipes)  # type: ignore[call-overload,no-any-return]
+        return subprocess.Popen(
+            command, env=variables, start_new_session=True, stdin=pipe, stdout=pipe, stderr=pipe, cwd="/"
+        )
     around = None
     if os.getuid() == 0:
         # Namespaces nest only for an ordinary user, and only root may read below /root: give up root inside a mount
         # tree of our own, in which this Python lies under folders that everyone may enter.
         around = (bubblewrap.level_zero_options(), [sys.executable, "-I", "-S", "-c", _DROP])
-    return bubblewrap.start_bwrap(bubblewrap.outer_options(variables), command, around=around, **pipes)
+    return bubblewrap.start_bwrap(
+        bubblewrap.outer_options(variables), command, around=around, stdin=pipe, stdout=pipe, stderr=pipe
+    )
 
 
 def _exchange(process: subprocess.Popen[bytes], stdin: bytes, time_limit: float) -> OuterRun:

@@ -38,9 +38,9 @@ class _State:
     spinning = 0
     spun: set[str] = set()  # noqa: RUF012
     once: set[tuple[str, ...]] = set()  # noqa: RUF012
-    kinds: dict[Any, tuple[str, str]] = {}  # noqa: RUF012
+    kinds: dict[Any, Any] = {}  # noqa: RUF012
     """Callback -> what kind of callback it is, and of which node."""
-    owners: "weakref.WeakKeyDictionary[Any, Any]" = weakref.WeakKeyDictionary()
+    owners: "weakref.WeakKeyDictionary[Any, Any]" = weakref.WeakKeyDictionary()  # noqa: RUF012
     """Lifecycle publisher -> node."""
 
 
@@ -207,7 +207,9 @@ def _checked(kind: str, callback: Callable[..., Any], node: str, expected: type)
 # Wrapping.
 
 
-def _wrap(owner: Any, name: str, before: Callable[..., Any] | None = None, after: Callable[..., Any] | None = None) -> None:
+def _wrap(
+    owner: Any, name: str, before: Callable[..., Any] | None = None, after: Callable[..., Any] | None = None
+) -> None:
     """Replace `owner.name` by itself with a note before it and one after it has returned (its result first)."""
     original = getattr(owner, name)
 
@@ -231,7 +233,7 @@ def _wrap(owner: Any, name: str, before: Callable[..., Any] | None = None, after
 
 
 def _wrap_spin(owner: Any, name: str, what: str, executor_of: Callable[..., str], long: bool) -> None:
-    """As `_wrap`, for what spins. `long`: it goes on until the end, so that its begin and end are notes of their own."""
+    """As `_wrap`, for what spins. `long`: it goes on until the end, so that its begin and end are each noted."""
     original = getattr(owner, name)
 
     @functools.wraps(original)
@@ -317,7 +319,7 @@ def _entity_note(kind: str, name_of: Callable[[Any, Any], str]) -> Callable[...,
         group = getattr(entity, "callback_group", None)
         if group is not None and group is getattr(node, "_rate_group", None):
             return  # the timer below a Rate
-        event = {"e": "entity", "kind": kind, "name": "", "node": _node_name(node)}
+        event: dict[str, Any] = {"e": "entity", "kind": kind, "name": "", "node": _node_name(node)}
         with _quiet():
             event["name"] = name_of(entity, node)
         if group is not None and kind != "publisher":
@@ -356,9 +358,7 @@ def _prepare_executors(rclpy: Any) -> None:
         _wrap(executor, "__init__", after=made)
         _wrap_spin(executor, "spin_once", "spin_once", kind, long=False)
     _wrap_spin(rclpy.executors.Executor, "spin", "spin", kind, long=True)
-    _wrap_spin(
-        rclpy.executors.Executor, "spin_until_future_complete", "spin_until_future_complete", kind, long=False
-    )
+    _wrap_spin(rclpy.executors.Executor, "spin_until_future_complete", "spin_until_future_complete", kind, long=False)
     _wrap_spin(rclpy, "spin", "spin", kind_given, long=True)
     _wrap_spin(rclpy, "spin_once", "spin_once", kind_given, long=False)
     _wrap_spin(rclpy, "spin_until_future_complete", "spin_until_future_complete", kind_given, long=False)
@@ -422,15 +422,15 @@ def _prepare_callbacks(rclpy: Any) -> None:
     node_class.add_on_set_parameters_callback = add_noted
     node_class.remove_on_set_parameters_callback = remove_noted
 
-    def action_server_made(_result: None, server: Any, node: Any, action_type: Any, *_args: Any, **_kwargs: Any) -> None:
-        emit({"e": "entity", "kind": "action_server", "name": str(_args[0]) if _args else "", "node": _node_name(node)})
+    def action_server_made(_: None, server: Any, node: Any, action_type: Any, *args: Any, **_kwargs: Any) -> None:
+        emit({"e": "entity", "kind": "action_server", "name": str(args[0]) if args else "", "node": _node_name(node)})
         for callback, expected in (
             (server._execute_callback, action_type.Result),
             (server._goal_callback, rclpy.action.GoalResponse),
             (server._cancel_callback, rclpy.action.CancelResponse),
         ):
             _know(callback, "action", node)
-            _State.kinds[("result", callback)] = expected  # type: ignore[assignment]
+            _State.kinds[("result", callback)] = expected
 
     _wrap(rclpy.action.ActionServer, "__init__", after=action_server_made)
 

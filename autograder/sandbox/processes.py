@@ -50,7 +50,7 @@ def descendants(root: int) -> dict[int, Process]:
 
 
 def proportional_memory(pid: int) -> int:
-    """Return the bytes of memory that are this process's own, shared pages divided among those that share; 0 if gone."""
+    """Return the bytes of memory that are this process's own; a shared page counts in parts. 0 if it is gone."""
     with contextlib.suppress(OSError):
         for line in Path(f"/proc/{pid}/smaps_rollup").read_text().splitlines():
             if line.startswith("Pss:"):

@@ -108,7 +108,7 @@ class Program:
         return self._status
 
     def stopped_by(self) -> str:
-        """Return which limit ended it (`memory limit`, `output limit`, `time limit`, `process limit`…), or "" for none."""
+        """Return which limit ended it (`memory`, `process`, `output`, `time` or `CPU time limit`), or "" for none."""
         return self._stopped_by
 
     def output(self) -> str:
@@ -147,7 +147,7 @@ class Program:
             self.wait(1.0)
 
     def stacks(self, timeout: float = 1.0) -> str:
-        """Return what each of its threads is doing now, as a traceback each, newest call first; "" if it does not say."""
+        """Return what each of its threads does now, as a traceback each, newest call first; "" if it does not say."""
         with self._changed:
             self._stacks.clear()
             if self._status is not None:

@@ -28,7 +28,8 @@ _CALLS = {  # x86-64, the only architecture that the ROS wheels exist for
     "init_module": 175, "finit_module": 313, "delete_module": 176, "kexec_load": 246, "kexec_file_load": 320,
     "settimeofday": 164, "clock_settime": 227, "adjtimex": 159, "clock_adjtime": 305, "syslog": 103,
     "iopl": 172, "ioperm": 173, "personality": 135, "uselib": 134, "lookup_dcookie": 212, "vhangup": 153,
-    "fanotify_init": 300, "modify_ldt": 154, "mbind": 237, "set_mempolicy": 238, "migrate_pages": 256, "move_pages": 279,
+    "fanotify_init": 300, "modify_ldt": 154, "mbind": 237, "set_mempolicy": 238,
+    "migrate_pages": 256, "move_pages": 279,
 }  # fmt: skip
 _CLONE, _CLONE3, _SOCKET, _SOCKETPAIR = 56, 435, 41, 53
 _NAMESPACE_FLAGS = 0x7E020000  # every CLONE_NEW* that clone takes
