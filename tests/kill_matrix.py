@@ -60,7 +60,7 @@ def page() -> str:
         "# Which mistake is caught by which check",
         "",
         "Made by `python tests/kill_matrix.py` from what the sample classes expect; `make test` grades every student",
-        "and holds the result against it. A cell names the reason for which the check took its points; empty: it passed.",
+        "and holds the result against it. A cell names the reason for which the check took its points.",
         "",
     ]
     return "\n".join(head + [line for name in labs() for line in table(load_lab(ROOT, name))])
