@@ -72,7 +72,7 @@ html_css_files = ["course.css"]
 html_copy_source = False
 html_use_index = False
 
-revealjs_html_theme = "revealjs-simple"
+revealjs_html_theme = "deck"
 revealjs_style_theme = "course.css"
 revealjs_static_path = ["_static"]
 revealjs_css_files = ["pygments.css"]

@@ -27,9 +27,9 @@ from sphinx_revealjs.nodes import revealjs_break
 from sphinx_revealjs.writers import RevealjsSlideTranslator
 
 # The measures below belong to course.css, section "Slides"; they assume a wide font, so that a narrow one fits too.
-ROOM = 570  # pixels below a slide's heading
+ROOM = 600  # pixels below a slide's heading
 WIDTH = 1168  # pixels between the margins
-LEAST_FIGURE = 400  # a figure is not shrunk below this height to share a slide
+LEAST_FIGURE = 360  # a figure is not shrunk below this height to share a slide
 LEAST_LISTING = 220  # nor does a listing begin in less room than this
 TEXT_LINE, TEXT_COLUMNS, TEXT_GAP = 38, 74, 16
 CODE_LINE, CODE_COLUMNS, CODE_GAP = 26, 93, 34
