@@ -62,11 +62,7 @@ class GraphExpectations(ExpectationBase):
         if self.observer.nodes().count(name) > 1:
             self.fail(
                 title,
-                Diagnosis(
-                    f"Two nodes are called `{name}`: their parameters and services cannot be told apart.",
-                    "duplicate-node",
-                    "Give each node a name of its own.",
-                ),
+                diagnosis.why_doubled(self.scene(), name),
                 expected="one node of this name",
                 observed=", ".join(self.observer.nodes()),
                 hint=hint,

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from rcl_interfaces.srv import GetParameters
 
-from autograder.checks import outcomes
+from autograder.checks import outcomes, session
 from autograder.checks.base import WITHIN
 from autograder.checks.expect_graph import GraphExpectations
-from autograder.graph import diagnosis, parameters
+from autograder.graph import diagnosis, parameters, params_file
 from autograder.graph.diagnosis import Diagnosis
 from autograder.graph.names import type_name
 from autograder.graph.services import Answer, OfferedService, ServiceMissing, call_all
@@ -141,11 +142,27 @@ class ServiceExpectations(GraphExpectations):
         self.expect_that(
             same,
             title,
-            lambda: Diagnosis(f"It is {have[name]!r} ({type(have[name]).__name__}).", "parameter-value"),
+            lambda: (
+                self._file_for_others(node)
+                or Diagnosis(f"It is {have[name]!r} ({type(have[name]).__name__}).", "parameter-value")
+            ),
             expected=repr(value),
             observed=repr(have[name]),
             hint=hint,
         )
+
+    def _file_for_others(self, node: str) -> Diagnosis | None:
+        """Whether the parameter files of the launch have nothing for this node."""
+        for launched, _ in self.programs:
+            words = launched.arguments()
+            for option, file in itertools.pairwise(words):
+                path = session.current.folder / file
+                if option != "--params-file" or not path.is_file():
+                    continue
+                because = params_file.why_not_reached(path.read_text(encoding="utf-8"), node)
+                if because:
+                    return Diagnosis(because, "params-file-key", "The key is the node's full name, namespace included.")
+        return None
 
     def expect_parameter_refused(
         self, node: str, name: str, value: Any, *, within: float = WITHIN, hint: str = ""

@@ -154,6 +154,20 @@ def _death(scene: Scene, program: RunningProgram) -> Diagnosis | None:
     return Diagnosis(f"`{program.name}` ended by itself (exit status {status}) before this was seen.", "exited")
 
 
+_KNOWN_ERRORS = (
+    (
+        "ParameterNotDeclaredException",
+        "parameter-not-declared",
+        "A parameter exists from `declare_parameter` on: declare it before you read it, even if a value was given.",
+    ),
+    (
+        "InvalidParameterTypeException",
+        "parameter-type",
+        "The value's type must be the declared one: 40 is an integer, 40.0 a double, '40' a string.",
+    ),
+)
+
+
 def last_traceback(output: str, program: str) -> Diagnosis | None:
     """The last error that a Python program printed, with the student's own line."""
     lines = output.splitlines()
@@ -176,6 +190,9 @@ def last_traceback(output: str, program: str) -> Diagnosis | None:
         if lines[number].startswith("Traceback"):
             break
     quoted = f" (`{code}`)" if code else ""
+    for exception, word, hint in _KNOWN_ERRORS:
+        if exception in error:
+            return Diagnosis(f"`{program}` ended with an error{where}{quoted}: {error}", word, hint)
     kind = "syntax-error" if error.startswith(("SyntaxError", "IndentationError", "TabError")) else "crashed"
     what = "is not a Python program" if kind == "syntax-error" else "ended with an error"
     return Diagnosis(
@@ -354,15 +371,9 @@ def why_no_node(scene: Scene, wanted: str) -> Diagnosis:
     if not names:
         inside = inside_reason(scene)
         return inside or Diagnosis("The program runs, but it has not made any node.", "no-node")
-    renaming = [rule for rule in map(remap_rules.parse, scene.rules) if rule and not rule.renames_topics]
     doubles = [name for name in names if names.count(name) > 1]
-    if doubles and any(rule.left != "__ns" and not rule.prefix for rule in renaming):
-        rule = next(rule for rule in renaming if rule.left != "__ns" and not rule.prefix)
-        return Diagnosis(
-            f"`{rule.text}` renames every node of its process: now {len(doubles)} nodes are called `{doubles[0]}`.",
-            "one-name-for-all",
-            "Say which node is meant by its name in the code: `NODE:__node:=NEW`.",
-        )
+    if doubles:
+        return why_doubled(scene, doubles[0])
     base = wanted.rsplit("/", 1)[-1]
     for name in names:
         if name.rsplit("/", 1)[-1] == base:
@@ -376,6 +387,23 @@ def why_no_node(scene: Scene, wanted: str) -> Diagnosis:
         f"There is no node `{wanted}`; the nearest name on the graph is `{close}`.",
         "node-name",
         "The name given to the Node constructor (or by `-r __node:=`) decides.",
+    )
+
+
+def why_doubled(scene: Scene, name: str) -> Diagnosis:
+    """Why several nodes have one name."""
+    count = scene.observer.nodes().count(name)
+    for rule in map(remap_rules.parse, scene.rules):
+        if rule and rule.left in ("__node", "__name") and not rule.prefix and len(scene.programs) == 1:
+            return Diagnosis(
+                f"`{rule.text}` renames every node of its process: now {count} nodes are called `{name}`.",
+                "one-name-for-all",
+                "Say which node is meant by its name in the code: `NODE:__node:=NEW`.",
+            )
+    return Diagnosis(
+        f"{count} nodes are called `{name}`: their parameters and services cannot be told apart.",
+        "duplicate-node",
+        "Give each node a name of its own.",
     )
 
 
