@@ -183,23 +183,28 @@ def test_nonsense_on_the_probe_channel_is_harmless_and_bounded(report: dict[str,
     assert report["events_flood"]["events"] <= Limits().events
 
 
-@needs_full
-def test_when_the_parent_is_killed_nothing_remains() -> None:
+@pytest.mark.parametrize(("kind", "processes"), [(Isolation.FULL, 8), (Isolation.REDUCED, 4), (Isolation.NONE, 4)])
+def test_when_the_parent_is_killed_nothing_remains(kind: Isolation, processes: int) -> None:
+    if (
+        kind is not Isolation.NONE
+        and not {Isolation.FULL: preflight().full, Isolation.REDUCED: preflight().reduced}[kind]
+    ):
+        pytest.skip(f"no {kind.value} isolation here")
     inner = (
         "from pathlib import Path\nfrom autograder.results import Isolation\n"
         "from autograder.sandbox.nodes import NodeSandbox\n"
-        "Path('/tmp/p').mkdir(); Path('/tmp/p/sleeper.py').write_text('import time; time.sleep(600)')\n"
-        "s = NodeSandbox(Path('/tmp/p'), Isolation.FULL); s.start('sleeper'); s.start('sleeper').wait(600)\n"
+        "import tempfile; p = Path(tempfile.mkdtemp()); (p / 'sleeper.py').write_text('import time; time.sleep(600)')\n"
+        f"s = NodeSandbox(p, Isolation.{kind.name}); s.start('sleeper'); s.start('sleeper').wait(600)\n"
     )
     outer = (
         "from autograder.results import Isolation\nfrom autograder.sandbox.outer import run_in_sandbox\n"
-        f"run_in_sandbox({[*RUN_STDIN]!r}, {inner.encode()!r}, Isolation.FULL, 600.0)\n"
+        f"run_in_sandbox({[*RUN_STDIN]!r}, {inner.encode()!r}, Isolation.{kind.name}, 600.0)\n"
     )
     mounts = Path("/proc/self/mounts").read_text()
     parent = subprocess.Popen([sys.executable, "-c", outer], cwd=ROOT)
     try:
         # python, bwrap (outer, its first process), worker, bwrap (inner, first), launcher, two programs
-        family = _wait_for(lambda: found if len(found := descendants(parent.pid)) >= 8 else None, 20)
+        family = _wait_for(lambda: found if len(found := descendants(parent.pid)) >= processes else None, 20)
     finally:
         parent.kill()
         parent.wait()
