@@ -93,8 +93,17 @@ class MessageExpectations(GraphExpectations):
             reason = diagnosis.why_silent(self.scene(), topic, msg_type, qos or quiet_profile())
             if got and reason.code == "silent":
                 reason = Diagnosis(f"Only {got} of {need} messages came in {within:g} s.", "too-few")
-            elif where and recording.count and reason.code == "silent":
-                reason = Diagnosis(f"{recording.count} messages came, but none as expected.", "content")
+            elif where and not got and recording.count > after:
+                # Messages do come, so what keeps callbacks waiting is not the reason.
+                scene, last = self.scene(), _shorten(_text(recording.messages[-1].msg), 80)
+                reason = (
+                    diagnosis.program_trouble(scene)
+                    or diagnosis.inside_reason(scene)
+                    or diagnosis.lifecycle_silence(scene)
+                    or Diagnosis(
+                        f"{recording.count - after} messages came, but none as expected; the last is {last!r}.", "content"
+                    )
+                )
             self.fail(title, reason, expected=f"{need} messages", observed=f"{got} messages", hint=hint)
         if most is not None:
             self.observer.wait(lambda: len(counted()) > most, window)
