@@ -216,7 +216,8 @@ def finish(locks: "List[str]", version: "Tuple[int, ...]") -> None:
     command.write_text(
         # A #! line can hold no space and is cut at 127 bytes: /bin/sh starts the Python that lies beside this file.
         '#!/bin/sh\n\'\'\'exec\' "$(dirname "$(readlink -f "$0")")/python" "$0" "$@"\n\' \'\'\'\n'
-        "import sys\n\nfrom autograder.cli import main\n\nsys.exit(main())\n",
+        # Guarded, since processes of a pool import the main script once more.
+        "import sys\n\nfrom autograder.cli import main\n\nif __name__ == '__main__':\n    sys.exit(main())\n",
         encoding="utf-8",
     )
     command.chmod(0o755)
