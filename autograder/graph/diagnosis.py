@@ -427,7 +427,8 @@ def why_no_endpoint(scene: Scene, topic: str, msg_type: type, kind: str, node: s
     if idle:
         return Diagnosis(*idle)
     opposite = observer.subscriptions(topic) if kind == "publisher" else observer.publishers(topic)
-    names = [name for name in observer.topics() if not name.startswith(("/rosout", "/parameter_events"))]
+    names = [name for name in observer.topics() if name not in ("/rosout", "/parameter_events")]
+    names = [name for name in names if not name.endswith("/transition_event")]
     reach = observer.publishers if kind == "publisher" else observer.subscriptions
     names = [name for name in names if reach(name)]
     base = topic.rsplit("/", 1)[-1]
@@ -496,8 +497,11 @@ def why_silent(scene: Scene, topic: str, msg_type: type, profile: QoSProfile) ->
     asleep = lifecycle_silence(scene)
     if asleep:
         return asleep
+    owners = {full_name(end.node_namespace, end.node_name) for end in ends}
+    services = scene.observer.services()
+    # A lifecycle node that says nothing does so because of its state or its code: crowding is no likely cause.
     crowded = why_await_hangs(scene) or why_serial(scene)
-    if crowded:
+    if crowded and not any(f"{owner}/get_state" in services for owner in owners):
         return crowded
     for program in scene.programs:
         where = waiting_line(scene, program)
