@@ -20,13 +20,15 @@ class MapViewer(Node):
 
 
 def main():
-    with rclpy.init():
-        executor = SingleThreadedExecutor()
-        executor.add_node(MapViewer())
-        try:
-            executor.spin()
-        except (KeyboardInterrupt, ExternalShutdownException):
-            pass
+    rclpy.init()
+    executor = SingleThreadedExecutor()
+    executor.add_node(MapViewer())
+    try:
+        executor.spin()
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    finally:
+        rclpy.try_shutdown()
 
 
 main()
