@@ -48,11 +48,11 @@ def attack():
             folders[:] = [f for f in folders if f not in ("sys", "dev", "lib", "usr", "site-packages")][:200]
             for name in files[:500]:
                 path = os.path.join(folder, name)
-                if path == me or not name.endswith((".ipynb", ".json", ".py", "environ", "cmdline", "db")):
+                if path == me or not name.endswith((".ipynb", ".json", "environ", "cmdline", ".db")):
                     continue
                 try:
                     with open(path, "rb") as file:
-                        if b"BEGIN " + b"HIDDEN TESTS\n" in file.read(1_000_000):
+                        if b"BEGIN HIDDEN TESTS" in file.read(1_000_000):
                             return True
                 except OSError:
                     pass
