@@ -13,6 +13,7 @@ from typing import Any
 
 import rclpy
 from rclpy.context import Context
+from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
@@ -139,5 +140,6 @@ class Observer:
         return self._recordings[key]
 
     def publisher(self, topic: str, msg_type: type, qos: QoSProfile) -> Any:
-        """Make a publisher of the observer's."""
-        return self.node.create_publisher(msg_type, topic, qos)
+        """Make a publisher of the observer's; rclpy's own warnings about subscriptions that do not match are off."""
+        quiet = PublisherEventCallbacks(use_default_callbacks=False)
+        return self.node.create_publisher(msg_type, topic, qos, event_callbacks=quiet)
