@@ -24,9 +24,11 @@ OUTSIDE = """() => Reveal.getSlides().flatMap((slide, number) => {
   const at = Reveal.getIndices(slide);
   Reveal.slide(at.h, at.v);
   const boxes = [...slide.querySelectorAll('*')].map(element => element.getBoundingClientRect());
+  const title = slide.querySelector('h1, h2, h3').getBoundingClientRect();
   const right = Math.max(...boxes.map(box => box.right)), bottom = Math.max(...boxes.map(box => box.bottom));
-  return right > innerWidth || bottom > innerHeight || !slide.innerText.trim()
-    ? [`slide ${number + 1} "${slide.innerText.slice(0, 40)}" reaches ${right} x ${bottom}`] : [];
+  const shown = title.top >= 0 && title.height >= 40 && slide.innerText.trim().includes('\\n');
+  return shown && right <= innerWidth && bottom <= innerHeight
+    ? [] : [`slide ${number + 1} "${slide.innerText.slice(0, 40)}" reaches ${right} x ${bottom}, title ${title.top}`];
 })"""
 BROKEN_IMAGES = """async () => {
   const images = [...document.images];
