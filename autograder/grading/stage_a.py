@@ -25,7 +25,7 @@ from autograder.results import SCHEMA_VERSION, CheckResult, Isolation, Outcome, 
 from autograder.submission.lab import Lab
 from autograder.submission.reader import Submission, read_submission
 
-SECONDS_PER_CHECK = 90.0
+SECONDS_PER_CHECK = 30.0
 """After this long for each check cell, in seconds, the worker itself is stuck: its own deadlines are shorter."""
 ATTEMPTS = 2
 """A worker that dies is the grader's fault, so it gets a second chance before an instructor is asked."""
@@ -132,7 +132,7 @@ def run_in_worker(job: Job) -> SubmissionResult:
     """Run a job's checks in the sandbox. A worker that dies, hangs or talks nonsense means: could not find out."""
     from autograder.sandbox.outer import run_in_sandbox
 
-    limit = 60.0 + SECONDS_PER_CHECK * sum(cell.points is not None for cell in job.cells)
+    limit = _limit(len(_checks(job)))
     run = run_in_sandbox(
         ["autograder.grading.worker"], job.model_dump_json().encode("utf-8"), job.isolation, time_limit=limit
     )
@@ -143,6 +143,11 @@ def run_in_worker(job: Job) -> SubmissionResult:
     except ValidationError:
         return unknown(job, f"The grader ended with status {run.status} and no result.", run.stderr)
     return believed(job, result)
+
+
+def _limit(checks: int) -> float:
+    """Seconds after which a worker with so many checks is stuck."""
+    return 60.0 + SECONDS_PER_CHECK * checks
 
 
 def believed(job: Job, result: SubmissionResult) -> SubmissionResult:
@@ -256,8 +261,8 @@ def _run_pool(
 ) -> None:
     from pebble import ProcessPool
 
-    # Each run may not be given up before the worker's own limit had its chance, twice.
-    limit = 60.0 + ATTEMPTS * (90.0 + SECONDS_PER_CHECK * len(lab.checks))
+    # No run is given up before the worker's own limit had its chance, each time.
+    limit = 60.0 + ATTEMPTS * _limit(len(lab.checks))
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload(["autograder.grading.stage_a", "autograder.sandbox.outer"])
     pool = ProcessPool(

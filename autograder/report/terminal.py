@@ -92,39 +92,43 @@ def _details(outcome: Outcome) -> list[RenderableType]:
 
 
 def why_lost(result: SubmissionResult) -> str:
-    """Why a submission lost points, in one line: the first thing that went wrong."""
-    for check in result.checks:
+    """Why a submission lost points, in one line: the first check that did not pass, and its first failure."""
+    for number, check in enumerate(result.checks, start=1):
         if check.status is not Status.PASSED:
             failure = check.first_failure
-            return plain(reason(failure)) if failure else f"{check.title}: {check.status.value}"
+            return f"{number}: {plain(reason(failure)) if failure else check.status.value}"
     return ""
 
 
 def class_view(results: Sequence[SubmissionResult]) -> RenderableType:
-    """Return a class as a table: a row for each student, a column for each check, and why points were lost."""
+    """Return a class as a table: a row for each student, a symbol for each check, and why points were lost."""
+    checks = results[0].checks if results else []
     table = Table(box=None, header_style="bold", padding=(0, 1), pad_edge=False, expand=True)
     table.add_column("student", no_wrap=True, max_width=26)
-    checks = results[0].checks if results else []
-    for number, _ in enumerate(checks, start=1):
-        table.add_column(str(number), justify="right", no_wrap=True)
+    table.add_column(f"checks 1-{len(checks)}", no_wrap=True)
     table.add_column("points", justify="right", no_wrap=True)
     table.add_column("status", no_wrap=True)
     table.add_column("why points were lost", ratio=1, no_wrap=True, overflow="ellipsis")
     for result in results:
-        cells = [
-            Text("?" if check.points is None else f"{check.points:g}", STYLE[check.status]) for check in result.checks
-        ]
-        cells += [Text("")] * (len(checks) - len(cells))
         status = class_status(result)
         table.add_row(
             Text(plain(result.student)),
-            *cells[: len(checks)],
+            _marks(result.checks),
             f"{result.points:g}/{result.max_points:g}",
             Text(f"{SYMBOL[status]} {_WORD[status]}", STYLE[status]),
             Text(why_lost(result)),
         )
     legend = Text("\n".join(_legend(checks)), style="dim")
     return Group(table, Text(), legend)
+
+
+def _marks(checks: Sequence[CheckResult]) -> Text:
+    """A symbol for each check, in groups of five that can be counted."""
+    marks = Text()
+    for number, check in enumerate(checks):
+        marks.append(" " if number and number % 5 == 0 else "")
+        marks.append(SYMBOL[check.status], STYLE[check.status])
+    return marks
 
 
 _WORD = {
