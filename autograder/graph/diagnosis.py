@@ -246,7 +246,8 @@ def _callback_failure(program: RunningProgram) -> Diagnosis | None:
                 "service": "The client gets no answer and the node no longer spins.",
                 "lifecycle": "rclpy swallows it without a log line and treats the transition as ERROR.",
             }.get(kind, "It ended the spinning.")
-            return Diagnosis(f"A {kind} callback of `{program.name}`{at} raised {source}{error}. {after}", code)
+            which = f"A {kind} callback" if kind else "A callback"
+            return Diagnosis(f"{which} of `{program.name}`{at} raised {source}{error}. {after}", code)
     return None
 
 

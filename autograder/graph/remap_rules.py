@@ -140,6 +140,13 @@ def without_effect(rules: Sequence[str], wanted: str, nodes: Sequence[str], topi
                 )
             if rule.prefix and rule.prefix != own:
                 continue
+            fixed = [name for name in topics if name != left and left.endswith(name)]
+            if left not in topics and fixed and not rule.left.startswith("/"):
+                return (
+                    f"{said} the name in the code is absolute, `{fixed[0]}`, and the rule looks for `{left}`.",
+                    "absolute-name",
+                    "A name with a leading slash is absolute: no namespace reaches it. Write it without the slash.",
+                )
             if left not in topics:
                 close = nearest(left, [name for name in topics if name != wanted])
                 return (
