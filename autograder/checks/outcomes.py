@@ -55,8 +55,10 @@ def unknown(title: str, because: str) -> None:
 
 def _record(outcome: Outcome) -> None:
     frame = _check_frame()
-    if frame is not None:
+    # A cell's own helper function records for the line that called it: hidden there is hidden here.
+    while frame is not None and not outcome.hidden:
         outcome.hidden = frame.f_lineno in _hidden_lines(frame)
+        frame = frame.f_back if frame.f_code.co_name != "<module>" else None
     session.current.outcomes.append(outcome)
 
 
