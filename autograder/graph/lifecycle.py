@@ -125,8 +125,8 @@ class LifecycleClient:
 
         No state offers two transitions of one label: the three shutdowns leave three states. Raises as `state`.
         """
-        reply = self._ask(GetAvailableTransitions, GetAvailableTransitions.Request(), within, give_up)
-        return {item.transition.label: item.goal_state.label for item in reply.available_transitions}
+        offered = self._offered(within, give_up)
+        return {item.transition.label: item.goal_state.label for item in offered}
 
     def transition(self, label: str, within: float = 10.0, give_up: GiveUp = lambda: False) -> Requested:
         """Request a transition by its label, wait for the answer and ask for the state after it.
@@ -140,8 +140,10 @@ class LifecycleClient:
             ServiceMissing: there is no such lifecycle node.
             NoAnswer: no answer, and the node does not tell its state any more either.
         """
-        before = self.state(within, give_up)
-        offered = tuple(self.available(within, give_up))
+        transitions = self._offered(within, give_up)
+        # Each names the state it starts from; only a finalized node offers none.
+        before = str(transitions[0].start_state.label) if transitions else self.state(within, give_up)
+        offered = tuple(str(item.transition.label) for item in transitions)
         if label not in offered:
             return Requested(label, before, before, offered, success=False)
         self._observer.wait(lambda: self._events.matched > 0, MATCH_SECONDS, give_up)
@@ -180,6 +182,10 @@ class LifecycleClient:
     def listening(self) -> bool:
         """Whether the node's event publisher is matched, so that no later change is missed."""
         return self._events.matched > 0
+
+    def _offered(self, within: float, give_up: GiveUp) -> list[Any]:
+        reply = self._ask(GetAvailableTransitions, GetAvailableTransitions.Request(), within, give_up)
+        return list(reply.available_transitions)
 
     def _ask(self, srv_type: type, request: Any, within: float, give_up: GiveUp) -> Any:
         # Questions change nothing, so a lost first request may be repeated.
