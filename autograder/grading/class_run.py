@@ -13,7 +13,6 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from autograder.grading import stage_a, stage_b
 from autograder.grading.collect import collect
 from autograder.grading.stage_a import Settings
-from autograder.report.terminal import points_text
 from autograder.results import SubmissionResult
 from autograder.submission.lab import load_lab
 
@@ -60,7 +59,7 @@ class _Steps:
         self.done += 1
         self.progress.update(self.task, advance=1, last=last)
         if announce and not self.console.is_terminal:
-            self.console.print(f"{self.done}/{self.total} {last}", markup=False, highlight=False)
+            self.console.print(f"{self.done}/{self.total} {last}", markup=False, soft_wrap=True)
 
 
 def grade_class(root: Path, lab_name: str, source: Path, settings: Settings) -> ClassRun:
@@ -83,8 +82,7 @@ def grade_class(root: Path, lab_name: str, source: Path, settings: Settings) -> 
     with _Steps("running", len(collected.notebooks), console) as steps:
 
         def finished(result: SubmissionResult) -> None:
-            checks = " ".join(points_text(check) for check in result.checks)
-            steps.step(f"{result.student} {checks}", announce=True)
+            steps.step(f"{result.student} {result.points:g}/{result.max_points:g}", announce=True)
 
         try:
             results = stage_a.run_class(collected.notebooks, root, lab, settings, finished)
