@@ -1,0 +1,227 @@
+"""Launch files in ROS 2's YAML schema: what they start, and what is said of those that cannot be read."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import nbformat
+import pytest
+import rclpy
+from rclpy.node import Node
+from sample_class import ROOT
+
+from autograder.launch_files import FILE_BYTES, LaunchedNode, LaunchFileError, ParamsFile, read_launch_file
+from autograder.submission.lab import load_lab
+from autograder.submission.magics import parse
+
+CAMERA = '- node: {pkg: "camera_lab", exec: "camera_demo"'
+
+
+def read(folder: Path, text: str, **arguments: str) -> list[LaunchedNode]:
+    def find(package: str) -> Path:
+        return {"camera_lab": folder}[package]
+
+    (folder / "a.launch.yaml").write_text(text)
+    return read_launch_file(folder / "a.launch.yaml", arguments, find)
+
+
+def refusal(folder: Path, text: str, **arguments: str) -> str:
+    with pytest.raises(LaunchFileError) as caught:
+        read(folder, text, **arguments)
+    return str(caught.value)
+
+
+def test_a_node_gets_its_name_namespace_rules_and_parameters_in_order(tmp_path: Path) -> None:
+    (tmp_path / "camera.params.yaml").write_text("")
+    [node] = read(
+        tmp_path,
+        """
+launch:
+- node:
+    pkg: "camera_lab"
+    exec: "camera_demo"
+    name: "rear_demo"
+    namespace: "vehicle/back"
+    args: "--verbose 'two words'"
+    remap:
+    - {from: "a", to: "b"}
+    - {from: "c", to: "d"}
+    param:
+    - {name: "rate", value: 5}
+    - {from: "$(dirname)/camera.params.yaml"}
+    - {name: "gain", value: 2.0}
+""",
+    )
+    assert (node.program, node.name, node.namespace) == ("camera_demo", "rear_demo", "/vehicle/back")
+    assert node.arguments == ["--verbose", "two words"]
+    assert isinstance(node.parameters[1], ParamsFile)
+    assert node.ros_arguments() == [
+        *("-r", "__node:=rear_demo", "-r", "__ns:=/vehicle/back", "-r", "a:=b", "-r", "c:=d"),
+        *("-p", "rate:=5", "--params-file", "camera.params.yaml", "-p", "gain:=2.0"),
+    ]
+
+
+def test_arguments_have_defaults_and_are_given_from_outside(tmp_path: Path) -> None:
+    text = 'launch:\n- arg: {name: "side", default: "left"}\n' + CAMERA + ', name: "$(var side)_demo"}\n'
+    assert [node.name for node in read(tmp_path, text)] == ["left_demo"]
+    assert [node.name for node in read(tmp_path, text, side="right")] == ["right_demo"]
+
+
+def test_an_argument_without_a_value_is_named(tmp_path: Path) -> None:
+    assert "`side` has no value" in refusal(tmp_path, 'launch:\n- arg: {name: "side"}\n')
+
+
+@pytest.mark.parametrize(
+    ("written", "value"),
+    [
+        ("40", 40),
+        ('"40"', 40),
+        ('"$(var rate)"', 25),
+        ('"$(var rate).0"', 25.0),
+        ("\"'40'\"", "40"),
+        ('"$(var side)_camera"', "rear_camera"),
+        ("true", True),
+        ("[1, 2]", [1, 2]),
+        ('"[1, 2]"', [1, 2]),
+    ],
+)
+def test_a_parameter_keeps_its_type_and_a_text_is_read_as_yaml(tmp_path: Path, written: str, value: object) -> None:
+    text = f"launch:\n{CAMERA}, param: [{{name: p, value: {written}}}]}}\n"
+    [node] = read(tmp_path, text, rate="25", side="rear")
+    assert node.parameters[0].model_dump() == {"name": "p", "value": value}
+
+
+def test_nested_parameters_become_dotted_names(tmp_path: Path) -> None:
+    text = (
+        f"launch:\n{CAMERA}, param: [{{name: limits, param: [{{name: top, value: 1}}, {{name: low, value: 0}}]}}]}}\n"
+    )
+    [node] = read(tmp_path, text)
+    assert node.ros_arguments() == ["-p", "limits.top:=1", "-p", "limits.low:=0"]
+
+
+def test_a_pushed_namespace_ends_with_its_group(tmp_path: Path) -> None:
+    text = f"""
+launch:
+- group:
+  - push_ros_namespace: {{namespace: "outer"}}
+  - group:
+    - push-ros-namespace: {{namespace: "inner"}}
+    {CAMERA}}}
+    {CAMERA}, namespace: "below"}}
+    {CAMERA}, namespace: "/absolute"}}
+  {CAMERA}}}
+{CAMERA}}}
+"""
+    spaces = [node.namespace for node in read(tmp_path, text)]
+    assert spaces == ["/outer/inner", "/outer/inner/below", "/absolute", "/outer", ""]
+
+
+def test_rules_and_parameters_of_a_group_come_before_those_of_its_nodes(tmp_path: Path) -> None:
+    text = f"""
+launch:
+- group:
+  - set_remap: {{from: "a", to: "b"}}
+  - set_parameter: {{name: "p", value: 1}}
+  {CAMERA}, remap: [{{from: "a", to: "c"}}], param: [{{name: "p", value: 2}}]}}
+{CAMERA}}}
+"""
+    inside, outside = read(tmp_path, text)
+    assert inside.ros_arguments() == ["-r", "a:=b", "-r", "a:=c", "-p", "p:=1", "-p", "p:=2"]
+    assert outside.ros_arguments() == []
+
+
+@pytest.mark.parametrize(
+    ("condition", "starts"), [("if: true", 1), ('if: "$(var on)"', 0), ('unless: "$(var on)"', 1), ("unless: 1", 0)]
+)
+def test_conditions(tmp_path: Path, condition: str, starts: int) -> None:
+    assert len(read(tmp_path, f"launch:\n{CAMERA}, {condition}}}\n", on="False")) == starts
+
+
+def test_what_an_included_file_sets_stays_set_unless_a_group_holds_it(tmp_path: Path) -> None:
+    (tmp_path / "inner.launch.yaml").write_text(
+        'launch:\n- arg: {name: "side"}\n- push_ros_namespace: {namespace: "$(var side)"}\n' + CAMERA + "}\n"
+    )
+    include = (
+        '- include: {file: "$(find-pkg-share camera_lab)/launch/inner.launch.yaml", arg: [{name: side, value: a}]}\n'
+    )
+    leaks = read(tmp_path, f"launch:\n{include}{CAMERA}, name: $(var side)}}\n")
+    assert [node.namespace for node in leaks] == ["/a", "/a"]
+    held = read(tmp_path, f"launch:\n- group:\n  {include}{CAMERA}}}\n")
+    assert [node.namespace for node in held] == ["/a", ""]
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("launch:\n- node:\n\tpkg: x\n", "line 3: it is not YAML"),
+        ("- node: {}\n", "one key at the top"),
+        ("launch: {node: {}}\n", "one key at the top"),
+        ("launch:\n- node: {pkg: camera_lab, exec: a}\n  name: x\n", "entry 1: each entry"),
+        ("launch:\n- node: {pkg: camera_lab}\n", "the key `exec` is missing"),
+        ("launch:\n- node: {pkg: other, exec: a}\n", "there is no package `other`"),
+        (f"launch:\n{CAMERA}, remaps: []}}\n", "the key `remaps` is unknown or not covered"),
+        (f"launch:\n{CAMERA}, remap: {{from: a, to: b}}}}\n", "remap: a list is expected"),
+        (f"launch:\n{CAMERA}, remap: [{{from: a}}]}}\n", "remap (entry 1): the key `to` is missing"),
+        (f"launch:\n{CAMERA}, name: 2nd}}\n", "`2nd` cannot name a node"),
+        (f"launch:\n{CAMERA}, name: /front}}\n", "`/front` cannot name a node"),
+        (f"launch:\n{CAMERA}, namespace: front-left}}\n", "`/front-left` cannot be a namespace"),
+        (f"launch:\n{CAMERA}, name: $(var side)}}\n", "no launch argument `side`"),
+        (f'launch:\n{CAMERA}, name: "$(env HOME)"}}\n', "`$(env HOME)` is not covered"),
+        (f'launch:\n{CAMERA}, name: "$(var side"}}\n', "never closed"),
+        (f"launch:\n{CAMERA}, if: maybe}}\n", "a condition is true, false"),
+        ("launch:\n- arg: {name: rate, default: 10}\n", "`10` is a number; the launch schema wants a text"),
+        ("launch:\n- executable: {cmd: ls}\n", "`executable` is not covered"),
+        ("launch:\n- include: {file: other.launch.yaml}\n", "there is no file `other.launch.yaml`"),
+        ("launch:\n- include: {file: /etc/passwd}\n", "there is no file `/etc/passwd`"),
+        ("launch:\n- include: {file: $(dirname)/a.launch.yaml}\n", "more than 8 deep"),
+        ("launch: &all\n- group: *all\n", "aliases (`*name`) are not covered"),
+        (f"launch:\n{CAMERA}, param: [{{name: p, value: {{}}}}]}}\n", "a parameter is a bool"),
+        ("launch:\n" + f"{CAMERA}}}\n" * 33, "more than 32 nodes"),
+        ("launch: [" + "[" * 5000 + "]" * 5000 + "]", "it is not YAML"),
+        ("#" * (FILE_BYTES + 1), "larger than 64 KiB"),
+    ],
+)
+def test_what_cannot_be_read_is_said_with_its_place(tmp_path: Path, text: str, told: str) -> None:
+    message = refusal(tmp_path, text)
+    assert told in message
+    assert message.startswith("a.launch.yaml")
+
+
+def test_a_file_that_is_missing(tmp_path: Path) -> None:
+    with pytest.raises(LaunchFileError, match="there is no such file"):
+        read_launch_file(tmp_path / "a.launch.yaml", {})
+
+
+def test_a_real_node_takes_every_value_with_its_type(tmp_path: Path) -> None:
+    values = {"i": 40, "d": 40.0, "s": "40", "b": False, "words": ['a "quoted" word', "b"], "numbers": [1.0, 2.5]}
+    listed = ", ".join(
+        f"{{name: {name}, value: {value!r}}}" if name != "s" else "{name: s, value: \"'40'\"}"
+        for name, value in values.items()
+        if name not in ("words", "b")
+    )
+    text = f"launch:\n{CAMERA}, name: x, namespace: y, param: [{listed}, {{name: b, value: false}}"
+    text += ", {name: words, value: ['a \"quoted\" word', b]}]}\n"
+    [launched] = read(tmp_path, text)
+    context = rclpy.Context()
+    rclpy.init(context=context, args=["x", "--ros-args", *launched.ros_arguments()])
+    node = Node("camera_demo", context=context)
+    try:
+        assert node.get_fully_qualified_name() == "/y/x"
+        assert {name: node.declare_parameter(name, value).value for name, value in values.items()} == values
+    finally:
+        node.destroy_node()
+        rclpy.try_shutdown(context=context)
+
+
+@pytest.mark.parametrize("sides", [{}, {"vehicle": "car"}])
+def test_the_labs_own_launch_files_can_be_read(tmp_path: Path, sides: dict[str, str]) -> None:
+    for cell in nbformat.read(load_lab(ROOT, "lab3_remapping").notebook, as_version=4).cells:
+        file = parse(cell.source) if cell.cell_type == "code" else None
+        if file and file.name.endswith(".launch.yaml"):
+            text = "\n".join(line for line in file.text.splitlines() if "### " not in line)
+            (tmp_path / file.name).write_text(text)
+    nodes = read_launch_file(tmp_path / "vehicle.launch.yaml", sides)
+    space = sides.get("vehicle", "vehicle")
+    assert [f"{node.namespace}/{node.name}" for node in nodes] == [
+        f"/{space}/{side}_demo" for side in ("right", "left", "rear")
+    ]

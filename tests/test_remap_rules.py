@@ -1,0 +1,177 @@
+"""Why a remap rule or a parameter file did nothing: each reason is held against what the real rclpy does."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+import rclpy
+from rclpy.node import Node
+from std_msgs.msg import String
+
+from autograder.checks import command_line, session
+from autograder.checks.command_line import CommandLineError
+from autograder.graph import params_file, remap_rules
+from autograder.results import Isolation
+
+
+@contextmanager
+def started(*words: str) -> Iterator[Node]:
+    """A camera with these words after `--ros-args`."""
+    context = rclpy.Context()
+    rclpy.init(context=context, args=["camera", "--ros-args", *words])
+    node = Node("camera_demo", context=context)
+    node.create_publisher(String, "camera/image_color", 1)
+    node.create_publisher(String, "~/status", 1)
+    try:
+        yield node
+    finally:
+        node.destroy_node()
+        rclpy.try_shutdown(context=context)
+
+
+def names(rules: list[str]) -> tuple[str, list[str]]:
+    with started(*(word for rule in rules for word in ("-r", rule))) as node:
+        own = [publisher.topic_name for publisher in node.publishers]
+        return node.get_fully_qualified_name(), [name for name in own if name not in ("/rosout", "/parameter_events")]
+
+
+@pytest.mark.parametrize(
+    ("rule", "code"),
+    [
+        ("__node:=/front", "slash-in-node-name"),
+        ("__ns:=front", "namespace-without-slash"),
+        ("__ns:=/2nd", "begins-with-digit"),
+        ("__node:=2nd", "begins-with-digit"),
+        ("a:=front/2nd", "begins-with-digit"),
+        ("__node:=front-demo", "name-characters"),
+        ("*/a:=b", "wildcard"),
+        ("a=b", "rule-form"),
+    ],
+)
+def test_a_rule_that_rcl_refuses_is_explained(rule: str, code: str) -> None:
+    with pytest.raises(Exception, match="arse remap rule"):
+        names([rule])
+    reason = remap_rules.refused(["a:=b", rule])
+    assert reason is not None
+    assert reason[1] == code
+
+
+@pytest.mark.parametrize(
+    "rule",
+    ["a:=b", "~/a:=/b", "/a/b:=c_2", "camera:a:=b", "__ns:=/x/y", "camera_demo:__node:=x", "rostopic://a:=b", "a:=~/b"],
+)
+def test_a_rule_that_rcl_takes_is_not_blamed(rule: str) -> None:
+    names([rule])
+    assert remap_rules.refused([rule]) is None
+
+
+@pytest.mark.parametrize(
+    ("rules", "wanted", "code"),
+    [
+        (["camera/image_colour:=image"], "/image", "rule-without-match"),
+        (["image_color:=image"], "/image", "rule-without-match"),
+        (["camera/image_color:=a", "a:=image"], "/image", "rules-do-not-chain"),
+        (["a:=image", "camera/image_color:=a"], "/image", "rules-do-not-chain"),
+        (["camera/image_color:=a", "camera/image_color:=image"], "/image", "rule-order"),
+        (["__node:=rear", "camera_demo:camera/image_color:=image"], "/image", "rule-prefix"),
+        (["__node:=rear", "/camera_demo/status:=image"], "/image", "private-rule"),
+        (["__node:=rear", "camera_demo/status:=image"], "/image", "private-rule"),
+        (["__ns:=/x", "/camera/image_color:=image"], "/x/image", "absolute-rule"),
+    ],
+)
+def test_a_rule_without_effect_is_explained(rules: list[str], wanted: str, code: str) -> None:
+    node, topics = names(rules)
+    assert wanted not in topics
+    reason = remap_rules.without_effect(rules, wanted, [node], topics)
+    assert reason is not None
+    assert reason[1] == code
+
+
+def test_an_absolute_name_in_the_code_is_told_from_a_wrong_rule() -> None:
+    reason = remap_rules.without_effect(["camera:=image"], "/x/image", ["/x/demo"], ["/camera"])
+    assert reason is not None
+    assert reason[1] == "absolute-name"
+
+
+def test_rules_that_have_nothing_to_do_with_the_wanted_name_are_not_blamed() -> None:
+    assert remap_rules.without_effect(["a:=b"], "/image", ["/camera_demo"], ["/camera"]) is None
+
+
+@pytest.mark.parametrize(
+    ("key", "reached"),
+    [
+        ("camera_demo", False),
+        ("right_demo", False),
+        ("/vehicle/camera_demo", False),
+        ("/*", False),
+        ("/vehicle/right_demo", True),
+        ("vehicle/right_demo", True),
+        ("/vehicle/*", True),
+        ("/vehicle/**", True),
+        ("/**/right_demo", True),
+        ("/*/right_demo", True),
+        ("/**", True),
+    ],
+)
+def test_a_parameter_files_key_is_matched_as_rcl_does(tmp_path: Path, key: str, reached: bool) -> None:
+    text = f"{key}:\n  ros__parameters:\n    rate: 40\n"
+    (tmp_path / "p.yaml").write_text(text)
+    words = ["-r", "__ns:=/vehicle", "-r", "__node:=right_demo", "--params-file", str(tmp_path / "p.yaml")]
+    with started(*words) as node:
+        assert (node.declare_parameter("rate", 10).value == 40) is reached
+    assert (params_file.why_not_reached(text, "/vehicle/right_demo") is None) is reached
+
+
+def test_nested_keys_of_a_parameter_file_are_joined() -> None:
+    assert params_file.node_keys("vehicle:\n  right:\n    ros__parameters: {a: 1}\n/b:\n  ros__parameters: {}\n") == [
+        "/vehicle/right",
+        "/b",
+    ]
+
+
+@pytest.fixture
+def table(tmp_path: Path) -> Iterator[Path]:
+    before = session.current.folder
+    session.current.configure(tmp_path, Isolation.NONE, seed=1)
+    yield tmp_path / "rules.yaml"
+    session.current.configure(before, Isolation.NONE, seed=1)
+
+
+@pytest.mark.parametrize(
+    "text", ["-r a:=b -p c:=1", "--ros-args -r a:=b -p c:=1", '"-r  a:=b\\n-p c:=1"', ">-\n  -r a:=b\n  -p c:=1"]
+)
+def test_a_command_line_is_split_as_a_shell_does(table: Path, text: str) -> None:
+    table.write_text(f"front: {text}\n")
+    assert command_line("rules.yaml", "front").words() == ["-r", "a:=b", "-p", "c:=1"]
+    assert command_line("rules.yaml", "front", then=["-r", "x:=y"]).words()[-2:] == ["-r", "x:=y"]
+
+
+@pytest.mark.parametrize(
+    ("text", "code"),
+    [
+        ("other: x\n", "unanswered"),
+        ('front: "?"\n', "unanswered"),
+        ("front:\n", "unanswered"),
+        ("front: [a, b]\n", "command-line"),
+        ("front: a:=b\n", "command-line"),
+        ("front: -r\n", "command-line"),
+        ("front: -r a:=b c:=d\n", "command-line"),
+        ("front: --enable-stdout-logs x\n", "command-line"),
+        ('front: "-r \'a"\n', "command-line"),
+        ("front: -r a: b\n", "not-yaml"),
+        ("- front\n", "unanswered"),
+    ],
+)
+def test_words_that_are_no_ros_arguments_are_refused_with_a_reason(table: Path, text: str, code: str) -> None:
+    table.write_text(text)
+    with pytest.raises(CommandLineError) as caught:
+        command_line("rules.yaml", "front").words()
+    assert caught.value.code == code
+
+
+def test_a_missing_table_is_told(table: Path) -> None:
+    with pytest.raises(CommandLineError, match=r"%%file rules\.yaml"):
+        command_line("rules.yaml", "front").words()
