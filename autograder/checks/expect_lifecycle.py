@@ -14,6 +14,9 @@ from autograder.graph.lifecycle import Change, LifecycleClient, Requested, in_or
 from autograder.graph.parameters import NoAnswer
 from autograder.graph.services import ServiceMissing
 
+WORD_FROM_INSIDE = 0.5
+"""Seconds that a failed check waits for what the student's process says about it."""
+
 
 class LifecycleExpectations(GraphExpectations):
     """What state a node must be in, and how it got there."""
@@ -67,11 +70,16 @@ class LifecycleExpectations(GraphExpectations):
         )
 
     def _why_state(self, node: str, seen: str, wanted: str) -> Diagnosis:
-        return (
-            diagnosis.program_trouble(self.scene())
-            or diagnosis.inside_reason(self.scene())
-            or Diagnosis(f"`{node}` is {seen}, not {wanted}.", "state")
-        )
+        return self._trouble() or Diagnosis(f"`{node}` is {seen}, not {wanted}.", "state")
+
+    def _trouble(self) -> Diagnosis | None:
+        """What the programs say of themselves: it takes another way than the node's answer, and may come later."""
+
+        def look() -> Diagnosis | None:
+            return diagnosis.program_trouble(self.scene()) or diagnosis.inside_reason(self.scene())
+
+        self.observer.wait(look, WORD_FROM_INSIDE)
+        return look()
 
     def available_transitions(self, node: str, *, within: float = WITHIN) -> Mapping[str, str]:
         """Labels of the transitions that a node offers now, each with the state it leads to."""
@@ -113,8 +121,7 @@ class LifecycleExpectations(GraphExpectations):
         if expect == "success" and not done.success:
             self.fail(
                 title,
-                diagnosis.program_trouble(self.scene())
-                or diagnosis.inside_reason(self.scene())
+                self._trouble()
                 or Diagnosis(
                     f"The callback of {label} did not return SUCCESS; the node is {done.after} now.",
                     "transition-failed",
@@ -148,11 +155,7 @@ class LifecycleExpectations(GraphExpectations):
         self.expect_that(
             seen == list(steps),
             f"`{node}` goes " + ", ".join(f"{a} to {b}" for a, b in steps),
-            lambda: (
-                diagnosis.program_trouble(self.scene())
-                or diagnosis.inside_reason(self.scene())
-                or Diagnosis(f"It went {told}.", "transitions")
-            ),
+            lambda: self._trouble() or Diagnosis(f"It went {told}.", "transitions"),
             expected=", ".join(f"{a} to {b}" for a, b in steps),
             observed=told,
             hint=hint,
