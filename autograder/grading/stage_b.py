@@ -32,11 +32,12 @@ def prepare_nbgrader() -> None:
         os.environ["PATH"] = tools + os.pathsep + os.environ.get("PATH", "")
 
 
-def _api(root: Path, **directories: Any) -> Any:
+def _api(root: Path, gradebook: bool = True, **directories: Any) -> Any:
     """Return nbgrader's API with the course's stages.
 
     Args:
         root: of the course.
+        gradebook: False generates labs without noting them in it.
         directories: settings of nbgrader's CourseDirectory to replace.
     """
     prepare_nbgrader()
@@ -44,10 +45,12 @@ def _api(root: Path, **directories: Any) -> Any:
     from nbgrader.coursedir import CourseDirectory
     from traitlets.config import Config
 
-    from autograder.grading.stages import configure
+    from autograder.grading.stages import configure, leave_gradebook_alone
 
     config = Config()
     configure(config, root)
+    if not gradebook:
+        leave_gradebook_alone(config)
     config.NbGraderAPI.log_level = logging.ERROR
     # What nbgrader logs is read from its answers; it shall not also go to the terminal.
     logging.getLogger("traitlets").addHandler(logging.NullHandler())
@@ -57,8 +60,8 @@ def _api(root: Path, **directories: Any) -> Any:
     return NbGraderAPI(CourseDirectory(config=config), config=config)
 
 
-def generate(root: Path, lab: str, into: Path, database: Path) -> Path:
-    """Generate what students receive of a lab, and note its cells in a gradebook.
+def generate(root: Path, lab: str, into: Path, gradebook: bool) -> Path:
+    """Generate what students receive of a lab, and note its cells in the course's gradebook if asked to.
 
     Returns:
         The folder of the generated lab.
@@ -66,13 +69,13 @@ def generate(root: Path, lab: str, into: Path, database: Path) -> Path:
     Raises:
         KitError: nbgrader refuses.
     """
-    api = _api(root, release_directory=str(into), db_url=f"sqlite:///{database}", ignore=_NOT_RELEASED)
+    api = _api(root, gradebook, release_directory=str(into), ignore=_NOT_RELEASED)
     answer = api.generate_assignment(lab, force=True, create=True)
     if not answer["success"]:
         if "there are submissions associated" in answer.get("log", "") + answer["error"]:
             raise KitError(
-                f"The graded cells of {lab} are not those that {database} has grades for.",
-                f"Move {database} away, then grade again.",
+                f"The graded cells of {lab} are not those that build/gradebook.db has grades for.",
+                f"Move {root / 'build' / 'gradebook.db'} away, then grade again.",
             )
         raise KitError(f"nbgrader could not generate {lab}.", _last_error(answer))
     return into / lab
@@ -92,8 +95,8 @@ def _last_error(answer: dict[str, Any]) -> str:
     return (telling or lines or ["no reason given"])[-1]
 
 
-def release(root: Path, lab: str) -> Path:
-    """Generate `labs/<lab>` from `solutions/<lab>`; equal sources give equal files. Returns the folder.
+def released_files(root: Path, lab: str) -> dict[Path, bytes]:
+    """Return what students receive of a lab, by path below `labs/<lab>`; equal sources give equal files.
 
     Raises:
         KitError: there is no such lab under `solutions`, or nbgrader refuses.
@@ -101,13 +104,21 @@ def release(root: Path, lab: str) -> Path:
     if not (root / "solutions" / lab / f"{lab}.ipynb").is_file():
         raise KitError(f"There is no solutions/{lab}/{lab}.ipynb.", "Name a folder under `solutions`.")
     with tempfile.TemporaryDirectory() as folder:
-        made = generate(root, lab, Path(folder) / "labs", Path(folder) / "gradebook.db")
-        for path in sorted(made.rglob("*")):
-            if path.is_file():
-                content = path.read_bytes()
-                if path.suffix == ".ipynb" and not content.endswith(b"\n"):
-                    content += b"\n"
-                write_beside(root / "labs" / lab / path.relative_to(made), content)
+        made = generate(root, lab, Path(folder), gradebook=False)
+        files = {path.relative_to(made): path.read_bytes() for path in sorted(made.rglob("*")) if path.is_file()}
+    return {
+        path: content if path.suffix != ".ipynb" else content.rstrip(b"\n") + b"\n" for path, content in files.items()
+    }
+
+
+def release(root: Path, lab: str) -> Path:
+    """Write `labs/<lab>` and return that folder.
+
+    Raises:
+        KitError: there is no such lab under `solutions`, or nbgrader refuses.
+    """
+    for path, content in released_files(root, lab).items():
+        write_beside(root / "labs" / lab / path, content)
     return root / "labs" / lab
 
 
@@ -118,7 +129,7 @@ def register(root: Path, lab: str) -> None:
         KitError: the gradebook has grades for other cells.
     """
     with tempfile.TemporaryDirectory() as folder:
-        generate(root, lab, Path(folder), root / "build" / "gradebook.db")
+        generate(root, lab, Path(folder), gradebook=True)
 
 
 def before_autograde(assignment: str, student: str, notebooks: list[str]) -> None:

@@ -1,0 +1,42 @@
+"""What students receive is what the sources give: `labs/` is generated, never edited."""
+
+from __future__ import annotations
+
+import functools
+from pathlib import Path
+
+import pytest
+
+from autograder.grading import stage_b
+from autograder.submission.lab import CODE_STUB, load_lab
+
+ROOT = Path(__file__).resolve().parent.parent
+released_files = functools.cache(stage_b.released_files)
+LABS = sorted(path.parent.name for path in (ROOT / "solutions").glob("*/*.ipynb"))
+
+
+@pytest.mark.parametrize("lab", LABS)
+def test_labs_are_as_generated(lab: str) -> None:
+    made = released_files(ROOT, lab)
+    there = {path.relative_to(ROOT / "labs" / lab) for path in (ROOT / "labs" / lab).rglob("*") if path.is_file()}
+    # Running a lab writes its programs to `nodes`; editors leave folders that begin with a dot.
+    there = {path for path in there if path.parts[0] != "nodes" and not path.parts[0].startswith(".")}
+    assert there == made.keys(), f"run: autograder release {lab}"
+    for path, content in made.items():
+        assert (ROOT / "labs" / lab / path).read_bytes() == content, f"{path} differs; run: autograder release {lab}"
+
+
+@pytest.mark.parametrize("lab", LABS)
+def test_students_receive_neither_solutions_nor_hidden_tests(lab: str) -> None:
+    text = b"".join(released_files(ROOT, lab).values()).decode()
+    for mark in ("BEGIN HIDDEN TESTS", "BEGIN SOLUTION", "END SOLUTION", "BEGIN MARK SCHEME"):
+        assert mark not in text
+    assert CODE_STUB in text
+    # Besides the notebook nothing may lie in a lab's folder that its author has not meant to give out.
+    assert not [path for path in released_files(ROOT, lab) if path.suffix in (".py", ".pyc", ".db")]
+
+
+@pytest.mark.parametrize("lab", LABS)
+def test_every_answer_that_names_a_file_still_does_when_blank(lab: str) -> None:
+    for answer in load_lab(ROOT, lab).answers.values():
+        assert answer.cell_type == "markdown" or answer.file is not None, answer.grade_id
