@@ -33,7 +33,7 @@ LEAST_FIGURE = 360  # a figure is not shrunk below this height to share a slide
 LEAST_LISTING = 220  # nor does a listing begin in less room than this
 TEXT_LINE, TEXT_COLUMNS, TEXT_GAP = 38, 74, 16
 CODE_LINE, CODE_COLUMNS, CODE_GAP = 26, 93, 34
-ROW_LINE, ROW_COLUMNS, ROW_GAP = 29, 96, 15
+ROW_LINE, ROW_COLUMNS, ROW_GAP = 29, 102, 15
 ADMONITION = 70  # title, padding and margin
 
 logger = logging.getLogger(__name__)
@@ -140,7 +140,10 @@ def pieces(block: nodes.Element, room: int) -> Iterator[nodes.Element]:
     elif isinstance(block, nodes.literal_block):
         text = block.astext().splitlines()
         while text:
-            end = cut(text, (room - CODE_GAP) // CODE_LINE)
+            most = (room - CODE_GAP) // CODE_LINE
+            end = cut(text, most)
+            if 0 < len(text) - end < 6:  # not the last few lines alone
+                end = cut(text, most - 6)
             part = block.copy()
             part += nodes.Text("\n".join(text[:end]))
             part.rawsource = part.astext()
@@ -176,18 +179,26 @@ def cut(text: list[str], most: int) -> int:
     return blank[-1] if blank else end
 
 
-def grouped(items: list[Any], heights: list[int], extra: int) -> Iterator[list[Any]]:
-    """Return items in groups, each with `extra` pixels more and no higher than a slide."""
-    group: list[Any] = []
-    used = extra
+def grouped(items: list[Any], heights: list[int], extra: int) -> list[list[Any]]:
+    """Return items in as few groups as fit slides, of about the same height; each group needs `extra` pixels more."""
+    fewest = len(filled(items, heights, ROOM - extra))
+    room = sum(heights) // fewest
+    while len(groups := filled(items, heights, room)) > fewest:
+        room += 10
+    return groups
+
+
+def filled(items: list[Any], heights: list[int], room: int) -> list[list[Any]]:
+    """Return items in groups, each as full as `room` pixels allow."""
+    groups: list[list[Any]] = []
+    used = 0
     for item, need in zip(items, heights, strict=True):
-        if group and used + need > ROOM:
-            yield group
-            group, used = [], extra
-        group.append(item)
+        if not groups or used + need > room:
+            groups.append([])
+            used = 0
+        groups[-1].append(item)
         used += need
-    if group:
-        yield group
+    return groups
 
 
 def table_pieces(table: nodes.table) -> Iterator[nodes.table]:
@@ -195,7 +206,7 @@ def table_pieces(table: nodes.table) -> Iterator[nodes.table]:
     head = sum(row_height(row) for thead in table.findall(nodes.thead) for row in thead.children) + TEXT_GAP
     body = next(table.findall(nodes.tbody))
     rows = list(body.children)
-    for group in list(grouped(list(range(len(rows))), [row_height(row) for row in rows], head)):
+    for group in grouped(list(range(len(rows))), [row_height(row) for row in rows], head):
         part = table.deepcopy()
         body = next(part.findall(nodes.tbody))
         body.children = [row for number, row in enumerate(body.children) if number in group]
@@ -228,14 +239,13 @@ def paginate(section: nodes.Element) -> None:
         for part in pieces(block, ROOM - used if alone else ROOM):
             need = height(part)
             if page and used + need > ROOM:
-                # A line of text that leads to what comes next goes with it.
-                lead = page.pop() if len(page) > 1 and leads(page[-1]) else None
-                if lead is not None:
-                    used -= height(lead)
+                # A line of text goes with what it leads to, an output with the text that explains it.
+                carried = page[-1:] if len(page) > 1 and (leads(page[-1]) or short_output(page[-1])) else []
+                page = page[: len(page) - len(carried)]
+                used -= sum(height(block) for block in carried)
                 close()
                 result.append(revealjs_break())
-                if lead is not None:
-                    page, used = [lead], height(lead)
+                page, used = carried, sum(height(block) for block in carried)
             page.append(part)
             used += need
     close()
@@ -248,6 +258,11 @@ def paginate(section: nodes.Element) -> None:
 def leads(block: nodes.Element) -> bool:
     """Return whether a block is a short text before what it announces."""
     return isinstance(block, nodes.paragraph) and height(block) <= 2 * TEXT_LINE + TEXT_GAP
+
+
+def short_output(block: nodes.Element) -> bool:
+    """Return whether a block is a cell's output of a few lines of text."""
+    return block.get("nb_element") == "cell_code_output" and not any(block.findall(nodes.image)) and height(block) < 260
 
 
 def on_resolved(app: Sphinx, doctree: nodes.document, docname: str) -> None:
