@@ -70,9 +70,9 @@ class LifecycleExpectations(GraphExpectations):
         )
 
     def _why_state(self, node: str, seen: str, wanted: str) -> Diagnosis:
-        return self._trouble() or Diagnosis(f"`{node}` is {seen}, not {wanted}.", "state")
+        return self._what_they_say() or Diagnosis(f"`{node}` is {seen}, not {wanted}.", "state")
 
-    def _trouble(self) -> Diagnosis | None:
+    def _what_they_say(self) -> Diagnosis | None:
         """What the programs say of themselves: it takes another way than the node's answer, and may come later."""
 
         def look() -> Diagnosis | None:
@@ -121,7 +121,7 @@ class LifecycleExpectations(GraphExpectations):
         if expect == "success" and not done.success:
             self.fail(
                 title,
-                self._trouble()
+                self._what_they_say()
                 or Diagnosis(
                     f"The callback of {label} did not return SUCCESS; the node is {done.after} now.",
                     "transition-failed",
@@ -155,7 +155,7 @@ class LifecycleExpectations(GraphExpectations):
         self.expect_that(
             seen == list(steps),
             f"`{node}` goes " + ", ".join(f"{a} to {b}" for a, b in steps),
-            lambda: self._trouble() or Diagnosis(f"It went {told}.", "transitions"),
+            lambda: self._what_they_say() or Diagnosis(f"It went {told}.", "transitions"),
             expected=", ".join(f"{a} to {b}" for a, b in steps),
             observed=told,
             hint=hint,
