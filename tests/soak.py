@@ -109,7 +109,7 @@ def differing(kinds: set[Signature]) -> set[str]:
 
 def main() -> int:
     """Run the command; return its exit status."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = argparse.ArgumentParser()
     parser.add_argument("--times", type=int, default=20)
     parser.add_argument("--lab", choices=kill_matrix.labs(), help="default: every lab that has a sample class")
     options = parser.parse_args()
