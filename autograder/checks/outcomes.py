@@ -49,8 +49,13 @@ def failed(
 
 
 def unknown(title: str, because: str) -> None:
-    """Record that the grader could not find out."""
-    _record(Outcome(status=Status.UNKNOWN, title=title, because=because, code="grader"))
+    """Record that the grader could not find out.
+
+    In a cell with hidden tests the text is for instructors only: it may quote a line or a value of them.
+    """
+    frame = _check_frame()
+    hidden = frame is not None and bool(_hidden_lines(frame))
+    _record(Outcome(status=Status.UNKNOWN, title=title, because=because, code="grader", hidden=hidden))
 
 
 def _record(outcome: Outcome) -> None:
