@@ -109,9 +109,13 @@ def _run_all(browser: Any, address: str) -> list[dict[str, Any]]:
     page.goto(f"{address}lab/tree/{LAB.name}.ipynb?token=lab", timeout=START_SECONDS * 1000)
     page.wait_for_selector(".jp-Notebook .jp-CodeCell", timeout=START_SECONDS * 1000)
     page.wait_for_selector(".jp-Notebook-ExecutionIndicator[data-status='idle']", timeout=START_SECONDS * 1000)
-    page.click("text=Run >> nth=0")
-    page.click("text='Run All Cells'")
     deadline = time.monotonic() + RUN_SECONDS
+    # A menu that is chosen while JupyterLab still connects to the kernel does nothing, without a word.
+    while all("[ ]" in cell["prompt"] for cell in page.evaluate(CELLS)):
+        assert time.monotonic() < deadline, "Run All Cells runs no cell"
+        page.click("text=Run >> nth=0")
+        page.click("text='Run All Cells'")
+        page.wait_for_timeout(3000)
     while any("*" in cell["prompt"] or "[ ]" in cell["prompt"] for cell in page.evaluate(CELLS)):
         assert time.monotonic() < deadline, [c for c in page.evaluate(CELLS) if not re.search(r"\d", c["prompt"])]
         page.wait_for_timeout(200)
