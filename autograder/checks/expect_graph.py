@@ -52,6 +52,8 @@ class GraphExpectations(ExpectationBase):
             )
         self._settle(name)
         if name not in self.observer.nodes() or self._crashed():
+            # A program that dies takes its node off the graph first and prints its traceback after that.
+            self.observer.wait(self._crashed, SETTLE)
             self.fail(
                 title,
                 diagnosis.why_no_node(self.scene(), name),
