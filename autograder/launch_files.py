@@ -4,6 +4,9 @@ Covered: `arg`, `let`, `node`, `group`, `push_ros_namespace`, `set_remap`, `set_
 `if` and `unless`, and the substitutions `$(var …)`, `$(dirname)` and `$(find-pkg-share …)`. What they do here is what
 `ros2 launch` of Jazzy does with them; everything else is refused with a sentence that says where it stands.
 
+Where the real `launch_ros` can be imported (an apt-installed Jazzy), its parser reads each file too, and what it
+refuses is refused here.
+
 A student wrote the file: it is parsed by a safe loader, without aliases (a few lines of which can stand for gigabytes),
 and in the grading sandbox only.
 """
@@ -189,6 +192,7 @@ class _Reader:
                 "Begin with `launch:` and `- node:`.",
             )
         self.run(content["launch"], scope, place.at("launch"), depth)
+        _ask_launch_ros(path)
 
     def run(self, actions: Any, scope: _Scope, place: _Place, depth: int) -> None:
         if not isinstance(actions, list):
@@ -483,6 +487,20 @@ class _Attributes:
             f"the substitution `$({inside})` is not covered here.",
             "Covered are `$(var NAME)`, `$(dirname)` and `$(find-pkg-share PACKAGE)`.",
         )
+
+
+def _ask_launch_ros(path: Path) -> None:
+    """Let the parser of ROS 2 itself read a file, where it is installed; parsing starts and evaluates nothing."""
+    try:
+        import launch_ros  # noqa: F401 (it brings the actions)
+        from launch.frontend import Parser
+    except ImportError:
+        return
+    try:
+        root, parser = Parser.load(str(path))
+        parser.parse_description(root)
+    except Exception as error:
+        raise LaunchFileError(path.name, "", f"`ros2 launch` refuses it: {error}") from None
 
 
 def _namespace(outer: str, inner: str, place: _Place) -> str:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+import types
 from pathlib import Path
 
 import nbformat
@@ -190,6 +192,25 @@ def test_what_cannot_be_read_is_said_with_its_place(tmp_path: Path, text: str, t
 def test_a_file_that_is_missing(tmp_path: Path) -> None:
     with pytest.raises(LaunchFileError, match="there is no such file"):
         read_launch_file(tmp_path / "a.launch.yaml", {})
+
+
+def test_where_launch_ros_is_installed_its_parser_has_a_say(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    class Parser:
+        """Stands in for `launch.frontend.Parser`, which no package index has; it has the same two methods."""
+
+        @classmethod
+        def load(cls, file: str) -> tuple[str, Parser]:
+            return Path(file).read_text(), cls()
+
+        def parse_description(self, root: str) -> None:
+            if "bad" in root:
+                raise ValueError("Unexpected attribute")
+
+    for name in ("launch", "launch.frontend", "launch_ros"):
+        monkeypatch.setitem(sys.modules, name, types.ModuleType(name))
+    monkeypatch.setattr(sys.modules["launch.frontend"], "Parser", Parser, raising=False)
+    assert len(read(tmp_path, f"launch:\n{CAMERA}, name: good}}\n")) == 1
+    assert "`ros2 launch` refuses it: Unexpected attribute" in refusal(tmp_path, f"launch:\n{CAMERA}, name: bad}}\n")
 
 
 def test_a_real_node_takes_every_value_with_its_type(tmp_path: Path) -> None:
