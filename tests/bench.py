@@ -230,7 +230,7 @@ def stock(folder: Path, students: list[str]) -> Measured:
 def main() -> int:
     """Run the command; return its exit status."""
     parser = argparse.ArgumentParser()
-    parser.add_argument("--students", type=int, default=12, help="how many of the class, evenly chosen; 0: all")
+    parser.add_argument("--students", type=int, default=20, help="how many of the class, evenly chosen; 0: all")
     options = parser.parse_args()
     tame = [name for name in sample_class.students(LAB) if name.startswith(("solution", "correct", "blank", "e", "m"))]
     count = options.students or len(tame)
