@@ -100,6 +100,11 @@ def _address(runtime: Path, server: subprocess.Popen[bytes], log: Path) -> str:
     raise AssertionError(f"JupyterLab did not start:\n{log.read_text()[-3000:]}")
 
 
+def kernel_is_idle(kernels: list[dict[str, Any]]) -> bool:
+    """Whether the server says that the page is connected to a kernel that waits for work."""
+    return any(kernel["execution_state"] == "idle" and kernel["connections"] for kernel in kernels)
+
+
 def _run_all(browser: Any, address: str) -> list[dict[str, Any]]:
     """Open the lab, choose Run > Run All Cells, and give its code cells once the last one has been run."""
     page = browser.new_page(viewport={"width": 1400, "height": 900})
@@ -110,15 +115,18 @@ def _run_all(browser: Any, address: str) -> list[dict[str, Any]]:
     page.wait_for_selector(".jp-Notebook .jp-CodeCell", timeout=START_SECONDS * 1000)
     page.wait_for_selector(".jp-Notebook-ExecutionIndicator[data-status='idle']", timeout=START_SECONDS * 1000)
     deadline = time.monotonic() + RUN_SECONDS
-    # A menu that is chosen while JupyterLab still connects to the kernel does nothing, without a word.
+    # What is chosen while JupyterLab still connects to the kernel is not done; a dialog says so, or nothing does.
     while all("[ ]" in cell["prompt"] for cell in page.evaluate(CELLS)):
         assert time.monotonic() < deadline, "Run All Cells runs no cell"
-        page.click("text=Run >> nth=0")
-        page.click("text='Run All Cells'")
-        page.wait_for_timeout(3000)
+        if page.locator(".jp-Dialog").count():
+            page.keyboard.press("Escape")
+        elif kernel_is_idle(page.request.get(f"{address}api/kernels?token=lab").json()):
+            page.click("text=Run >> nth=0")
+            page.click("text='Run All Cells'")
+        page.wait_for_timeout(2000)
     while any("*" in cell["prompt"] or "[ ]" in cell["prompt"] for cell in page.evaluate(CELLS)):
         assert time.monotonic() < deadline, [c for c in page.evaluate(CELLS) if not re.search(r"\d", c["prompt"])]
-        page.wait_for_timeout(200)
+        page.wait_for_timeout(500)
     page.wait_for_selector(".jp-Notebook-ExecutionIndicator[data-status='idle']", timeout=30_000)
     cells: list[dict[str, Any]] = page.evaluate(CELLS)
     screenshot = os.environ.get("LAB_SCREENSHOT")
