@@ -221,7 +221,7 @@ def _callback_failure(program: RunningProgram) -> Diagnosis | None:
                     "Return TransitionCallbackReturn.SUCCESS, FAILURE or ERROR from every path.",
                 )
             return Diagnosis(
-                f"A {kind} callback of `{program.name}`{at} returned {event.get('text', 'the wrong type')}.",
+                f"A {kind + ' ' if kind else ''}callback of `{program.name}`{at} returned {event.get('text', 'the wrong type')}.",
                 "bad-return",
             )
         if event.get("e") == "callback_error":
@@ -236,7 +236,7 @@ def _callback_failure(program: RunningProgram) -> Diagnosis | None:
                 )
             if "ParameterAlreadyDeclared" in error:
                 return Diagnosis(
-                    f"A {kind} callback of `{program.name}`{at} declares a parameter that is declared already "
+                    f"A {kind + ' ' if kind else ''}callback of `{program.name}`{at} declares a parameter that is declared already "
                     f"({source}{error}). A parameter lives as long as its node.",
                     "declared-twice",
                     "Declare parameters in `__init__`, once for all lives of the node.",
