@@ -205,6 +205,7 @@ def _callback_failure(program: RunningProgram) -> Diagnosis | None:
     for event in program.events():
         line, kind = str(event.get("line", "")), str(event.get("kind", ""))
         at = f" ({line})" if line else ""
+        callback = f"A {kind} callback" if kind else "A callback"
         if event.get("e") == "bad_return":
             if kind == "service":
                 return Diagnosis(
@@ -221,7 +222,7 @@ def _callback_failure(program: RunningProgram) -> Diagnosis | None:
                     "Return TransitionCallbackReturn.SUCCESS, FAILURE or ERROR from every path.",
                 )
             return Diagnosis(
-                f"A {kind + ' ' if kind else ''}callback of `{program.name}`{at} returned {event.get('text', 'the wrong type')}.",
+                f"{callback} of `{program.name}`{at} returned {event.get('text', 'the wrong type')}.",
                 "bad-return",
             )
         if event.get("e") == "callback_error":
@@ -236,7 +237,7 @@ def _callback_failure(program: RunningProgram) -> Diagnosis | None:
                 )
             if "ParameterAlreadyDeclared" in error:
                 return Diagnosis(
-                    f"A {kind + ' ' if kind else ''}callback of `{program.name}`{at} declares a parameter that is declared already "
+                    f"{callback} of `{program.name}`{at} declares a parameter that is declared already "
                     f"({source}{error}). A parameter lives as long as its node.",
                     "declared-twice",
                     "Declare parameters in `__init__`, once for all lives of the node.",
@@ -246,8 +247,7 @@ def _callback_failure(program: RunningProgram) -> Diagnosis | None:
                 "service": "The client gets no answer and the node no longer spins.",
                 "lifecycle": "rclpy swallows it without a log line and treats the transition as ERROR.",
             }.get(kind, "It ended the spinning.")
-            which = f"A {kind} callback" if kind else "A callback"
-            return Diagnosis(f"{which} of `{program.name}`{at} raised {source}{error}. {after}", code)
+            return Diagnosis(f"{callback} of `{program.name}`{at} raised {source}{error}. {after}", code)
     return None
 
 
