@@ -5,6 +5,7 @@ Imports stay inside the commands, for `autograder check` shall start at once.
 
 from __future__ import annotations
 
+import os
 import sys
 from enum import StrEnum
 from pathlib import Path
@@ -12,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from autograder.bootstrap import SetUpError, refuse_foreign_ros
 from autograder.errors import KitError
 from autograder.results import Isolation
 
@@ -37,8 +39,10 @@ JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON for a progr
 def main() -> None:
     """Run the command; people get sentences, never a traceback."""
     try:
+        if sys.argv[1:2] != ["doctor"]:  # which reports it among other things
+            refuse_foreign_ros(os.environ)
         app()
-    except KitError as error:
+    except (KitError, SetUpError) as error:
         print(f"error: {error.what}", file=sys.stderr)
         if error.do:
             print(f"  {error.do}", file=sys.stderr)

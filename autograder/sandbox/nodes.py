@@ -347,7 +347,9 @@ class NodeSandbox:
 
         self._todo.put(do)
         os.write(self._wake_write, b"x")
-        done.wait()
+        while not done.wait(0.5):
+            if not self._thread.is_alive():
+                raise KitError("The node sandbox has ended by itself.", "Run the command again.")
         if problem:
             raise problem[0]
 
