@@ -26,7 +26,7 @@ OUTSIDE = """() => Reveal.getSlides().flatMap((slide, number) => {
   const boxes = [...slide.querySelectorAll('*')].map(element => element.getBoundingClientRect());
   const title = slide.querySelector('h1, h2, h3').getBoundingClientRect();
   const right = Math.max(...boxes.map(box => box.right)), bottom = Math.max(...boxes.map(box => box.bottom));
-  const shown = title.top >= 0 && title.height >= 40 && slide.innerText.trim().includes('\\n');
+  const shown = title.top >= 0 && title.height >= 40 && slide.children.length > 1;
   return shown && right <= innerWidth && bottom <= innerHeight
     ? [] : [`slide ${number + 1} "${slide.innerText.slice(0, 40)}" reaches ${right} x ${bottom}, title ${title.top}`];
 })"""
