@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, NoReturn
 
@@ -46,8 +47,6 @@ class ExpectationBase:
 
     def all_ended(self) -> bool:
         """Whether nothing can come any more: every program has ended (or none could be started), a moment ago."""
-        import time
-
         if any(program.running() for _, program in self.programs):
             self._ended = None
             return False
