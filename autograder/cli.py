@@ -170,7 +170,7 @@ def grade(
     for student, why in run.unrecorded.items():
         screen.print(f"{plain(student)} is not in the gradebook: {plain(why)}", markup=False)
     screen.print(
-        f"{len(run.results)} submissions: {run.seconds['run']:.1f} s running, {run.seconds['record']:.1f} s recording"
+        f"{len(run.results)} submissions in {run.seconds['all']:.0f} s ({run.seconds['recording']:.0f} s in nbgrader)"
     )
     for label, path in (
         ("gradebook", root / "build" / "gradebook.db"),

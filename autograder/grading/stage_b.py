@@ -5,13 +5,13 @@ from __future__ import annotations
 import csv
 import io
 import logging
+import math
 import os
 import re
 import shutil
 import sys
 import tempfile
 import warnings
-from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
@@ -70,7 +70,7 @@ def generate(root: Path, lab: str, into: Path, gradebook: bool) -> Path:
         KitError: nbgrader refuses.
     """
     api = _api(root, gradebook, release_directory=str(into), ignore=_NOT_RELEASED)
-    answer = api.generate_assignment(lab, force=True, create=True)
+    answer = _answered(api.generate_assignment(lab, force=True, create=True))
     if not answer["success"]:
         if "there are submissions associated" in answer.get("log", "") + answer["error"]:
             raise KitError(
@@ -148,65 +148,85 @@ def before_autograde(assignment: str, student: str, notebooks: list[str]) -> Non
         register(root, assignment)
 
 
-def record(
-    root: Path, lab: Lab, students: Iterable[str], force: bool, on_student: Callable[[str], None]
-) -> dict[str, str]:
-    """Record results in the gradebook and write feedback, for those that changed.
+class Recorder:
+    """Records results in the gradebook and writes feedback, one student at a time, for those that changed."""
 
-    Args:
-        root: of the course.
-        lab: whose results are recorded.
-        students: in the order to record them.
-        force: record also what did not change.
-        on_student: called after each.
+    def __init__(self, root: Path, lab: Lab, force: bool) -> None:
+        """Look at what is recorded already; nothing is loaded or written before something is to be.
 
-    Returns:
-        Why it failed, by student; the others are recorded.
-    """
-    database = root / "build" / "gradebook.db"
-    if not database.exists():
-        # What was recorded went with the gradebook.
-        shutil.rmtree(root / "build" / "autograded", ignore_errors=True)
-    todo = {student: _due(root, lab, student, force) for student in students}
-    failures: dict[str, str] = {}
-    if any(todo.values()):
-        register(root, lab.name)
-        api = _api(root)
-    for student, steps in todo.items():
-        feedback = _feedback(root, lab, student)
+        Args:
+            root: of the course.
+            lab: whose results are recorded.
+            force: record also what did not change.
+        """
+        self._root, self._lab, self._force = root, lab, force
+        self._api: Any = None
+        self._written: list[Path] = []
+        self.failures: dict[str, str] = {}
+        """Why it failed, by student; the others are recorded."""
+        if not (root / "build" / "gradebook.db").exists():
+            # What was recorded went with the gradebook.
+            shutil.rmtree(root / "build" / "autograded", ignore_errors=True)
+        self._last_grade = _modified(root / "build" / "gradebook.db")
+
+    def __enter__(self) -> Recorder:
+        """Return itself."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Note that the feedback knows the gradebook as it is now, also when the rest of the class was given up."""
+        for path in self._written:
+            os.utime(path)
+
+    def record(self, student: str) -> None:
+        """Record one student's result.
+
+        Raises:
+            KitError: the gradebook has grades for other cells.
+            KeyboardInterrupt: the student counts as not recorded.
+        """
+        feedback = _feedback(self._root, self._lab, student)
+        steps = self._due(student)
+        if steps and self._api is None:
+            register(self._root, self._lab.name)
+            self._api = _api(self._root)
         if steps:
             feedback.unlink(missing_ok=True)
         for step in steps:
-            answer = getattr(api, step)(lab.name, student, force=True)
-            if "KeyboardInterrupt" in answer.get("error", ""):  # nbgrader catches even this
-                raise KeyboardInterrupt
+            answer = _answered(getattr(self._api, step)(self._lab.name, student, force=True))
             if not answer["success"]:
-                failures[student] = _last_error(answer)
-                break
-        on_student(student)
-    for student in todo.keys() - failures.keys():
-        os.utime(_feedback(root, lab, student))
-    return failures
+                self.failures[student] = _last_error(answer)
+                return
+        self._written.append(feedback)
+
+    def _due(self, student: str) -> list[str]:
+        """The steps of nbgrader's that a student needs; none if neither the result nor a grade changed."""
+        recorded = self._root / "build" / "autograded" / student / self._lab.name / f"{self._lab.name}.ipynb"
+        result = result_path(self._root, self._lab.name, student)
+        if self._force or _modified(recorded) < max(_modified(result), _modified(self._lab.notebook)):
+            return ["autograde", "generate_feedback"]
+        # The gradebook was younger than the feedback where somebody graded by hand since.
+        stale = _modified(_feedback(self._root, self._lab, student)) < self._last_grade
+        return ["generate_feedback"] if stale else []
+
+
+def _answered(answer: dict[str, Any]) -> dict[str, Any]:
+    """Return nbgrader's answer. It catches even what Ctrl-C raises; that goes on here."""
+    if "KeyboardInterrupt" in str(answer.get("error", "")):
+        raise KeyboardInterrupt
+    return answer
 
 
 def _feedback(root: Path, lab: Lab, student: str) -> Path:
     return root / "build" / "feedback" / student / lab.name / f"{lab.name}.html"
 
 
-def _due(root: Path, lab: Lab, student: str, force: bool) -> list[str]:
-    """The steps of nbgrader's that a student needs; none if neither the result nor a grade changed."""
-    recorded = root / "build" / "autograded" / student / lab.name / f"{lab.name}.ipynb"
-    if force or _is_older(recorded, result_path(root, lab.name, student), lab.notebook):
-        return ["autograde", "generate_feedback"]
-    # The gradebook is younger than the feedback where somebody graded by hand since.
-    return ["generate_feedback"] if _is_older(_feedback(root, lab, student), root / "build" / "gradebook.db") else []
-
-
-def _is_older(path: Path, *others: Path) -> bool:
+def _modified(path: Path) -> float:
+    """When a file was last written; before all time if it is not there."""
     try:
-        return any(path.stat().st_mtime < other.stat().st_mtime for other in others)
+        return path.stat().st_mtime
     except OSError:
-        return True
+        return -math.inf
 
 
 def write_grades(root: Path) -> Path:
@@ -215,7 +235,7 @@ def write_grades(root: Path) -> Path:
     A row for each student and lab. The score stays empty as long as a check waits for an instructor's verdict.
     """
     path = root / "build" / "grades.csv"
-    if not _is_older(path, root / "build" / "gradebook.db"):
+    if _modified(path) > _modified(root / "build" / "gradebook.db"):
         return path
     prepare_nbgrader()
     from nbgrader.api import Gradebook

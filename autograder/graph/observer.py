@@ -1,6 +1,6 @@
 """The observer: one node, in a context of its own, that watches the graph of one launch.
 
-It is not a student's node and shares no process with one. It stays quiet: no parameter services, no /rosout.
+It is not a student's node and shares no process with one. It stays quiet: no services, no /rosout.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from rclpy.context import Context
 from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
@@ -50,6 +51,7 @@ class Observer:
             enable_rosout=False,
             enable_logger_service=False,
             use_global_arguments=False,
+            parameter_overrides=[Parameter("start_type_description_service", value=False)],
         )
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self.node)

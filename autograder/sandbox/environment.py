@@ -37,6 +37,8 @@ def python_environment() -> dict[str, str]:
         # The wheels find their libraries by starting Python a second time, unless these two are set.
         "_ROS_WHEELS_BOOTSTRAP_COMPLETE": "1",
         "LD_LIBRARY_PATH": os.pathsep.join(_library_folders()),
+        # Messages load numpy; the threads of its linear algebra, which nobody here uses, take as long as all the rest.
+        "OPENBLAS_NUM_THREADS": "1",
         # Fewer arenas: sixty threads would otherwise reserve gigabytes of address space.
         "MALLOC_ARENA_MAX": "2",
         **profile_environment(),

@@ -214,7 +214,7 @@ class NodeSandbox:
         return launcher
 
     def _start_in(self, launcher: _Launcher, name: str, args: list[str], env: dict[str, str], cores: int) -> Program:
-        program = Program(name, self.limits, self._changed)
+        program = Program(name, self.limits, self._changed, self._catch_up)
         ends = [os.pipe2(os.O_CLOEXEC) for _ in range(3)]
         for ours, _ in ends:
             os.set_blocking(ours, False)
@@ -393,8 +393,6 @@ class NodeSandbox:
             if descriptor not in program.readers:
                 return  # closed by what came before it in the same round
             data = b""
-            if descriptor not in program.readers:
-                return  # closed by what was handled just before, in the same batch of events
             with contextlib.suppress(BlockingIOError):
                 data = os.read(descriptor, 1 << 16)
                 if not data:
@@ -407,8 +405,13 @@ class NodeSandbox:
 
         return read
 
+    def _catch_up(self, program: Program) -> None:
+        """Take what lies in a running program's pipes: its answer may have come by DDS before its notes were read."""
+        if program.readers and not self._closed:
+            self._in_thread(lambda: self._drain(program))
+
     def _drain(self, program: Program) -> None:
-        """Take what an ended program has left in its pipes, at most one limit's worth."""
+        """Take what a program has left in its pipes, at most one limit's worth."""
         for descriptor in list(program.readers):
             key = self._selector.get_map().get(descriptor)
             for _ in range(64):

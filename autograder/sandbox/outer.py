@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import compileall
 import contextlib
+import functools
 import os
 import selectors
 import subprocess
@@ -75,6 +77,7 @@ def run_in_sandbox(module_args: list[str], stdin: bytes, isolation: Isolation, t
 
 def start_in_sandbox(module_args: list[str], isolation: Isolation) -> subprocess.Popen[bytes]:
     """Start what `run_in_sandbox` waits for; it ends with the thread that calls this."""
+    _compile_package()
     variables = {
         **python_environment(),
         "PYTHONPATH": str(bubblewrap.PACKAGE.parent),
@@ -96,6 +99,12 @@ def start_in_sandbox(module_args: list[str], isolation: Isolation) -> subprocess
     return bubblewrap.start_bwrap(
         bubblewrap.outer_options(variables), command, around=around, stdin=pipe, stdout=pipe, stderr=pipe
     )
+
+
+@functools.cache
+def _compile_package() -> None:
+    """Keep the package's bytecode up to date: a sandbox cannot write it, and would compile everything each time."""
+    compileall.compile_dir(bubblewrap.PACKAGE, quiet=2)  # where it may not write either, it goes on
 
 
 def _exchange(process: subprocess.Popen[bytes], stdin: bytes, time_limit: float) -> OuterRun:

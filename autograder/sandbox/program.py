@@ -8,6 +8,7 @@ import os
 import signal
 import threading
 import time
+from collections.abc import Callable
 from typing import Any
 
 from autograder.sandbox.limits import Limits
@@ -27,11 +28,14 @@ class Program:
         name: what `NodeSandbox.start` was asked for.
     """
 
-    def __init__(self, name: str, limits: Limits, changed: threading.Condition) -> None:
+    def __init__(
+        self, name: str, limits: Limits, changed: threading.Condition, catch_up: Callable[[Program], None]
+    ) -> None:
         """Made by `NodeSandbox.start`."""
         self.name = name
         self._limits = limits
         self._changed = changed
+        self._catch_up = catch_up
         self._handle = -1
         self.pid = -1
         """Process id as this process sees it."""
@@ -113,6 +117,7 @@ class Program:
 
     def output(self) -> str:
         """Return what it has printed so far: of a long output the beginning and the end."""
+        self._catch_up(self)
         with self._changed:
             half = self._limits.output_kept // 2
             tail = bytes(self._tail[-half:])
@@ -124,7 +129,11 @@ class Program:
         return self._written > self._limits.output_kept // 2 * 2
 
     def events(self) -> list[dict[str, Any]]:
-        """Return what the probe inside it noted, in order. The program can forge it: for hints, never for points."""
+        """Return what the probe inside it noted, in order. The program can forge it: for hints, never for points.
+
+        Whatever it noted before it sent an answer or a message is in here once that has arrived.
+        """
+        self._catch_up(self)
         with self._changed:
             return list(self._events)
 
