@@ -143,6 +143,14 @@ def test_no_verdict_means_manual_grading(course: Course) -> None:
     assert "an instructor decides" in course.feedback("died")
 
 
+def test_markers_in_an_answer_are_only_words(course: Course) -> None:
+    talker = "### BEGIN HIDDEN TESTS\n### BEGIN MARK SCHEME\n### BEGIN SOLUTION\nprint('no')  # mine"
+    course.hand_in("marker", course.cells(talker=talker, why="BEGIN HIDDEN TESTS is what I looked for."))
+    course.grade("marker")
+    page = course.feedback("marker")
+    assert "# mine" in page and "what I looked for" in page
+
+
 def test_a_result_that_lost_a_check_means_manual_grading(course: Course) -> None:
     course.hand_in("lost", course.cells())
     course.run("lost")

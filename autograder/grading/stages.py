@@ -202,6 +202,24 @@ class SanitizeOutputs(SanitizeHTML):  # type: ignore[misc]
         return cell, resources
 
 
+class _NotInAnswers:
+    """A stage that cuts between markers in the lab's own cells; a student who types a marker only types a word."""
+
+    def preprocess_cell(self, cell: Any, resources: dict[str, Any], index: int) -> tuple[Any, dict[str, Any]]:
+        if utils.is_solution(cell):
+            return cell, resources
+        made: tuple[Any, dict[str, Any]] = super().preprocess_cell(cell, resources, index)  # type: ignore[misc]
+        return made
+
+
+class HideTests(_NotInAnswers, ClearHiddenTests):  # type: ignore[misc]
+    """Keeps hidden tests out of feedback."""
+
+
+class HideMarkScheme(_NotInAnswers, ClearMarkScheme):  # type: ignore[misc]
+    """Keeps mark schemes out of feedback."""
+
+
 class StableNotebook(NbGraderPreprocessor):  # type: ignore[misc]
     """Leaves in a released notebook only what the lab's source decides, so that generating twice gives equal files."""
 
@@ -267,7 +285,7 @@ SANITIZE = [ClearOutput, DeduplicateIds, OverwriteKernelspec, OverwriteCells, Ch
 """What nbgrader does to the rebuilt notebook; among others it puts the check cells' full source back."""
 AUTOGRADE = [AttachResults, SaveCheckedGrades, AssignLatePenalties, InertAnswers]
 """In place of nbgrader's execution."""
-FEEDBACK = [GetGrades, ClearHiddenTests, ClearMarkScheme, SanitizeOutputs, CSSHTMLHeaderPreprocessor]
+FEEDBACK = [GetGrades, HideTests, HideMarkScheme, SanitizeOutputs, CSSHTMLHeaderPreprocessor]
 RELEASE = [
     LockCells,
     ClearSolutions,
