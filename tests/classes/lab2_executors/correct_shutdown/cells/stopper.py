@@ -1,0 +1,45 @@
+import rclpy
+from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.executors import ExternalShutdownException, MultiThreadedExecutor
+from rclpy.node import Node
+from std_msgs.msg import Empty, Int64
+
+
+class Stopper(Node):
+    def __init__(self):
+        super().__init__("stopper")
+        self.declare_parameter("tick_period", 0.1)  # seconds
+        self.count = 0
+        self.ticks = self.create_publisher(Int64, "ticks", 10)
+        together = ReentrantCallbackGroup()
+        self.create_timer(self.get_parameter("tick_period").value, self.tick, callback_group=together)
+        self.create_subscription(Empty, "stop", self.on_stop, 10, callback_group=together)
+
+    def tick(self):
+        self.count += 1
+        self.ticks.publish(Int64(data=self.count))
+
+    def on_stop(self, _):
+        """End the program."""
+        rclpy.shutdown()
+
+
+def spin(node):
+    """Run the node's callbacks until the program is told to end."""
+    executor = MultiThreadedExecutor(num_threads=2)
+    executor.add_node(node)
+    executor.spin()
+
+
+def main():
+    rclpy.init()
+    node = Stopper()
+    try:
+        spin(node)
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    finally:
+        rclpy.try_shutdown()
+
+
+main()
