@@ -1,4 +1,4 @@
-"""Lab 2 in a real JupyterLab and a real browser: run from top to bottom, it gives the verdicts of grading.
+"""The labs in a real JupyterLab and a real browser: run from top to bottom, they give the verdicts of grading.
 
 The browser is Debian's chromium. Where there is none the test is skipped, except in CI.
 """
@@ -22,10 +22,9 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 
 import sample_class
 
-from autograder.submission.lab import load_lab
+from autograder.submission.lab import Lab, lab_names, load_lab
 
 ROOT = Path(__file__).resolve().parent.parent
-LAB = load_lab(ROOT, "lab2_executors")
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 START_SECONDS, RUN_SECONDS = 90, 240
 """Far beyond what it takes (5 s and 35 s on two cores), for a machine that does much else."""
@@ -105,13 +104,13 @@ def kernel_is_idle(kernels: list[dict[str, Any]]) -> bool:
     return any(kernel["execution_state"] == "idle" and kernel["connections"] for kernel in kernels)
 
 
-def _run_all(browser: Any, address: str) -> list[dict[str, Any]]:
+def _run_all(browser: Any, address: str, lab: Lab) -> list[dict[str, Any]]:
     """Open the lab, choose Run > Run All Cells, and give its code cells once the last one has been run."""
     page = browser.new_page(viewport={"width": 1400, "height": 900})
     outside: list[str] = []
     own = (address, address.replace("http", "ws"), "data:", "blob:")
     page.on("request", lambda request: None if request.url.startswith(own) else outside.append(request.url))
-    page.goto(f"{address}lab/tree/{LAB.name}.ipynb?token=lab", timeout=START_SECONDS * 1000)
+    page.goto(f"{address}lab/tree/{lab.name}.ipynb?token=lab", timeout=START_SECONDS * 1000)
     page.wait_for_selector(".jp-Notebook .jp-CodeCell", timeout=START_SECONDS * 1000)
     page.wait_for_selector(".jp-Notebook-ExecutionIndicator[data-status='idle']", timeout=START_SECONDS * 1000)
     deadline = time.monotonic() + RUN_SECONDS
@@ -131,23 +130,26 @@ def _run_all(browser: Any, address: str) -> list[dict[str, Any]]:
     cells: list[dict[str, Any]] = page.evaluate(CELLS)
     screenshot = os.environ.get("LAB_SCREENSHOT")
     if screenshot:
-        page.screenshot(path=screenshot)
+        page.screenshot(path=f"{screenshot}/{lab.name}.png")
     page.close()
     assert not outside, f"the page asked for {outside}"
     return cells
 
 
-@pytest.mark.parametrize("student", ["solution", "e03_no_groups"])
+@pytest.mark.parametrize(
+    ("lab_name", "student"), [*((lab, "solution") for lab in lab_names(ROOT)), ("lab2_executors", "e03_no_groups")]
+)
 def test_the_lab_runs_top_to_bottom_with_the_verdicts_of_grading(
-    browser: Any, jupyter: tuple[Path, str], tmp_path: Path, student: str
+    browser: Any, jupyter: tuple[Path, str], tmp_path: Path, lab_name: str, student: str
 ) -> None:
     work, address = jupyter
-    handed_in = sample_class.build_student(LAB, student, tmp_path) / f"{LAB.name}.ipynb"
+    lab = load_lab(ROOT, lab_name)
+    handed_in = sample_class.build_student(lab, student, tmp_path) / f"{lab.name}.ipynb"
     shutil.copy(handed_in, work)
-    expected = sample_class.expected(LAB, student)
+    expected = sample_class.expected(lab, student)
     sources = [cell for cell in json.loads(handed_in.read_text())["cells"] if cell["cell_type"] == "code"]
 
-    cells = _run_all(browser, address)
+    cells = _run_all(browser, address, lab)
 
     assert len(cells) == len(sources)
     assert [cell["output"] for cell in cells if cell["error"]] == []

@@ -28,8 +28,8 @@ class Answers:
             outcomes.unknown("The check itself broke", f"{type(error).__name__}: {error}")
         return error is None or isinstance(error, Exception)
 
-    def expect_table(self) -> None:
-        """The file exists and is a table."""
+    def _read(self) -> None:
+        """The file exists and is a table; fails the check if not."""
         path = session.current.folder / self.file
         title = f"`{self.file}` is a table of answers"
         if not path.is_file():
@@ -51,23 +51,21 @@ class Answers:
 
     def expect_filled(self, questions: Mapping[str, Sequence[Any]] | Sequence[str]) -> None:
         """Every question has an answer; where a sequence of allowed answers is given, one of them."""
-        self.expect_table()
+        self._read()
         title = f"Every question in `{self.file}` is answered"
         for question in questions:
             answer = self._table.get(question)
             if answer is None or answer == "?":
                 outcomes.failed(title, because=f"`{question}` has no answer yet.", code="unanswered")
             if isinstance(questions, Mapping) and answer not in questions[question]:
-                allowed = ", ".join(str(value) for value in questions[question])
-                outcomes.failed(
-                    title, because=f"`{question}` is {answer!r}; it must be one of {allowed}.", code="answer-form"
-                )
+                because = f"`{question}` is {answer!r}; it must be {_one_of(questions[question])}."
+                outcomes.failed(title, because=because, code="answer-form")
         outcomes.passed(title)
 
     def expect_answer(self, question: str, *right: Any, hint: str = "") -> None:
         """The answer to one question is one of the right ones."""
         if not self._table:
-            self.expect_table()
+            self._read()
         answer = self._table.get(question)
         title = f"`{question}`"
         if answer in right and isinstance(answer, bool) == any(isinstance(r, bool) for r in right if r == answer):
@@ -84,6 +82,15 @@ class Answers:
     def score(self, points: float) -> Score:
         """The score of the cell, as `ros.score`."""
         return score(points)
+
+
+def _one_of(allowed: Sequence[Any]) -> str:
+    """Name the allowed answers, of many only what they look like."""
+    if isinstance(allowed, range):
+        return f"a whole number from {allowed[0]} to {allowed[-1]}"
+    if len(allowed) > 10:
+        return f"of the form {allowed[0]}, {allowed[1]}, …"
+    return "one of " + ", ".join(str(value) for value in allowed)
 
 
 def answers(file: str) -> Answers:
