@@ -6,16 +6,20 @@ import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, NoReturn
 
-from autograder.checks import outcomes
+from autograder.checks import outcomes, session
+from autograder.graph import diagnosis
+from autograder.graph.diagnosis import Diagnosis, Scene
 from autograder.graph.observer import Observer
 from autograder.sandbox.nodes import Program
 
 if TYPE_CHECKING:
     from autograder.checks.launch import Node
-    from autograder.graph.diagnosis import Diagnosis
 
 WITHIN = 10.0
 """Seconds that an expectation waits at the most: far beyond what a start takes on a busy machine."""
+
+SETTLE = 2.0
+"""Seconds that a new program may take to show that it lives."""
 
 AFTER_EXIT = 0.3
 """Seconds that evidence may still be under way after the last program has ended."""
@@ -34,12 +38,24 @@ class ExpectationBase:
     def prepare(self) -> None:
         """Set up what each group needs for this launch."""
         self._ended: float | None = None
-        self.stopped: list[Program] = []
-        """Programs that the check itself has stopped."""
+        self.may_end: list[Program] = []
+        """Programs that the check itself has stopped, or that are asked to end by themselves."""
+        self._first_outcome = len(session.current.outcomes)
 
     def start(self, node: Node | str) -> None:
         """Start one more program."""
         raise NotImplementedError
+
+    def scene(self) -> Scene:
+        """The launch as the diagnosis sees it."""
+        return Scene(
+            self.observer,
+            [program for _, program in self.programs],
+            self._missing,
+            session.current.folder,
+            [rule for node, _ in self.programs for rule in node.all_rules()],
+            self._trouble,
+        )
 
     def served(self, name: str) -> list[tuple[float, float]]:
         """When requests to an offered service arrived and were answered, seconds on the system clock."""
@@ -58,17 +74,40 @@ class ExpectationBase:
         """Wait for evidence; at most `within` seconds, less when every program has ended."""
         return self.observer.wait(ready, within, self.all_ended)
 
+    def gone_program(self) -> Program | None:
+        """A program that has ended by itself, though it had to go on: it failed, or it ended as the last one."""
+        ended = [program for _, program in self.programs if not program.running() and program not in self.may_end]
+        failed = [program for program in ended if program.exit_status() != 0]
+        last = ended if len(ended) == len(self.programs) else []
+        return next(iter(failed + last), None)
+
     def fail(
-        self, title: str, diagnosis: Diagnosis | None, *, expected: str = "", observed: str = "", hint: str = ""
+        self, title: str, reason: Diagnosis | None, *, expected: str = "", observed: str = "", hint: str = ""
     ) -> NoReturn:
-        """Record a failure with the first broken link as its reason, and end the block."""
-        outcomes.failed(
-            title,
-            expected=expected,
-            observed=observed,
-            because=diagnosis.because if diagnosis else "",
-            hint=" ".join(part for part in (diagnosis.hint if diagnosis else "", hint) if part),
-            code=diagnosis.code if diagnosis else "",
+        """Record a failure with the first broken link as its reason, and end the block.
+
+        Where a program has ended that had to go on, the whole launch has failed: how much of it was seen before is a
+        matter of luck, and a verdict must not depend on that. A new program gets a moment to show whether it does so.
+        """
+        youngest = max((program.began for _, program in self.programs), default=0.0)
+        self.observer.wait(self.gone_program, youngest + SETTLE - time.monotonic())
+        gone = self.gone_program()
+        if gone is not None:
+            trouble = diagnosis.program_trouble(self.scene())
+            reason = trouble if trouble and trouble.code != "exited" else reason or trouble
+        because = reason.because if reason else ""
+        code = reason.code if reason else ""
+        hint = " ".join(part for part in (reason.hint if reason else "", hint) if part)
+        if gone is None:
+            outcomes.failed(title, expected=expected, observed=observed, because=because, hint=hint, code=code)
+        outcomes.failed_as_a_whole(
+            self._first_outcome,
+            f"`{gone.name}` runs until it is stopped",
+            expected="running",
+            observed=gone.stopped_by() or f"ended with status {gone.exit_status()}",
+            because=because,
+            hint=hint,
+            code=code,
         )
 
     def expect_that(

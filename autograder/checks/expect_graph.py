@@ -9,17 +9,14 @@ from typing import Any, Literal
 from rcl_interfaces.srv import ListParameters
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
-from autograder.checks import outcomes, session
-from autograder.checks.base import WITHIN, ExpectationBase
+from autograder.checks import outcomes
+from autograder.checks.base import SETTLE, WITHIN, ExpectationBase
 from autograder.graph import diagnosis, qos
-from autograder.graph.diagnosis import Diagnosis, Scene
+from autograder.graph.diagnosis import Diagnosis
 from autograder.graph.names import full_name, type_name
 from autograder.graph.services import ServiceMissing, call_all
 
 End = Literal["publisher", "subscription"]
-
-SETTLE = 2.0
-"""Seconds that a new node may take to show that it lives."""
 
 GONE_WITHIN = 2.0
 """Seconds that an absence may take to show, for example after a node was stopped."""
@@ -27,17 +24,6 @@ GONE_WITHIN = 2.0
 
 class GraphExpectations(ExpectationBase):
     """What must be on the graph, and what must not."""
-
-    def scene(self) -> Scene:
-        """The launch as the diagnosis sees it."""
-        return Scene(
-            self.observer,
-            [program for _, program in self.programs],
-            self._missing,
-            session.current.folder,
-            [rule for node, _ in self.programs for rule in node.all_rules()],
-            self._trouble,
-        )
 
     def expect_node(self, name: str, *, within: float = WITHIN, hint: str = "") -> None:
         """The node with this full name is on the graph, exactly once."""
@@ -51,9 +37,9 @@ class GraphExpectations(ExpectationBase):
                 hint=hint,
             )
         self._settle(name)
-        if name not in self.observer.nodes() or self._crashed():
+        if name not in self.observer.nodes() or self.gone_program():
             # A program that dies takes its node off the graph first and prints its traceback after that.
-            self.observer.wait(self._crashed, SETTLE)
+            self.observer.wait(self.gone_program, SETTLE)
             self.fail(
                 title,
                 diagnosis.why_no_node(self.scene(), name),
@@ -85,14 +71,8 @@ class GraphExpectations(ExpectationBase):
                 ListParameters,
                 [ListParameters.Request()],
                 SETTLE / 2,
-                self._crashed,
+                lambda: self.gone_program() is not None,
             )
-
-    def _crashed(self) -> bool:
-        """Whether a program has failed by itself; one that ended well, or that the check stopped, has not."""
-        return any(
-            program.exit_status() not in (None, 0) for _, program in self.programs if program not in self.stopped
-        )
 
     def expect_no_node(self, name: str, *, within: float = GONE_WITHIN, hint: str = "") -> None:
         """No node has this full name; use it after a positive expectation, which proves that the graph is known."""

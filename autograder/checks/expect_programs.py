@@ -37,7 +37,7 @@ class ProgramExpectations(GraphExpectations):
     def stop(self, name: str, *, kill: bool = False) -> None:
         """End one of several programs: politely (SIGTERM), or without a chance to clean up."""
         program = self.program(name)
-        self.stopped.append(program)
+        self.may_end.append(program)
         program.stop(grace=0.0 if kill else 2.0)
 
     def expect_running(self, name: str, *, hint: str = "") -> None:
@@ -52,6 +52,7 @@ class ProgramExpectations(GraphExpectations):
     def expect_exit(self, name: str, *, status: int | None = None, within: float = WITHIN, hint: str = "") -> None:
         """A program ends by itself, with this exit status if one is given."""
         program = self.program(name)
+        self.may_end.append(program)
         title = f"`{name}` ends by itself" + ("" if status is None else f" with exit status {status}")
         if not program.wait(within):
             reason = diagnosis.inside_reason(self.scene())

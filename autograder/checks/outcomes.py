@@ -33,19 +33,38 @@ def failed(
     Raises:
         CheckEnded: always.
     """
-    _record(
-        Outcome(
-            status=Status.FAILED,
-            title=title,
-            expected=expected,
-            observed=observed,
-            because=because,
-            hint=hint,
-            code=code or "failed",
-        )
-    )
+    _record(_failure(title, expected, observed, because, hint, code))
     _rest_not_checked()
     raise CheckEnded(title)
+
+
+def failed_as_a_whole(
+    first: int, title: str, *, expected: str = "", observed: str = "", because: str = "", hint: str = "", code: str = ""
+) -> NoReturn:
+    """As `failed`, in place of all that was found out since outcome number `first`: it is worth nothing any more.
+
+    Raises:
+        CheckEnded: always.
+    """
+    del session.current.outcomes[first:]
+    frame, block = _block()
+    failure = _failure(title, expected, observed, because, hint, code)
+    failure.hidden = frame is not None and block is not None and block.lineno in _hidden_lines(frame)
+    session.current.outcomes.append(failure)
+    _rest_not_checked(whole=True)
+    raise CheckEnded(title)
+
+
+def _failure(title: str, expected: str, observed: str, because: str, hint: str, code: str) -> Outcome:
+    return Outcome(
+        status=Status.FAILED,
+        title=title,
+        expected=expected,
+        observed=observed,
+        because=because,
+        hint=hint,
+        code=code or "failed",
+    )
 
 
 def unknown(title: str, because: str) -> None:
@@ -91,35 +110,40 @@ def _hidden_lines(frame: FrameType) -> set[int]:
     return hidden
 
 
-def _rest_not_checked() -> None:
-    """Record what the source still wanted to check in the same `with` block."""
+def _block() -> tuple[FrameType | None, ast.With | None]:
+    """The check cell's frame, and the `with` block that it is in."""
     frame = _check_frame()
     if frame is None:
-        return
+        return None, None
     try:
         tree = ast.parse("".join(_lines(frame)))
     except SyntaxError:  # only the shell knows this source (IPython syntax around it): nothing to list
-        return
-    hidden = _hidden_lines(frame)
+        return frame, None
     blocks = [
         n for n in ast.walk(tree) if isinstance(n, ast.With) and n.lineno <= frame.f_lineno <= (n.end_lineno or 0)
     ]
-    if not blocks:
+    return frame, min(blocks, key=lambda node: (node.end_lineno or 0) - node.lineno, default=None)
+
+
+def _rest_not_checked(whole: bool = False) -> None:
+    """Record what the source still wanted to check in the same `with` block, or all that it wanted there."""
+    frame, block = _block()
+    if frame is None or block is None:
         return
-    block = min(blocks, key=lambda node: (node.end_lineno or 0) - node.lineno)
+    hidden = _hidden_lines(frame)
     for node in ast.walk(block):
         if (
             isinstance(node, ast.Call)
             and isinstance(node.func, ast.Attribute)
             and node.func.attr.startswith("expect")
-            and node.lineno > frame.f_lineno
+            and (whole or node.lineno > frame.f_lineno)
         ):
             text = " ".join(ast.unparse(node).split(".", 1)[-1].split())
             session.current.outcomes.append(
                 Outcome(
                     status=Status.NOT_CHECKED,
                     title=text if len(text) <= 120 else text[:117] + "...",
-                    because="Something before it failed.",
+                    because="The program ended too early." if whole else "Something before it failed.",
                     hidden=node.lineno in hidden,
                 )
             )
