@@ -25,7 +25,6 @@ import sample_class
 from autograder.submission.lab import Lab, lab_names, load_lab
 
 ROOT = Path(__file__).resolve().parent.parent
-CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 START_SECONDS, RUN_SECONDS = 90, 240
 """Far beyond what it takes (5 s and 35 s on two cores), for a machine that does much else."""
 
@@ -38,21 +37,6 @@ CELLS = """() => [...document.querySelectorAll('.jp-CodeCell')].map(cell => ({
   output: [...cell.querySelectorAll('.jp-OutputArea-output')].map(output => output.innerText).join('\\n'),
   error: !!cell.querySelector('[data-mime-type="application/vnd.jupyter.error"]'),
 }))"""
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    """Start a headless chromium that opens no connection of its own."""
-    if CHROMIUM is None:
-        if os.environ.get("CI"):
-            pytest.fail("CI needs chromium (Debian: apt-get install chromium)")
-        pytest.skip("no chromium on this machine (Debian: apt-get install chromium)")
-    sync_api = pytest.importorskip("playwright.sync_api")
-    with sync_api.sync_playwright() as playwright:
-        arguments = ["--no-sandbox", "--disable-gpu", "--disable-background-networking"]
-        started = playwright.chromium.launch(executable_path=CHROMIUM, args=arguments)
-        yield started
-        started.close()
 
 
 @pytest.fixture
