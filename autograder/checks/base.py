@@ -81,16 +81,20 @@ class ExpectationBase:
         last = ended if len(ended) == len(self.programs) else []
         return next(iter(failed + last), None)
 
+    def settle_programs(self) -> None:
+        """Give a new program a moment to show what becomes of it, before something is held against it."""
+        youngest = max((program.began for _, program in self.programs), default=0.0)
+        self.observer.wait(self.gone_program, youngest + SETTLE - time.monotonic())
+
     def fail(
         self, title: str, reason: Diagnosis | None, *, expected: str = "", observed: str = "", hint: str = ""
     ) -> NoReturn:
         """Record a failure with the first broken link as its reason, and end the block.
 
         Where a program has ended that had to go on, the whole launch has failed: how much of it was seen before is a
-        matter of luck, and a verdict must not depend on that. A new program gets a moment to show whether it does so.
+        matter of luck, and a verdict must not depend on that.
         """
-        youngest = max((program.began for _, program in self.programs), default=0.0)
-        self.observer.wait(self.gone_program, youngest + SETTLE - time.monotonic())
+        self.settle_programs()
         gone = self.gone_program()
         if gone is not None:
             trouble = diagnosis.program_trouble(self.scene())
@@ -125,4 +129,5 @@ class ExpectationBase:
         if holds:
             outcomes.passed(title, expected=expected, observed=text)
         else:
+            self.settle_programs()
             self.fail(title, diagnose(), expected=expected, observed=text, hint=hint)

@@ -161,6 +161,7 @@ class ProgramExpectations(GraphExpectations):
         if condition:
             outcomes.passed(title, expected=expected, observed=observed)
             return
+        self.settle_programs()
         trouble = diagnosis.program_trouble(self.scene())
         if because and trouble and trouble.code in ("exited", "not-spinning"):
             trouble = None
