@@ -184,6 +184,37 @@ def test_what_follows_a_failure_is_listed_as_not_checked_and_hidden_lines_stay_m
     ]
 
 
+@pytest.mark.parametrize("ticks", [0, 3, 12])
+def test_how_much_was_seen_of_a_program_that_fails_makes_no_difference(grade: Grade, ticks: int) -> None:
+    fails = TALKER.replace("        self.count += 1\n", f"        self.count += 1 / max(0, {ticks} - self.count)\n")
+    result = grade(
+        """\
+        with launch("talker") as ros:
+            ros.expect_publisher("/chatter", String)
+            ros.expect_messages("/chatter", String, at_least=2)
+            ros.expect_messages("/chatter", String, at_least=100)
+        ros.score(2)
+        """,
+        talker__py=fails,
+    )
+    assert [outcome.status for outcome in result.outcomes] == [Status.FAILED, *[Status.NOT_CHECKED] * 3]
+    assert failure(result).title == "`talker` runs until it is stopped"
+    assert failure(result).code == "callback-exception" and "ZeroDivisionError" in failure(result).because
+
+
+def test_a_new_program_has_time_to_fail_before_something_else_is_held_against_it(grade: Grade) -> None:
+    late = TALKER.replace('"period", 0.05', '"period", 0.5').replace("self.count += 1", "self.count += one")
+    result = grade(
+        """\
+        with launch("talker") as ros:
+            ros.expect_parameter("/talker", "word", "goodbye")
+        ros.score(2)
+        """,
+        talker__py=late,
+    )
+    assert failure(result).code == "callback-exception" and "one" in failure(result).because
+
+
 def test_a_missing_program_is_the_students_failure(grade: Grade) -> None:
     result = grade('with launch("talker") as ros:\n    ros.expect_node("/talker")\nros.score(2)')
     assert failure(result).code == "program-missing"
@@ -234,5 +265,7 @@ def test_a_table_of_answers_is_compared_question_by_question(grade: Grade) -> No
         "answer-form",
         "not-yaml",
     )
+    wrong = failure(grade(check.replace("[1, 2]", "range(1, 99)"), table__yaml="overlap: 'no'\nthreads: two\n"))
+    assert wrong.because == "`threads` is 'two'; it must be a whole number from 1 to 98."
     assert failure(grade(check, table__yaml="overlap\n")).code == "not-yaml"
     assert failure(grade(check.replace("table.yaml", "other.yaml"))).code == "file-missing"
