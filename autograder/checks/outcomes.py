@@ -47,10 +47,7 @@ def failed_as_a_whole(
         CheckEnded: always.
     """
     del session.current.outcomes[first:]
-    frame, block = _block()
-    failure = _failure(title, expected, observed, because, hint, code)
-    failure.hidden = frame is not None and block is not None and block.lineno in _hidden_lines(frame)
-    session.current.outcomes.append(failure)
+    _record(_failure(title, expected, observed, because, hint, code))
     _rest_not_checked(whole=True)
     raise CheckEnded(title)
 
