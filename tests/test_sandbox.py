@@ -50,7 +50,7 @@ with NodeSandbox(folder, Isolation.FULL) as sandbox:
     for name in attacks:
         began = time.monotonic()
         program = sandbox.start(name, env={"ROS_DOMAIN_ID": "7", "HOST_PORT": "HOSTPORT"})
-        if name in ("ignores_term", "stops_launcher", "daemon"):
+        if name in ("ignores_term", "stops_launcher"):
             while not program.output() and program.running():
                 time.sleep(0.01)
             program.stop(0.3)
@@ -141,11 +141,16 @@ def test_every_attack_leaves_a_sandbox_that_works_and_no_process(report: dict[st
 @needs_full
 @pytest.mark.parametrize(
     ("name", "limit"),
-    [("fork_bomb", "process limit"), ("memory_bomb", "memory limit"), ("endless_output", "output limit")],
+    [("thread_bomb", "process limit"), ("memory_bomb", "memory limit"), ("endless_output", "output limit")],
 )
 def test_limits_end_a_program_and_say_so(report: dict[str, dict[str, Any]], name: str, limit: str) -> None:
     assert report[name]["stopped_by"] == limit, report[name]
     assert report[name]["seconds"] < 15
+
+
+@needs_full
+def test_a_program_cannot_start_processes(report: dict[str, dict[str, Any]]) -> None:
+    assert report["fork_bomb"]["output"] == "processes 0\n", report["fork_bomb"]
 
 
 @needs_full
@@ -285,12 +290,10 @@ def test_a_program_ends_as_python_does(tmp_path: Path, source: str, status: int,
         assert "launcher.py" not in program.output()
 
 
-def test_daemons_end_and_the_launcher_stays(local: NodeSandbox) -> None:
-    assert local.start("daemon").wait(10)
-    launcher = local._launcher
-    local.end_all()
-    assert local._launcher is launcher
-    assert launcher is not None and set(descendants(launcher.process.pid)) <= {launcher.pid}
+def test_a_program_starts_no_process_in_a_notebook_either(local: NodeSandbox) -> None:
+    program = local.start("fork_bomb")
+    assert program.wait(20)
+    assert program.output() == "processes 0\n"
 
 
 def test_stacks_name_the_waiting_line(local: NodeSandbox) -> None:

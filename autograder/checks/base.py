@@ -91,11 +91,11 @@ class ExpectationBase:
     ) -> NoReturn:
         """Record a failure with the first broken link as its reason, and end the block.
 
-        Where a program has ended that had to go on, the whole launch has failed: how much of it was seen before is a
-        matter of luck, and a verdict must not depend on that.
+        Where a program has ended that had to go on, or is bound to, the whole launch has failed: how much of it was
+        seen before is a matter of luck, and a verdict must not depend on that.
         """
         self.settle_programs()
-        gone = self.gone_program()
+        gone = self.gone_program() or diagnosis.failed_in_a_callback(self.scene())
         if gone is not None:
             trouble = diagnosis.program_trouble(self.scene())
             reason = trouble if trouble and trouble.code != "exited" else reason or trouble
@@ -108,7 +108,8 @@ class ExpectationBase:
             self._first_outcome,
             f"`{gone.name}` runs until it is stopped",
             expected="running",
-            observed=gone.stopped_by() or f"ended with status {gone.exit_status()}",
+            observed=gone.stopped_by()
+            or ("an error in a callback" if gone.running() else f"ended with status {gone.exit_status()}"),
             because=because,
             hint=hint,
             code=code,

@@ -54,7 +54,7 @@ class ProgramExpectations(GraphExpectations):
         program = self.program(name)
         self.may_end.append(program)
         title = f"`{name}` ends by itself" + ("" if status is None else f" with exit status {status}")
-        if not program.wait(within):
+        if not self.wait(lambda: not program.running(), within):
             reason = diagnosis.inside_reason(self.scene())
             where = "" if reason else diagnosis.waiting_line(self.scene(), program)
             self.fail(

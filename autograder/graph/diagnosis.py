@@ -165,6 +165,12 @@ _KNOWN_ERRORS = (
         "parameter-type",
         "The value's type must be the declared one: 40 is an integer, 40.0 a double, '40' a string.",
     ),
+    (
+        "PermissionError: [Errno 1]",
+        "refused-call",
+        "A program may not ask this of the system, new processes (`fork`, `subprocess`, `multiprocessing`) among it: "
+        "use threads, or one more program in the launch.",
+    ),
 )
 
 
@@ -248,6 +254,18 @@ def _callback_failure(program: RunningProgram) -> Diagnosis | None:
                 "lifecycle": "rclpy swallows it without a log line and treats the transition as ERROR.",
             }.get(kind, "It ended the spinning.")
             return Diagnosis(f"{callback} of `{program.name}`{at} raised {source}{error}. {after}", code)
+    return None
+
+
+def failed_in_a_callback(scene: Scene) -> RunningProgram | None:
+    """A program with an error in a callback, which ends it; only lifecycle nodes outlive theirs.
+
+    When it ends is luck: a multi-threaded executor of rclpy 7.1 looks for errors only at its next event.
+    """
+    for program in scene.programs:
+        for event in program.events():
+            if event.get("e") in ("bad_return", "callback_error") and event.get("kind") != "lifecycle":
+                return program
     return None
 
 

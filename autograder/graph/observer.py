@@ -6,6 +6,7 @@ It is not a student's node and shares no process with one. It stays quiet: no se
 from __future__ import annotations
 
 import contextlib
+import os
 import threading
 import time
 from collections.abc import Callable
@@ -22,9 +23,16 @@ from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from autograder.graph.names import full_name
 from autograder.graph.recording import Recording, quiet_profile
+from autograder.sandbox.processes import CpuWait, cpu_waits, kept_waiting
 
 POLL = 0.02
 """Seconds between two looks at the graph while waiting: rclpy reports messages, but not every graph change."""
+
+_LOOK_AFTER = 0.25
+"""Seconds of waiting after which it pays to ask what the machine keeps the programs from."""
+
+_LONGEST = 3.0
+"""How often its own length a wait may take on a busy machine."""
 
 OBSERVER_NAME = "grading_observer"
 
@@ -79,17 +87,32 @@ class Observer:
     def wait(self, ready: Callable[[], object], within: float, give_up: Callable[[], bool] | None = None) -> bool:
         """Wait until `ready()` is true; at most `within` seconds, less if `give_up()` says that nothing can change.
 
-        The last look comes after the deadline: a grader that was not scheduled for a while still sees what is there.
+        Time in which the grader or a program wanted to run and got no CPU does not count (up to three times `within`):
+        a verdict must not depend on what else the machine does. The last look comes after the deadline.
         """
-        deadline = time.monotonic() + within
+        began = time.monotonic()
+        deadline = began + within
+        before: dict[int, dict[int, CpuWait]] | None = None
         while True:
-            late = time.monotonic() >= deadline or (give_up is not None and give_up())
+            now = time.monotonic()
+            if before is None and now - began > _LOOK_AFTER:
+                before = cpu_waits(os.getpid())
+            elif before is not None and now >= deadline:
+                deadline = began + min(within + kept_waiting(before, cpu_waits(os.getpid())), _LONGEST * within)
+            late = now >= deadline or (give_up is not None and give_up())
             if ready():
                 return True
             if late:
                 return False
             with self.changed:
                 self.changed.wait(min(POLL, max(0.0, deadline - time.monotonic())))
+
+    def pause(self, seconds: float) -> None:
+        """Let time go by, exactly as much as is said: for experiments in which its length matters."""
+        deadline = time.monotonic() + seconds
+        with self.changed:
+            while (left := deadline - time.monotonic()) > 0:
+                self.changed.wait(left)
 
     def nodes(self) -> list[str]:
         """Full names of all nodes but the observer, one entry per node: two nodes of one name are listed twice."""

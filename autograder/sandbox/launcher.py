@@ -4,7 +4,8 @@ It runs beside the programs, inside their sandbox, and is trusted no more than t
 `probe.py` in its folder it imports nothing of the kit.
 
 Usage: launcher.py FD. FD is one end of a SOCK_SEQPACKET pair. Requests are JSON:
-    {"do": "start", "id", "path", "args", "env", "cpus", "cores", "limits"} with descriptors (output, events, stacks)
+    {"do": "start", "id", "path", "args", "env", "cpus", "cores", "limits", "filter"}
+        with descriptors (output, events, stacks)
     {"do": "end_all", "everyone": true where the process list is the sandbox's own}
 Answers: {"ready": pid}, {"started": id, "pid"} with a pidfd, {"failed": id, "why"}, {"ended": id, "status"},
     {"all_ended": true}.
@@ -30,7 +31,7 @@ import types
 from typing import Any
 
 STACK_SIGNAL = signal.SIGRTMIN + 10
-PR_SET_PDEATHSIG, PR_SET_DUMPABLE, PR_SET_CHILD_SUBREAPER = 1, 4, 36
+PR_SET_PDEATHSIG, PR_SET_DUMPABLE, PR_SET_SECCOMP, PR_SET_CHILD_SUBREAPER, PR_SET_NO_NEW_PRIVS = 1, 4, 22, 36, 38
 EVENTS_FD, STACKS_FD = 3, 4
 
 WARM = (
@@ -81,6 +82,7 @@ class Start:
         self.cpus: list[int] = request["cpus"]
         self.cores: int = request["cores"]
         self.limits: dict[str, int] = request["limits"]
+        self.filter = bytes.fromhex(request["filter"])
         self.output, self.events, self.stacks = descriptors
 
 
@@ -239,6 +241,19 @@ def become(start: Start) -> None:
     vars(sys).update(__stdin__=sys.stdin, __stdout__=sys.stdout, __stderr__=sys.stderr)
     signal.signal(signal.SIGINT, signal.default_int_handler)
     faulthandler.register(STACK_SIGNAL, file=STACKS_FD, all_threads=True, chain=False)
+    _filter_calls(start.filter)
+
+
+class _FilterProgram(ctypes.Structure):
+    _fields_ = (("length", ctypes.c_ushort), ("filter", ctypes.c_char_p))
+
+
+def _filter_calls(content: bytes) -> None:
+    """Put this process under a filter of system calls, an array of `struct sock_filter`."""
+    program = _FilterProgram(len(content) // 8, content)
+    _prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0)
+    if _prctl(PR_SET_SECCOMP, 2, ctypes.byref(program), 0, 0) != 0:
+        raise OSError("the filter of system calls was refused")
 
 
 def _above(descriptor: int) -> int:

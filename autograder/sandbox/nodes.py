@@ -27,7 +27,7 @@ from typing import Any
 
 from autograder.errors import KitError
 from autograder.results import Isolation
-from autograder.sandbox import bubblewrap
+from autograder.sandbox import bubblewrap, seccomp
 from autograder.sandbox.environment import HERE, python_environment
 from autograder.sandbox.limits import Limits
 from autograder.sandbox.processes import Process, descendants, proportional_memory
@@ -168,9 +168,7 @@ class NodeSandbox:
         python = [sys.executable, "-I"]
         with (self._scratch / "launcher.log").open("wb") as log:
             if self.isolation is Isolation.FULL:
-                from autograder.sandbox.seccomp import filter_program
-
-                filtered = bubblewrap.memory_file("seccomp", filter_program())
+                filtered = bubblewrap.memory_file("seccomp", seccomp.filter_program())
                 process = bubblewrap.start_bwrap(
                     bubblewrap.inner_options(self.folder, self.limits, self._environment(), filtered),
                     [*python, f"{bubblewrap.KIT_FOLDER}/launcher.py", end],
@@ -235,6 +233,7 @@ class NodeSandbox:
             "cpus": sorted(random.sample(usable, min(cores, len(usable)))),
             "cores": cores,
             "limits": bubblewrap.rlimits(self.limits),
+            "filter": seccomp.no_processes().hex(),
         }
         with self._changed:
             launcher.programs[number] = program

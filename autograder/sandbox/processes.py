@@ -1,9 +1,10 @@
-"""Reading the process list: who descends from whom, and how much memory is whose."""
+"""Reading the process list: who descends from whom, how much memory is whose, and who waits for a CPU."""
 
 from __future__ import annotations
 
 import contextlib
 import os
+import time
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -64,3 +65,54 @@ def pid_of(handle: int) -> int:
         if line.startswith("Pid:"):
             return int(line.split()[1])
     return -1
+
+
+@dataclass(frozen=True)
+class CpuWait:
+    """What a thread has had of the CPUs."""
+
+    when: float
+    """Seconds on the monotonic clock at which this was read."""
+    waited: float
+    """Seconds for which it was ready to run and got no CPU, up to its last turn."""
+    turns: int
+    """How often it got one."""
+    ready: bool
+    """Whether it runs or waits for its turn now."""
+
+
+def cpu_waits(root: int) -> dict[int, dict[int, CpuWait]]:
+    """Return what the threads of `root` and its descendants have had of the CPUs, by process and thread.
+
+    Empty where the kernel does not count that (proc(5), `/proc/PID/schedstat`).
+    """
+    waits: dict[int, dict[int, CpuWait]] = {}
+    for pid in (root, *descendants(root)):
+        with contextlib.suppress(OSError):
+            for task in os.listdir(f"/proc/{pid}/task"):
+                with contextlib.suppress(OSError, IndexError, ValueError):
+                    folder = Path(f"/proc/{pid}/task/{task}")
+                    _, waited, turns = map(int, (folder / "schedstat").read_text().split())
+                    state = (folder / "stat").read_text().rpartition(")")[2].split()[0]
+                    now = CpuWait(time.monotonic(), waited / 1e9, turns, state == "R")
+                    waits.setdefault(pid, {})[int(task)] = now
+    return waits
+
+
+def kept_waiting(before: dict[int, dict[int, CpuWait]], after: dict[int, dict[int, CpuWait]]) -> float:
+    """Return by how many seconds a message through all these processes may have come late for want of a CPU.
+
+    It passes one process after another, so their waits add up; the threads of one wait side by side.
+    """
+    return sum(
+        max(_waited_since(before.get(pid, {}).get(thread), wait) for thread, wait in threads.items())
+        for pid, threads in after.items()
+    )
+
+
+def _waited_since(before: CpuWait | None, after: CpuWait) -> float:
+    if before is None:
+        return after.waited
+    if after.ready and before.ready and after.turns == before.turns:
+        return after.when - before.when  # the kernel adds a wait when it is over, and this one is not
+    return after.waited - before.waited

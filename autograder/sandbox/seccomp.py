@@ -31,8 +31,9 @@ _CALLS = {  # x86-64, the only architecture that the ROS wheels exist for
     "fanotify_init": 300, "modify_ldt": 154, "mbind": 237, "set_mempolicy": 238,
     "migrate_pages": 256, "move_pages": 279,
 }  # fmt: skip
-_CLONE, _CLONE3, _SOCKET, _SOCKETPAIR = 56, 435, 41, 53
+_CLONE, _FORK, _VFORK, _CLONE3, _SOCKET, _SOCKETPAIR = 56, 57, 58, 435, 41, 53
 _NAMESPACE_FLAGS = 0x7E020000  # every CLONE_NEW* that clone takes
+_THREAD_FLAG = 0x10000
 _FAMILIES = (1, 2, 10, 16)  # unix, IPv4, IPv6, netlink (listing the interfaces)
 
 _LOAD, _EQUAL, _SET, _AT_LEAST, _RETURN = 0x20, 0x15, 0x45, 0x35, 0x06
@@ -40,36 +41,59 @@ _ALLOW, _ERRNO, _KILL = 0x7FFF0000, 0x00050000, 0x80000000
 _ARCHITECTURE = 0xC000003E
 
 
+def _step(code: int, value: int, yes: int = 0, no: int = 0) -> bytes:
+    return struct.pack("HBBI", code, yes, no, value)
+
+
+_REFUSE = _step(_RETURN, _ERRNO | errno.EPERM)
+
+
 def filter_program() -> bytes:
-    """Return the filter as an array of `struct sock_filter`.
+    """Return the filter for everything in the node sandbox, as an array of `struct sock_filter`.
 
     Raises:
         KitError: this machine is not x86-64.
     """
+    program = _beginning()
+    for number in _CALLS.values():
+        program += [_step(_EQUAL, number, 0, 1), _REFUSE]
+    program += [_step(_EQUAL, _CLONE, 0, 4), _step(_LOAD, 16), _step(_SET, _NAMESPACE_FLAGS, 0, 1), _REFUSE]
+    program += [_step(_RETURN, _ALLOW)]
+    for call in (_SOCKET, _SOCKETPAIR):
+        checks = [_step(_LOAD, 16)]
+        for index, family in enumerate(_FAMILIES):
+            checks.append(_step(_EQUAL, family, len(_FAMILIES) - index, 0))
+        checks += [_step(_RETURN, _ERRNO | errno.EAFNOSUPPORT), _step(_RETURN, _ALLOW)]
+        program += [_step(_EQUAL, call, 0, len(checks)), *checks]
+    program += [_step(_RETURN, _ALLOW)]
+    return b"".join(program)
+
+
+def no_processes() -> bytes:
+    """Return a further filter, for one program of a student's: it may start threads, but no process.
+
+    A node needs none, and the processes of a fork bomb, hundreds at once, take the CPUs from every other submission
+    for seconds before any limit ends them.
+
+    Raises:
+        KitError: this machine is not x86-64.
+    """
+    program = _beginning()
+    for number in (_FORK, _VFORK):
+        program += [_step(_EQUAL, number, 0, 1), _REFUSE]
+    program += [_step(_EQUAL, _CLONE, 0, 3), _step(_LOAD, 16), _step(_SET, _THREAD_FLAG, 1, 0), _REFUSE]
+    return b"".join([*program, _step(_RETURN, _ALLOW)])
+
+
+def _beginning() -> list[bytes]:
+    """What every filter begins with; the number of the call is loaded after it."""
     if platform.machine() != "x86_64":
         raise KitError(f"The sandbox's filter of system calls is written for x86_64, not {platform.machine()}.")
-
-    def step(code: int, value: int, yes: int = 0, no: int = 0) -> bytes:
-        return struct.pack("HBBI", code, yes, no, value)
-
-    refuse = step(_RETURN, _ERRNO | errno.EPERM)
-    program = [
-        step(_LOAD, 4), step(_EQUAL, _ARCHITECTURE, 1, 0), step(_RETURN, _KILL),
-        step(_LOAD, 0), step(_AT_LEAST, 0x40000000, 0, 1), step(_RETURN, _KILL),  # the x32 calls
-        step(_EQUAL, _CLONE3, 0, 1), step(_RETURN, _ERRNO | errno.ENOSYS),  # its flags are out of reach: use clone
+    return [
+        _step(_LOAD, 4), _step(_EQUAL, _ARCHITECTURE, 1, 0), _step(_RETURN, _KILL),
+        _step(_LOAD, 0), _step(_AT_LEAST, 0x40000000, 0, 1), _step(_RETURN, _KILL),  # the x32 calls
+        _step(_EQUAL, _CLONE3, 0, 1), _step(_RETURN, _ERRNO | errno.ENOSYS),  # its flags are out of reach: use clone
     ]  # fmt: skip
-    for number in _CALLS.values():
-        program += [step(_EQUAL, number, 0, 1), refuse]
-    program += [step(_EQUAL, _CLONE, 0, 4), step(_LOAD, 16), step(_SET, _NAMESPACE_FLAGS, 0, 1), refuse]
-    program += [step(_RETURN, _ALLOW)]
-    for call in (_SOCKET, _SOCKETPAIR):
-        checks = [step(_LOAD, 16)]
-        for index, family in enumerate(_FAMILIES):
-            checks.append(step(_EQUAL, family, len(_FAMILIES) - index, 0))
-        checks += [step(_RETURN, _ERRNO | errno.EAFNOSUPPORT), step(_RETURN, _ALLOW)]
-        program += [step(_EQUAL, call, 0, len(checks)), *checks]
-    program += [step(_RETURN, _ALLOW)]
-    return b"".join(program)
 
 
 def apply_to_self() -> None:

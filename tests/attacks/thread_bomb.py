@@ -1,0 +1,10 @@
+"""Starts threads without end, and does not care for refusals."""
+
+import threading
+import time
+
+while True:
+    try:
+        threading.Thread(target=time.sleep, args=(600,), daemon=True).start()
+    except RuntimeError:
+        pass
