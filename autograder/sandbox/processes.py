@@ -10,6 +10,9 @@ from pathlib import Path
 
 _PAGE = os.sysconf("SC_PAGE_SIZE")
 
+_HAD_ITS_CHANCE = 2.0
+"""Seconds of CPU after which a thread was not kept from anything; to start a whole node takes a third of one."""
+
 
 @dataclass(frozen=True)
 class Process:
@@ -73,6 +76,8 @@ class CpuWait:
 
     when: float
     """Seconds on the monotonic clock at which this was read."""
+    ran: float
+    """Seconds for which it had one."""
     waited: float
     """Seconds for which it was ready to run and got no CPU, up to its last turn."""
     turns: int
@@ -92,9 +97,9 @@ def cpu_waits(root: int) -> dict[int, dict[int, CpuWait]]:
             for task in os.listdir(f"/proc/{pid}/task"):
                 with contextlib.suppress(OSError, IndexError, ValueError):
                     folder = Path(f"/proc/{pid}/task/{task}")
-                    _, waited, turns = map(int, (folder / "schedstat").read_text().split())
+                    ran, waited, turns = map(int, (folder / "schedstat").read_text().split())
                     state = (folder / "stat").read_text().rpartition(")")[2].split()[0]
-                    now = CpuWait(time.monotonic(), waited / 1e9, turns, state == "R")
+                    now = CpuWait(time.monotonic(), ran / 1e9, waited / 1e9, turns, state == "R")
                     waits.setdefault(pid, {})[int(task)] = now
     return waits
 
@@ -102,7 +107,8 @@ def cpu_waits(root: int) -> dict[int, dict[int, CpuWait]]:
 def kept_waiting(before: dict[int, dict[int, CpuWait]], after: dict[int, dict[int, CpuWait]]) -> float:
     """Return by how many seconds a message through all these processes may have come late for want of a CPU.
 
-    It passes one process after another, so their waits add up; the threads of one wait side by side.
+    It passes one process after another, so their waits add up; the threads of one wait side by side. A thread that does
+    nothing but compute waits for ever, and does not count.
     """
     return sum(
         max(_waited_since(before.get(pid, {}).get(thread), wait) for thread, wait in threads.items())
@@ -112,7 +118,9 @@ def kept_waiting(before: dict[int, dict[int, CpuWait]], after: dict[int, dict[in
 
 def _waited_since(before: CpuWait | None, after: CpuWait) -> float:
     if before is None:
-        return after.waited
+        before = CpuWait(after.when, 0.0, 0.0, 0, ready=False)
+    if after.ran - before.ran > _HAD_ITS_CHANCE:
+        return 0.0
     if after.ready and before.ready and after.turns == before.turns:
         return after.when - before.when  # the kernel adds a wait when it is over, and this one is not
     return after.waited - before.waited
