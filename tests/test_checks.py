@@ -215,6 +215,30 @@ def test_a_new_program_has_time_to_fail_before_something_else_is_held_against_it
     assert failure(result).code == "callback-exception" and "one" in failure(result).because
 
 
+def test_when_an_executor_notices_an_error_makes_no_difference(grade: Grade) -> None:
+    # With several threads it looks for errors only at its next event, and here none comes.
+    lingers = TALKER.replace("rclpy.spin(Talker())", "rclpy.spin(Talker(), MultiThreadedExecutor(num_threads=2))")
+    lingers = lingers.replace("import rclpy\n", "import rclpy\nfrom rclpy.executors import MultiThreadedExecutor\n", 1)
+    result = grade(
+        """\
+        with launch("talker", parameters={"period": 600.0}) as ros:
+            ros.expect_node("/talker")
+            ros.call("/how_many", Trigger, Trigger.Request(), within=3)
+            ros.expect_messages("/chatter", String)
+        ros.score(2)
+        """,
+        talker__py=lingers.replace("response.success = True", "raise ValueError('no')"),
+    )
+    assert [outcome.status for outcome in result.outcomes] == [Status.FAILED, *[Status.NOT_CHECKED] * 2]
+    assert failure(result).code == "service-exception" and "ValueError: no" in failure(result).because
+
+
+def test_a_program_that_starts_processes_is_told_why_it_may_not(grade: Grade) -> None:
+    source = "import subprocess\nsubprocess.run(['true'])\n"
+    result = grade('with launch("starter") as ros:\n    ros.expect_node("/starter")\nros.score(2)', starter__py=source)
+    assert failure(result).code == "refused-call" and "subprocess.run" in failure(result).because
+
+
 def test_a_missing_program_is_the_students_failure(grade: Grade) -> None:
     result = grade('with launch("talker") as ros:\n    ros.expect_node("/talker")\nros.score(2)')
     assert failure(result).code == "program-missing"

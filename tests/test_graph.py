@@ -1,8 +1,12 @@
-"""The parts that the expectations stand on: names, QoS matching, overlaps, parameter values on a command line."""
+"""The parts that the expectations stand on: names, QoS, overlaps, parameter values on a command line, deadlines."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Iterator, Sequence
 from types import SimpleNamespace
 
 import pytest
@@ -20,11 +24,15 @@ from rclpy.qos import (
     qos_check_compatible,
 )
 
+from autograder.checks import session
 from autograder.checks.activity import Activity
 from autograder.checks.launch import Node
 from autograder.graph.names import nearest
+from autograder.graph.observer import Observer
 from autograder.graph.qos import first_mismatch
 from autograder.graph.recording import Received
+from autograder.sandbox.environment import profile_environment
+from autograder.sandbox.processes import cpu_waits, kept_waiting
 
 
 def profiles() -> st.SearchStrategy[QoSProfile]:
@@ -116,3 +124,38 @@ def test_a_parameter_keeps_its_type_on_the_command_line(value: bool | int | floa
         context.try_shutdown()
     assert type(read) is type(value)
     assert read == value
+
+
+@pytest.fixture
+def observer() -> Iterator[Observer]:
+    os.environ.update(profile_environment())
+    watching = Observer(session.current.next_domain())
+    yield watching
+    watching.close()
+
+
+@pytest.fixture
+def crowded_cpu() -> Iterator[None]:
+    """Two programs that share one CPU, so that each waits while the other runs."""
+    source = f"import os\nos.sched_setaffinity(0, {{{min(os.sched_getaffinity(0))}}})\nwhile True: pass"
+    programs = [subprocess.Popen([sys.executable, "-c", source]) for _ in range(2)]
+    yield
+    for program in programs:
+        program.kill()
+        program.wait()
+
+
+@pytest.mark.usefixtures("crowded_cpu")
+def test_time_in_which_a_program_got_no_cpu_does_not_count_against_it(observer: Observer) -> None:
+    began = time.monotonic()
+    assert not observer.wait(lambda: False, within=2.0)
+    assert time.monotonic() - began > 2.5
+
+
+@pytest.mark.usefixtures("crowded_cpu")
+def test_a_thread_that_waits_for_a_cpu_has_waited_as_long_as_others_ran() -> None:
+    before = cpu_waits(os.getpid())
+    deadline = time.monotonic() + 20
+    while kept_waiting(before, cpu_waits(os.getpid())) < 0.5 and time.monotonic() < deadline:
+        time.sleep(0.05)
+    assert kept_waiting(before, cpu_waits(os.getpid())) >= 0.5
