@@ -171,7 +171,23 @@ _KNOWN_ERRORS = (
         "A program may not ask this of the system, new processes (`fork`, `subprocess`, `multiprocessing`) among it: "
         "use threads, or one more program in the launch.",
     ),
+    (
+        "InvalidHandle",
+        "used-after-destroy",
+        "It used something that had been destroyed. Under a MultiThreadedExecutor the executor does this itself, now "
+        "and then, while a callback destroys a publisher, subscription or timer (rclpy issue 1355): spin such a node "
+        "with a SingleThreadedExecutor.",
+    ),
+    (
+        "timer argument is null",
+        "used-after-destroy",
+        "A MultiThreadedExecutor asked a timer that a callback had just destroyed (rclpy issue 1355): spin a node that "
+        "destroys its timers with a SingleThreadedExecutor, or use `cancel()` and `reset()`.",
+    ),
 )
+
+_KIND = re.compile(r"[A-Za-z_][\w.]*(Error|Exception|Interrupt|Exit|Warning|Shutdown\w*)\b")
+"""What the line of an error begins with, by the names that errors usually have."""
 
 
 def last_traceback(output: str, program: str) -> Diagnosis | None:
@@ -179,7 +195,7 @@ def last_traceback(output: str, program: str) -> Diagnosis | None:
     lines = output.splitlines()
     error_at = None
     for number in range(len(lines) - 1, -1, -1):
-        if re.match(r"^[A-Za-z_][\w.]*(Error|Exception|Interrupt|Exit|Warning|Shutdown\w*)\b", lines[number]):
+        if _KIND.match(lines[number]) or _under_frames(lines, number):
             error_at = number
             break
     if error_at is None:
@@ -204,6 +220,18 @@ def last_traceback(output: str, program: str) -> Diagnosis | None:
     return Diagnosis(
         f"`{program}` {what}{where}{quoted}: {error}", kind, "The lines above it in the log say how it got there."
     )
+
+
+def _under_frames(lines: Sequence[str], number: int) -> bool:
+    """Whether this line is an error of any name: it stands under the frames of a traceback."""
+    if not re.match(r"[A-Za-z_][\w.]*(: |$)", lines[number]):
+        return False
+    for above in reversed(lines[:number]):
+        if above.startswith('  File "'):
+            return True
+        if not above.startswith("    "):
+            return False
+    return False
 
 
 def _callback_failure(program: RunningProgram) -> Diagnosis | None:

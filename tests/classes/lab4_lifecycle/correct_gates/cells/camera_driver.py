@@ -1,7 +1,7 @@
 %%node camera_driver
 import rclpy
 from camera_hardware import CameraHardware
-from rclpy.executors import ExternalShutdownException, MultiThreadedExecutor
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.lifecycle import LifecycleNode, TransitionCallbackReturn
 from sensor_msgs.msg import Image
 from std_msgs.msg import String
@@ -60,7 +60,7 @@ class CameraDriver(LifecycleNode):
 
 
 rclpy.init()
-executor = MultiThreadedExecutor(num_threads=2)
+executor = SingleThreadedExecutor()
 executor.add_node(CameraDriver())
 try:
     executor.spin()

@@ -1,6 +1,6 @@
 %%node sensor_publisher
 import rclpy
-from rclpy.executors import ExternalShutdownException, MultiThreadedExecutor
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.lifecycle import LifecycleNode, ManagedEntity, TransitionCallbackReturn
 from std_msgs.msg import String
 
@@ -41,7 +41,7 @@ class SensorPublisher(LifecycleNode):
 
 
 rclpy.init()
-executor = MultiThreadedExecutor(num_threads=4)
+executor = SingleThreadedExecutor()
 executor.add_node(SensorPublisher())
 try:
     executor.spin()
