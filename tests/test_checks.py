@@ -297,3 +297,90 @@ def test_a_table_of_answers_is_compared_question_by_question(grade: Grade) -> No
     assert wrong.because == "`threads` is 'two'; it must be a whole number from 1 to 98."
     assert failure(grade(check, table__yaml="overlap\n")).code == "not-yaml"
     assert failure(grade(check.replace("table.yaml", "other.yaml"))).code == "file-missing"
+
+
+COUNTER = """
+import time
+import rclpy
+from rclpy.action import ActionServer, CancelResponse, GoalResponse
+from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.executors import MultiThreadedExecutor
+from rclpy.node import Node
+from test_msgs.action import Fibonacci
+
+
+class Counter(Node):
+    def __init__(self):
+        super().__init__("counter")
+        self.server = ActionServer(
+            self,
+            Fibonacci,
+            "count",
+            self.count,
+            goal_callback=lambda goal: GoalResponse.ACCEPT if goal.order >= 0 else GoalResponse.REJECT,
+            cancel_callback=lambda handle: CancelResponse.ACCEPT,
+            callback_group=ReentrantCallbackGroup(),
+        )
+
+    def count(self, handle):
+        counted = []
+        while len(counted) < handle.request.order:
+            if handle.is_cancel_requested:
+                handle.canceled()
+                return Fibonacci.Result(sequence=counted)
+            counted.append(len(counted))
+            handle.publish_feedback(Fibonacci.Feedback(sequence=counted))
+            time.sleep(0.02)
+        handle.succeed()
+        return Fibonacci.Result(sequence=counted)
+
+
+rclpy.init()
+executor = MultiThreadedExecutor(num_threads=4)
+executor.add_node(Counter())
+executor.spin()
+"""
+
+
+def test_an_action_is_followed_from_the_goal_to_its_end(grade: Grade) -> None:
+    result = grade(
+        """\
+        from test_msgs.action import Fibonacci
+        with launch("counter") as ros:
+            short = ros.send_goal("/count", Fibonacci, Fibonacci.Goal(order=30))
+            ended = short.wait_for_result(within=10)
+            ros.expect_that(ended and short.status == "succeeded", "it succeeds", observed=short.status)
+            ros.expect_that(list(short.result.sequence) == list(range(30)), "its result", observed=short.result)
+            lengths = [len(feedback.sequence) for feedback in short.feedback]
+            ros.expect_that(lengths == list(range(1, 31)), "all feedback, in order", observed=lengths)
+            endless = ros.send_goal("/count", Fibonacci, Fibonacci.Goal(order=100_000))
+            ros.expect_that(endless.wait_for_feedback(3, within=10), "feedback while it runs")
+            ros.expect_that(endless.result is None, "no result while it runs")
+            ros.expect_that(endless.cancel() and endless.wait_for_result(within=10), "cancelling is agreed to")
+            ros.expect_that(endless.status == "canceled", "and done", observed=endless.status)
+            ros.expect_that(len(endless.result.sequence) >= 3, "with what was counted", observed=endless.result)
+            refused = ros.send_goal("/count", Fibonacci, Fibonacci.Goal(order=-1))
+            ros.expect_that(refused.accepted is False, "a goal below zero is rejected")
+            ros.expect_that(not refused.cancel(), "and cannot be cancelled")
+        ros.score(2)
+        """,
+        counter__py=COUNTER,
+    )
+    assert result.points == 2.0, result
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "code"),
+    [('"count"', '"cuont"', "no-action"), ("executor.spin()", "__import__('threading').Event().wait()", "not-spinning")],
+)
+def test_a_missing_action_and_a_silent_one_are_told_apart(grade: Grade, old: str, new: str, code: str) -> None:
+    result = grade(
+        """\
+        from test_msgs.action import Fibonacci
+        with launch("counter") as ros:
+            ros.send_goal("/count", Fibonacci, Fibonacci.Goal(order=1), within=4)
+        ros.score(2)
+        """,
+        counter__py=COUNTER.replace(old, new),
+    )
+    assert failure(result).code == code, result
