@@ -371,7 +371,10 @@ def test_an_action_is_followed_from_the_goal_to_its_end(grade: Grade) -> None:
 
 @pytest.mark.parametrize(
     ("old", "new", "code"),
-    [('"count"', '"cuont"', "no-action"), ("executor.spin()", "__import__('threading').Event().wait()", "not-spinning")],
+    [
+        ('"count"', '"cuont"', "no-action"),
+        ("executor.spin()", "__import__('threading').Event().wait()", "not-spinning"),
+    ],
 )
 def test_a_missing_action_and_a_silent_one_are_told_apart(grade: Grade, old: str, new: str, code: str) -> None:
     result = grade(
