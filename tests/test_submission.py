@@ -171,6 +171,12 @@ def test_defects_are_named_one_by_one(lab: Lab, tmp_path: Path) -> None:
     assert defect(say("talker", "%%file answers.yaml\nx")) == ["renamed-file", "same-file"]
 
 
+def test_the_labs_own_source_is_a_notebook_without_defects(lab: Lab, tmp_path: Path) -> None:
+    assert "HIDDEN TESTS" in json.dumps(lab.raw)
+    submission = read(lab, tmp_path, lab.raw["cells"])
+    assert submission.readable and codes(submission) == []
+
+
 def test_a_given_program_cannot_be_replaced(lab: Lab, tmp_path: Path) -> None:
     submission = read(lab, tmp_path, solved(lab, talker="%%node helper\nprint('mine')"))
     assert submission.files["helper.py"] == "print('given')\n"
