@@ -16,7 +16,14 @@ FOLDER = Path("nodes")
 
 
 def register(shell: Any) -> None:
-    """Give an IPython shell the `%%node` and `%%file` magics, and start each cell's findings afresh."""
+    """Give an IPython shell the `%%node` and `%%file` magics, and start each cell's findings afresh.
+
+    Programs of an earlier kernel are removed: one whose cell has been renamed or deleted since would still pass here,
+    and be missing when the notebook is graded.
+    """
+    for path in FOLDER.glob("*"):
+        if path.suffix in (".py", ".yaml", ".yml", ".json", ".csv"):
+            path.unlink(missing_ok=True)
     for magic in ("node", "file"):
         shell.register_magic_function(_writer(magic), magic_kind="cell", magic_name=magic)
     shell.events.register("pre_run_cell", _begin_cell)

@@ -299,6 +299,43 @@ def test_a_table_of_answers_is_compared_question_by_question(grade: Grade) -> No
     assert failure(grade(check.replace("table.yaml", "other.yaml"))).code == "file-missing"
 
 
+TWIN = """
+import time
+class Twin(Node):
+    def __init__(self):
+        probe = rclpy.create_node("probe")
+        names = []
+        while not names:
+            names = [name for name in probe.get_node_names() if name.startswith("grading_observer")]
+            time.sleep(0.01)
+        super().__init__(names[0])
+        self.publisher = self.create_publisher(String, "chatter", 10)
+        self.create_timer(0.05, lambda: self.publisher.publish(String(data="hello 7")))
+"""
+
+
+def test_the_observers_own_name_hides_nothing(grade: Grade) -> None:
+    def twin(spin: str) -> str:
+        return TALKER.replace("def main():", TWIN + "\n\ndef main():").replace("    rclpy.spin(Talker())", spin)
+
+    both = twin(
+        "    from rclpy.executors import SingleThreadedExecutor\n    executor = SingleThreadedExecutor()\n"
+        "    for node in (Talker(), Twin()):\n        executor.add_node(node)\n    executor.spin()"
+    )
+    check = """\
+        with launch("talker") as ros:
+            ros.{expectation}
+        ros.score(2)
+        """
+    result = grade(check.format(expectation='expect_messages("/chatter", String, at_least=40)'), talker__py=both)
+    assert failure(result).code == "extra-publisher" and "grading_observer" in failure(result).because
+    result = grade(
+        check.format(expectation='expect_publisher("/chatter", String, node="/talker")'),
+        talker__py=twin("    rclpy.spin(Twin())"),
+    )
+    assert "grading_observer" in failure(result).because, result
+
+
 COUNTER = """
 import time
 import rclpy

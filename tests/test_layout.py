@@ -71,7 +71,7 @@ def test_a_notebook_has_stable_ids_and_no_outputs(path: Path) -> None:
 # In parts, so that this file does not name what it looks for.
 HOSTS = "|".join(("pypi" + r"\.org", "python" + "hosted", "registry" + r"\.npm", "npm" + "js", "deb" + r"ian\.org"))
 FOREIGN = re.compile(
-    "|".join((HOSTS, "/" + "work/", "/" + r"root/\.", "/opt/" + "(pypi|wheels)", "shared" + "/design"))
+    "|".join((HOSTS, "/" + r"work\b", "/" + r"root/\.", "/opt/" + "(pypi|wheels)", "shared" + "/design"))
 )
 
 

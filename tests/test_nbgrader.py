@@ -227,6 +227,7 @@ def test_nothing_of_a_students_is_live_in_feedback_or_formgrader(course: Course)
     talker = "print('no')  # <img src=x onerror=alert(20)></script><script>alert(21)</script>"
     cells = course.cells(talker=talker, why=LIVE)
     cells.append(toy.cell("code", "1", 98, grade_id="<img src=x onerror=alert(22)>", grade=True, locked=True, points=1))
+    cells.append(toy.cell("code", "1", 97, grade_id="\r\r[j](javascript:alert(23))\r\r", grade=True, points=1))
     course.hand_in("live", cells)
     course.grade("live")
     assert Tags("<img src=x onerror=alert(1)><script>alert(2)</script>").live == [

@@ -31,6 +31,13 @@ def test_a_node_cell_becomes_a_program(shell: InteractiveShell, capsys: pytest.C
     assert [path.name for path in Path("nodes").iterdir()] == ["talker.py"]
 
 
+def test_a_new_kernel_knows_no_program_of_the_last_one(shell: InteractiveShell) -> None:
+    shell.run_cell("%%node talker\nprint('hello')\n")
+    Path("nodes/README").touch()
+    shell.run_line_magic("reload_ext", "autograder")
+    assert [path.name for path in Path("nodes").iterdir()] == ["README"]
+
+
 def test_a_file_cell_becomes_a_file(shell: InteractiveShell, capsys: pytest.CaptureFixture[str]) -> None:
     assert say(shell, "%%file camera.yaml\na: 1\n", capsys) == "file camera.yaml written"
     assert Path("nodes/camera.yaml").read_text() == "a: 1\n"

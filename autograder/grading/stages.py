@@ -110,7 +110,8 @@ class AttachResults(NbGraderPreprocessor):  # type: ignore[misc]
                 grade_id = cell.metadata.nbgrader["grade_id"]
                 points[grade_id] = _attach(cell, checks.get(grade_id), result)
         if result.problems:
-            note = render("problems.html", problems=result.problems).replace("\n", "")
+            # It quotes the student: no line of it may be the blank one that ends the HTML, and no word a link.
+            note = inert_text(" ".join(render("problems.html", problems=result.problems).split()))
             nb.cells.insert(0, nbformat.v4.new_markdown_cell(note, id="problems"))
         resources[_POINTS] = points
         return nb, resources
@@ -179,9 +180,13 @@ class InertAnswers(NbGraderPreprocessor):  # type: ignore[misc]
 
 def inert(markdown: str) -> str:
     """Return Markdown in which nothing can become a tag, a script link or a picture from elsewhere."""
-    parted = re.sub(r"<(?=[A-Za-z/!?])", "<\u2060", markdown)
+    return inert_text(re.sub(r"<(?=[A-Za-z/!?])", "<\u2060", markdown))
+
+
+def inert_text(markdown: str) -> str:
+    """Return Markdown in which nothing but tags can become a script link or a picture from elsewhere."""
     # What a browser fetches by itself would tell its owner who reads the page.
-    parted = parted.replace("![", "!\u2060[")
+    parted = markdown.replace("![", "!\u2060[")
     # Only links that plainly begin with http stay links: there are too many ways to spell the other schemes.
     return re.sub(r"\](?=(\(|:)(?!\s*https?://))", "]\u2060", parted)
 

@@ -111,7 +111,7 @@ def program_trouble(scene: Scene) -> Diagnosis | None:
         return Diagnosis(
             f"There is no program `{name}`: no cell that begins with `%%node {name}` was found.",
             "program-missing",
-            "Check the first line of the cell; it must stand there unchanged.",
+            "Check the first line of the cell, which must stand there unchanged; in a notebook, run the cell first.",
         )
     for trouble in scene.trouble:
         return trouble

@@ -21,6 +21,7 @@ from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
+from autograder.errors import KitError
 from autograder.graph.names import full_name
 from autograder.graph.recording import Recording, quiet_profile
 from autograder.sandbox.processes import CpuWait, cpu_waits, kept_waiting
@@ -50,7 +51,8 @@ class Observer:
         self.changed = threading.Condition()
         self._context = Context()
         rclpy.init(context=self._context, domain_id=domain_id, args=[])
-        # The random end keeps a student's node from taking this name by chance or by guess.
+        # The random end keeps a student's node from having this name by chance; what is the observer's own is told by
+        # its participant, for a name can be read off the graph and taken.
         self.name = f"{OBSERVER_NAME}_{time.monotonic_ns() % 0xFFFFFF:06x}"
         self.node: Node = rclpy.create_node(
             self.name,
@@ -61,11 +63,22 @@ class Observer:
             use_global_arguments=False,
             parameter_overrides=[Parameter("start_type_description_service", value=False)],
         )
+        self._participant = self._own_participant()
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self.node)
         self._recordings: dict[tuple[str, str], Recording] = {}
         self._thread = threading.Thread(target=self._spin, name="observer", daemon=True)
         self._thread.start()
+
+    def _own_participant(self) -> bytes:
+        """The GUID prefix of the endpoints made here; every rclpy node publishes its parameters' events."""
+        deadline = time.monotonic() + 10.0
+        while time.monotonic() < deadline:
+            for end in self.node.get_publishers_info_by_topic("/parameter_events"):
+                if end.node_name == self.name:
+                    return _participant(end)
+            time.sleep(POLL)
+        raise KitError("The observer does not find itself in the ROS graph.", "Run the command again.")
 
     def _spin(self) -> None:
         with contextlib.suppress(ExternalShutdownException):
@@ -117,7 +130,9 @@ class Observer:
     def nodes(self) -> list[str]:
         """Full names of all nodes but the observer, one entry per node: two nodes of one name are listed twice."""
         found = self.node.get_node_names_and_namespaces()
-        return sorted(full_name(namespace, name) for name, namespace in found if name != self.name)
+        if (self.name, "/") in found:
+            found.remove((self.name, "/"))  # once: another node of this very name stays
+        return sorted(full_name(namespace, name) for name, namespace in found)
 
     def topics(self) -> dict[str, list[str]]:
         """Topics and their type names, those that only the observer uses left out."""
@@ -129,24 +144,21 @@ class Observer:
 
     def publishers(self, topic: str) -> list[TopicEndpointInfo]:
         """Publishers of a topic, the observer's own left out."""
-        return [end for end in self.node.get_publishers_info_by_topic(topic) if end.node_name != self.name]
+        ends = self.node.get_publishers_info_by_topic(topic)
+        return [end for end in ends if _participant(end) != self._participant]
 
     def subscriptions(self, topic: str) -> list[TopicEndpointInfo]:
         """Subscriptions to a topic, the observer's own left out."""
-        return [end for end in self.node.get_subscriptions_info_by_topic(topic) if end.node_name != self.name]
+        ends = self.node.get_subscriptions_info_by_topic(topic)
+        return [end for end in ends if _participant(end) != self._participant]
 
     def services(self) -> dict[str, list[str]]:
-        """Services of all nodes but the observer, with their type names."""
+        """Services of all nodes, with their type names; the observer itself offers none."""
         found: dict[str, list[str]] = {}
         for name, namespace in self.node.get_node_names_and_namespaces():
-            if name != self.name:
-                try:
-                    pairs = self.node.get_service_names_and_types_by_node(name, namespace)
-                except (
-                    Exception
-                ):  # the node went away between the two questions (rclpy raises NodeNameNonExistentError)
-                    continue
-                found.update(pairs)
+            # A node may go away between the two questions (rclpy raises NodeNameNonExistentError).
+            with contextlib.suppress(Exception):
+                found.update(self.node.get_service_names_and_types_by_node(name, namespace))
         return found
 
     def record(self, topic: str, msg_type: type, qos: QoSProfile | None = None) -> Recording:
@@ -168,3 +180,8 @@ class Observer:
         """Make a publisher of the observer's; rclpy's own warnings about subscriptions that do not match are off."""
         quiet = PublisherEventCallbacks(use_default_callbacks=False)
         return self.node.create_publisher(msg_type, topic, qos, event_callbacks=quiet)
+
+
+def _participant(end: TopicEndpointInfo) -> bytes:
+    """The part of an endpoint's GID that all endpoints of a DDS participant have in common (RTPS 2.5, GUID prefix)."""
+    return bytes(end.endpoint_gid)[:12]

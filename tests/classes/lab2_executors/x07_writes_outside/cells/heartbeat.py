@@ -42,7 +42,7 @@ def attack():
     """Whether a file can be left anywhere that outlives this sandbox."""
     import os
 
-    for folder in ("/", "/etc", "/usr", "/home", "/root", "/work", "/var/lib", os.path.dirname(rclpy.__file__), os.getcwd()):
+    for folder in ("/", "/etc", "/usr", "/home", "/root", "/var/lib", os.path.dirname(rclpy.__file__), os.getcwd()):
         try:
             with open(f"{folder}/left_behind.txt", "w") as file:
                 file.write("I was here")
