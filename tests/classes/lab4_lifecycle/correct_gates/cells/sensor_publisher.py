@@ -27,8 +27,6 @@ class SensorPublisher(Node):
         self._n += 1
 
     def on_activate(self, state: State) -> TransitionCallbackReturn:
-        # The period may have been set since.
-        self._timer.timer_period_ns = int(self.get_parameter("period").value * 1e9)
         self._timer.reset()
         return super().on_activate(state)
 
