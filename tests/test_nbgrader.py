@@ -151,6 +151,23 @@ def test_markers_in_an_answer_are_only_words(course: Course) -> None:
     assert "# mine" in page and "what I looked for" in page
 
 
+def test_the_hook_before_grading_leaves_a_foreign_working_folder_alone(
+    course: Course, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from traitlets.config import Config
+
+    stage_b.prepare_nbgrader()
+    from autograder.grading.stages import configure
+
+    (tmp_path / "build").mkdir()
+    monkeypatch.chdir(tmp_path)
+    config = Config()
+    configure(config, course.root)
+    stage_b.register(course.root, toy.LAB)
+    config.Autograde.pre_convert_hook(assignment=toy.LAB, student="ann", notebooks=[])
+    assert list((tmp_path / "build").iterdir()) == []
+
+
 def test_a_result_that_lost_a_check_means_manual_grading(course: Course) -> None:
     course.hand_in("lost", course.cells())
     course.run("lost")

@@ -132,11 +132,10 @@ def register(root: Path, lab: str) -> None:
         generate(root, lab, Path(folder), gradebook=True)
 
 
-def before_autograde(assignment: str, student: str, notebooks: list[str]) -> None:
+def before_autograde(root: Path, assignment: str, student: str, notebooks: list[str]) -> None:
     """nbgrader's hook: note the lab's cells when `nbgrader autograde` meets a gradebook without them."""
     from nbgrader.api import Gradebook, MissingEntry
 
-    root = Path.cwd()
     with Gradebook(f"sqlite:///{root / 'build' / 'gradebook.db'}") as gradebook:
         try:
             gradebook.find_notebook(assignment, assignment)
