@@ -279,6 +279,7 @@ def test_a_folder_is_taken_in_without_following_links(tmp_path: Path) -> None:
     (tmp_path / "in" / "eve" / "toy.ipynb").symlink_to(secret)
     (tmp_path / "in" / "mallory").symlink_to(tmp_path)
     toy.hand_in(tmp_path / "in", "*", "glob")
+    toy.hand_in(tmp_path / "in" / "__MACOSX", "ann", "what a Mac packs")
     collected = collect(tmp_path / "in", toy.LAB, tmp_path / "course")
     assert {student: path.read_text() for student, path in collected.notebooks.items()} == {
         "ann": "ann", "bob": "", "eve": ""

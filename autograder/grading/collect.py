@@ -18,6 +18,8 @@ from autograder.files import write_beside
 from autograder.submission.reader import NOTEBOOK_BYTES
 
 _STUDENT = re.compile(r"[\w](?:[\w .@+-]{0,62}[\w@+-])?")
+_NOBODYS = (".", "__MACOSX")
+"""What the name of a folder begins with that a system or a packer made."""
 _MANY = 20_000
 """More entries than this in a zip are no class."""
 
@@ -70,7 +72,9 @@ def collect(source: Path, lab: str, root: Path) -> Collected:
 
 def _from_folder(source: Path, lab: str) -> dict[str, bytes]:
     folders = [
-        entry for entry in source.iterdir() if entry.is_dir() and not entry.is_symlink() and entry.name[0] != "."
+        entry
+        for entry in source.iterdir()
+        if entry.is_dir() and not entry.is_symlink() and not entry.name.startswith(_NOBODYS)
     ]
     return {folder.name: _notebook_in(folder, lab) for folder in folders}
 
@@ -122,7 +126,7 @@ def _from_zip(source: Path, lab: str) -> dict[str, bytes]:
 def _parts(name: str) -> tuple[str, ...]:
     """Return a member's path as names; empty if it tries to leave its folder, or belongs to the packer."""
     path = PurePosixPath(name.replace("\\", "/"))
-    if path.is_absolute() or ".." in path.parts or any(part.startswith((".", "__MACOSX")) for part in path.parts):
+    if path.is_absolute() or ".." in path.parts or any(part.startswith(_NOBODYS) for part in path.parts):
         return ()
     return path.parts
 
