@@ -52,6 +52,14 @@ def main() -> None:
         sys.exit(130)
     except BrokenPipeError:
         sys.exit(1)
+    except OSError as error:  # the machine refuses something, which is no defect of the kit
+        print(f"error: {error.filename or 'a file'}: {error.strerror or error}", file=sys.stderr)
+        print(
+            "  See that its folder exists, that you may write there, and that the disk has room.\n"
+            '  What another user left in the course\'s folder becomes yours by: sudo chown -R "$USER" build',
+            file=sys.stderr,
+        )
+        sys.exit(2)
     except Exception as error:
         import traceback
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import os
+import resource
 import signal
 import subprocess
 import sys
@@ -16,6 +17,7 @@ import pytest
 import toy
 from junitparser import JUnitXml
 
+from autograder.files import write_beside
 from autograder.submission.lab import load_lab
 
 KIT = Path(__file__).resolve().parent.parent
@@ -98,6 +100,29 @@ def test_a_broken_notebook_fails_its_checks(root: Path) -> None:
 def test_usage_errors_are_sentences_with_status_2(root: Path, arguments: list[str]) -> None:
     status, _, err = run(root, *arguments)
     assert status == 2 and err.strip()
+
+
+def test_what_the_machine_refuses_is_named_with_a_way_out(root: Path, tmp_path: Path) -> None:
+    status, _, err = run(root, "check", "class/dan/toy.ipynb", "--junit", "/proc/nowhere/j.xml")
+    assert status == 2 and "/proc/nowhere/j.xml: No such file" in err and "disk has room" in err
+    course = toy.make_course(tmp_path / "course")
+    (course / "build").touch()
+    status, _, err = run(course, "grade", "toy", str(root / "class"))
+    assert status == 2 and f"{course}/build/" in err and "chown" in err and "defect" not in err
+
+
+def test_a_full_disk_names_the_file_and_leaves_nothing_behind(tmp_path: Path) -> None:
+    path = tmp_path / "grades.csv"
+    path.write_text("whole")
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1000, hard))  # writing ends in the middle, as on a full disk
+    try:
+        with pytest.raises(OSError) as refused:
+            write_beside(path, "x" * 100_000)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert refused.value.filename == str(path)
+    assert {file.name: file.read_text() for file in tmp_path.iterdir()} == {"grades.csv": "whole"}
 
 
 def test_help_on_each_command(root: Path) -> None:
