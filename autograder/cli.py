@@ -20,6 +20,9 @@ from autograder.results import Isolation
 if TYPE_CHECKING:
     from autograder.submission.lab import Lab
 
+INTERRUPTED = 130
+"""Exit status after Ctrl-C; Typer takes the KeyboardInterrupt and exits with it, saying nothing."""
+
 app = typer.Typer(
     add_completion=False,
     no_args_is_help=True,
@@ -47,9 +50,11 @@ def main() -> None:
         if error.do:
             print(f"  {error.do}", file=sys.stderr)
         sys.exit(2)
-    except KeyboardInterrupt:
+    except (KeyboardInterrupt, SystemExit) as end:
+        if isinstance(end, SystemExit) and end.code != INTERRUPTED:
+            raise
         print("\nInterrupted.", file=sys.stderr)
-        sys.exit(130)
+        sys.exit(INTERRUPTED)
     except BrokenPipeError:
         sys.exit(1)
     except OSError as error:  # the machine refuses something, which is no defect of the kit

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import json
 import os
@@ -164,6 +165,18 @@ def test_a_class_is_graded_once_and_only_what_changed_again(root: Path) -> None:
     assert len(json.loads(run(root, "export", "gradescope")[1])) == 4
 
 
+def family_with_a_worker(process: subprocess.Popen[str]) -> list[psutil.Process]:
+    """Wait until a submission is being run, and return every process below this one."""
+    deadline = time.monotonic() + 60
+    while time.monotonic() < deadline and process.poll() is None:
+        with contextlib.suppress(psutil.NoSuchProcess):
+            family = psutil.Process(process.pid).children(recursive=True)
+            if any("autograder.grading.worker" in member.cmdline() for member in family):
+                return family
+        time.sleep(0.05)
+    pytest.fail("no submission is being run")
+
+
 def test_an_interrupt_keeps_finished_results_and_leaves_nothing_running(root: Path, tmp_path: Path) -> None:
     course = toy.make_course(tmp_path / "course")
     hand_in(course, "ann", "print('hello')")
@@ -172,12 +185,23 @@ def test_an_interrupt_keeps_finished_results_and_leaves_nothing_running(root: Pa
     process = start(course, "grade", "toy", "class", "--jobs", "4", start_new_session=True)
     assert process.stderr is not None
     assert "ann" in process.stderr.readline()
-    family = psutil.Process(process.pid).children(recursive=True)
-    assert any("autograder.grading.worker" in member.cmdline() for member in family)
+    family = family_with_a_worker(process)
     os.killpg(process.pid, signal.SIGINT)
     _, err = process.communicate(timeout=30)
     assert process.returncode == 130 and "1 of 4 results are kept" in err and "Traceback" not in err
     assert [path.name for path in (course / "build" / "results" / "toy").iterdir()] == ["ann.json"]
+    _, alive = psutil.wait_procs(family, timeout=10)
+    assert alive == []
+
+
+def test_an_interrupted_check_says_so(root: Path, tmp_path: Path) -> None:
+    course = toy.make_course(tmp_path / "course")
+    stuck = hand_in(course, "stuck", STUCK)
+    process = start(course, "check", str(stuck), start_new_session=True)
+    family = family_with_a_worker(process)
+    os.killpg(process.pid, signal.SIGINT)
+    _, err = process.communicate(timeout=30)
+    assert process.returncode == 130 and err == "\nInterrupted.\n"
     _, alive = psutil.wait_procs(family, timeout=10)
     assert alive == []
 
