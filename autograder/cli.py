@@ -166,11 +166,16 @@ def grade(
     from autograder.sandbox.isolation import choose
 
     run = grade_class(root, lab, source, Settings(choose(isolation), seed, force, jobs))
-    if as_json:
-        print("[" + ",\n".join(result.model_dump_json() for result in run.results) + "]")
-        raise typer.Exit(0)
     from autograder.report.terminal import class_view, console, plain, undecided_view
 
+    left_out = [plain(sentence) for sentence in run.refused]
+    left_out += [f"{plain(name)} is not in the gradebook: {plain(why)}" for name, why in run.unrecorded.items()]
+    status = 2 if run.unrecorded else 0
+    if as_json:
+        print("[" + ",\n".join(result.model_dump_json() for result in run.results) + "]")
+        for sentence in left_out:
+            print(sentence, file=sys.stderr)
+        raise typer.Exit(status)
     screen = console()
     screen.print(class_view(run.results))
     undecided = undecided_view(run.results)
@@ -178,10 +183,8 @@ def grade(
         screen.print()
         screen.print(undecided)
     screen.print()
-    for sentence in run.refused:
-        screen.print(plain(sentence), markup=False)
-    for student, why in run.unrecorded.items():
-        screen.print(f"{plain(student)} is not in the gradebook: {plain(why)}", markup=False)
+    for sentence in left_out:
+        screen.print(sentence, markup=False)
     screen.print(
         f"{len(run.results)} submissions in {run.seconds['all']:.0f} s ({run.seconds['recording']:.0f} s in nbgrader)"
     )
@@ -192,7 +195,7 @@ def grade(
         ("results", root / "build" / "results" / lab),
     ):
         screen.print(f"{label:<10} {path}", markup=False, soft_wrap=True)
-    raise typer.Exit(2 if run.unrecorded else 0)
+    raise typer.Exit(status)
 
 
 @app.command()
