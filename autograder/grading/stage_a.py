@@ -46,7 +46,7 @@ class Settings:
     @property
     def parallel(self) -> int:
         """How many run at once. A run mostly waits for messages, so a core carries several."""
-        return self.jobs or min(20, 5 * (os.cpu_count() or 1))
+        return self.jobs or min(20, 5 * len(os.sched_getaffinity(0)))
 
 
 def result_path(root: Path, lab: str, student: str) -> Path:
