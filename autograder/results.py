@@ -107,7 +107,7 @@ class SubmissionResult(_Model):
     student: str
     lab: str
     digest: str
-    """SHA-256 over the submission's files and the lab's source: it changes when either does."""
+    """SHA-256 over the submission's files, the lab's source and the kit's: it changes when any of them does."""
     isolation: Isolation
     seed: int = 0
     """Seed of the values that differ from run to run."""

@@ -6,6 +6,8 @@ import copy
 import json
 import os
 import shutil
+import subprocess
+import sys
 import tempfile
 import zipfile
 from pathlib import Path
@@ -22,6 +24,7 @@ from autograder.submission.lab import Lab, grade_id_of, load_lab
 from autograder.submission.magics import BadNameError, parse
 from autograder.submission.reader import NOTEBOOK_BYTES, Submission, read_submission
 
+ROOT = Path(__file__).resolve().parent.parent
 ORDINARY_USER = 12345
 
 
@@ -230,6 +233,26 @@ def test_the_digest_follows_the_answers_and_the_lab(lab: Lab, tmp_path: Path) ->
     path.write_text(path.read_text().replace("secret = 0", "secret = 1"))
     changed = load_lab(path.parent.parent.parent, toy.LAB)
     assert read(changed, tmp_path, solved(changed)).digest != digest
+
+
+def test_the_digest_follows_the_kit(lab: Lab, tmp_path: Path) -> None:
+    shutil.copytree(ROOT / "autograder", tmp_path / "autograder", ignore=shutil.ignore_patterns("__pycache__"))
+    path = toy.hand_in(tmp_path, "ann", solved(lab))
+    command = (
+        "import sys; from pathlib import Path; from autograder.submission import lab, reader\n"
+        "print(reader.read_submission(Path(sys.argv[1]), lab.load_lab(Path(sys.argv[2]), sys.argv[3])).digest)"
+    )
+
+    def digest() -> str:
+        arguments = [str(path), str(lab.notebook.parent.parent.parent), toy.LAB]
+        run = [sys.executable, "-c", command, *arguments]
+        environment = os.environ | {"PYTHONPATH": str(tmp_path)}
+        return subprocess.check_output(run, cwd=tmp_path, env=environment, text=True).strip()
+
+    assert digest() == read(lab, tmp_path, solved(lab)).digest
+    check = tmp_path / "autograder" / "checks" / "launch.py"
+    check.write_text(check.read_text() + "# changed\n")
+    assert digest() != read(lab, tmp_path, solved(lab)).digest
 
 
 json_values = st.recursive(

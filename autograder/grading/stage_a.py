@@ -18,7 +18,6 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
-from autograder import __version__
 from autograder.errors import KitError
 from autograder.grading.job import Cell, Job
 from autograder.results import SCHEMA_VERSION, CheckResult, Isolation, Outcome, Status, SubmissionResult
@@ -69,7 +68,7 @@ def stored_result(
         result = SubmissionResult.load(path)
     except (OSError, ValueError):
         return None
-    same = result.digest == digest and result.kit_version == __version__ and result.schema_version == SCHEMA_VERSION
+    same = result.digest == digest and result.schema_version == SCHEMA_VERSION
     return result if same and isolation in (None, result.isolation) and seed in (None, result.seed) else None
 
 
