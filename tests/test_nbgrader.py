@@ -139,7 +139,7 @@ def test_no_verdict_means_manual_grading(course: Course) -> None:
     course.grade("died")
     assert course.grades("died")["check_talker"] == (None, True)
     rows = stage_b.write_grades(course.root).read_text().splitlines()
-    assert rows[0] == "student,lab,score,max_score" and "died,toy,,9" in rows
+    assert rows[0] == "student,lab,score,max_score,waiting" and "died,toy,,9,2" in rows
     assert "an instructor decides" in course.feedback("died")
 
 
@@ -306,7 +306,7 @@ def test_a_manual_grade_stays_and_reaches_the_feedback(course: Course) -> None:
     course.grade("manual")
     assert "(Score: 7.5 / 9.0)" in course.feedback("manual")
     course.grade("manual", force=True)
-    assert "manual,toy,7.5,9" in stage_b.write_grades(course.root).read_text()
+    assert "manual,toy,7.5,9,0\n" in stage_b.write_grades(course.root).read_text()
 
 
 def test_changed_graded_cells_are_refused_with_a_way_out(course: Course, tmp_path: Path) -> None:
