@@ -38,6 +38,8 @@ NO_NETWORK = re.compile(
     r"|tcp connect error",
     re.IGNORECASE,
 )
+NO_SPACE = re.compile(r"No space left on device|Disk quota exceeded", re.IGNORECASE)
+FULL_DISK = 16 << 20  # bytes
 PIP_INSTALL = ("install", "--quiet", "--retries=2", "--disable-pip-version-check", "--no-deps", "--require-hashes")
 PROBE = """
 import json, platform, struct, sys, sysconfig
@@ -112,6 +114,24 @@ def refuse_other_machines() -> None:
         "The ROS 2 packages exist for Linux on x86_64 with glibc 2.28 or newer; %s." % found,
         "Use such a machine, WSL 2 on Windows, or the container described in .devcontainer.",
     )
+
+
+def refuse_closed_folder(folder: Path) -> None:
+    """Raise SetUpError if this user may not write to `folder`."""
+    if not os.access(str(folder), os.W_OK):
+        raise SetUpError(
+            "This user may not write to %s." % folder,
+            'Work in a copy that is yours, or make it yours: sudo chown -R "$USER" \'%s\'' % ROOT,
+        )
+
+
+def refuse_full_disk(text: str) -> None:
+    """Raise SetUpError if a command failed because the disk is full: its output or the disk says so."""
+    if NO_SPACE.search(text) or shutil.disk_usage(str(ROOT)).free < FULL_DISK:  # venv keeps what ensurepip said
+        raise SetUpError(
+            "There is no space left:\n%s" % tail(text),
+            "Free 1.5 GB (df -h says where space is lacking), then run it again.",
+        )
 
 
 def clean_environment() -> "Dict[str, str]":
@@ -255,6 +275,7 @@ def create(base: Interpreter) -> "List[str]":
     options = [] if base.ensurepip else ["--without-pip"]
     status, text = output_of(base.program, "-I", "-m", "venv", *options, str(VENV))
     if status:
+        refuse_full_disk(text)
         raise SetUpError(
             "%s -m venv failed:\n%s" % (base.program, tail(text)), "Debian, Ubuntu: sudo apt-get install python3-venv"
         )
@@ -311,6 +332,7 @@ def fill(pip: "List[str]", lock: str) -> None:
         status, text = output_of(uv, "pip", "install", *options, "-r", str(ROOT / lock), **settings_for_uv(pip))
         if status == 0:
             return
+        refuse_full_disk(text)
         trouble = text.strip()
     if not pip:
         raise SetUpError(
@@ -320,11 +342,12 @@ def fill(pip: "List[str]", lock: str) -> None:
     say("  uv does not manage:\n%s\n  pip does the same in a minute or two" % tail(trouble))
     status, text = output_of(*pip, *PIP_INSTALL, "-r", str(ROOT / lock))
     if status:
+        refuse_full_disk(text)
         if NO_NETWORK.search(text):
             raise no_network(text)
         raise SetUpError(
             "The packages could not be installed:\n%s" % tail(text),
-            "Look for the reason in these lines (free space: 1.5 GB are needed), then run it again.",
+            "Look for the reason in these lines, then run it again.",
         )
 
 
@@ -358,6 +381,7 @@ def make_ready(dev: bool, wanted: str) -> None:
     if all(known.get(lock) == digest(lock) for lock in locks):
         return
     refuse_other_machines()
+    refuse_closed_folder(VENV if state else ROOT)
     started = time.time()
     if state:
         say("Bringing .venv up to date with %s" % locks[-1])

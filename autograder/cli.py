@@ -20,6 +20,9 @@ from autograder.results import Isolation
 if TYPE_CHECKING:
     from autograder.submission.lab import Lab
 
+INTERRUPTED = 130
+"""Exit status after Ctrl-C; Typer takes the KeyboardInterrupt and exits with it, saying nothing."""
+
 app = typer.Typer(
     add_completion=False,
     no_args_is_help=True,
@@ -47,11 +50,21 @@ def main() -> None:
         if error.do:
             print(f"  {error.do}", file=sys.stderr)
         sys.exit(2)
-    except KeyboardInterrupt:
+    except (KeyboardInterrupt, SystemExit) as end:
+        if isinstance(end, SystemExit) and end.code != INTERRUPTED:
+            raise
         print("\nInterrupted.", file=sys.stderr)
-        sys.exit(130)
+        sys.exit(INTERRUPTED)
     except BrokenPipeError:
         sys.exit(1)
+    except OSError as error:  # the machine refuses something, which is no defect of the kit
+        print(f"error: {error.filename or 'a file'}: {error.strerror or error}", file=sys.stderr)
+        print(
+            "  See that its folder exists, that you may write there, and that the disk has room.\n"
+            '  What another user left in the course\'s folder becomes yours by: sudo chown -R "$USER" build',
+            file=sys.stderr,
+        )
+        sys.exit(2)
     except Exception as error:
         import traceback
 
@@ -153,11 +166,16 @@ def grade(
     from autograder.sandbox.isolation import choose
 
     run = grade_class(root, lab, source, Settings(choose(isolation), seed, force, jobs))
-    if as_json:
-        print("[" + ",\n".join(result.model_dump_json() for result in run.results) + "]")
-        raise typer.Exit(0)
     from autograder.report.terminal import class_view, console, plain, undecided_view
 
+    left_out = [plain(sentence) for sentence in run.refused]
+    left_out += [f"{plain(name)} is not in the gradebook: {plain(why)}" for name, why in run.unrecorded.items()]
+    status = 2 if run.unrecorded else 0
+    if as_json:
+        print("[" + ",\n".join(result.model_dump_json() for result in run.results) + "]")
+        for sentence in left_out:
+            print(sentence, file=sys.stderr)
+        raise typer.Exit(status)
     screen = console()
     screen.print(class_view(run.results))
     undecided = undecided_view(run.results)
@@ -165,10 +183,8 @@ def grade(
         screen.print()
         screen.print(undecided)
     screen.print()
-    for sentence in run.refused:
-        screen.print(plain(sentence), markup=False)
-    for student, why in run.unrecorded.items():
-        screen.print(f"{plain(student)} is not in the gradebook: {plain(why)}", markup=False)
+    for sentence in left_out:
+        screen.print(sentence, markup=False)
     screen.print(
         f"{len(run.results)} submissions in {run.seconds['all']:.0f} s ({run.seconds['recording']:.0f} s in nbgrader)"
     )
@@ -179,7 +195,7 @@ def grade(
         ("results", root / "build" / "results" / lab),
     ):
         screen.print(f"{label:<10} {path}", markup=False, soft_wrap=True)
-    raise typer.Exit(2 if run.unrecorded else 0)
+    raise typer.Exit(status)
 
 
 @app.command()

@@ -5,13 +5,13 @@ The JSON form is versioned by `SCHEMA_VERSION`. It is written by stage A (runnin
 
 from __future__ import annotations
 
-import os
 from enum import StrEnum
 from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict, Field
 
 from autograder import __version__
+from autograder.files import write_beside
 
 SCHEMA_VERSION = 1
 
@@ -107,7 +107,7 @@ class SubmissionResult(_Model):
     student: str
     lab: str
     digest: str
-    """SHA-256 over the submission's files and the lab's source: it changes when either does."""
+    """SHA-256 over the submission's files, the lab's source and the kit's: it changes when any of them does."""
     isolation: Isolation
     seed: int = 0
     """Seed of the values that differ from run to run."""
@@ -135,10 +135,7 @@ class SubmissionResult(_Model):
 
     def save(self, path: Path) -> None:
         """Write the result as JSON, whole or not at all."""
-        path.parent.mkdir(parents=True, exist_ok=True)
-        beside = path.with_name(f".{path.name}.{os.getpid()}")
-        beside.write_text(self.model_dump_json(indent=1) + "\n", encoding="utf-8")
-        beside.replace(path)
+        write_beside(path, self.model_dump_json(indent=1) + "\n")
 
     @classmethod
     def load(cls, path: Path) -> SubmissionResult:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import json
 import os
+import resource
 import signal
 import subprocess
 import sys
@@ -16,6 +18,7 @@ import pytest
 import toy
 from junitparser import JUnitXml
 
+from autograder.files import write_beside
 from autograder.submission.lab import load_lab
 
 KIT = Path(__file__).resolve().parent.parent
@@ -100,6 +103,29 @@ def test_usage_errors_are_sentences_with_status_2(root: Path, arguments: list[st
     assert status == 2 and err.strip()
 
 
+def test_what_the_machine_refuses_is_named_with_a_way_out(root: Path, tmp_path: Path) -> None:
+    status, _, err = run(root, "check", "class/dan/toy.ipynb", "--junit", "/proc/nowhere/j.xml")
+    assert status == 2 and "/proc/nowhere/j.xml: No such file" in err and "disk has room" in err
+    course = toy.make_course(tmp_path / "course")
+    (course / "build").touch()
+    status, _, err = run(course, "grade", "toy", str(root / "class"))
+    assert status == 2 and f"{course}/build/" in err and "chown" in err and "defect" not in err
+
+
+def test_a_full_disk_names_the_file_and_leaves_nothing_behind(tmp_path: Path) -> None:
+    path = tmp_path / "grades.csv"
+    path.write_text("whole")
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1000, hard))  # writing ends in the middle, as on a full disk
+    try:
+        with pytest.raises(OSError) as refused:
+            write_beside(path, "x" * 100_000)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert refused.value.filename == str(path)
+    assert {file.name: file.read_text() for file in tmp_path.iterdir()} == {"grades.csv": "whole"}
+
+
 def test_help_on_each_command(root: Path) -> None:
     for command in ("doctor", "release", "check", "grade", "report", "export"):
         status, out, _ = run(root, command, "--help")
@@ -114,8 +140,8 @@ def test_a_class_is_graded_once_and_only_what_changed_again(root: Path) -> None:
     assert "2/5" in rows["bob"] and "ZeroDivisionError" in rows["bob"]
     assert "2/5" in rows["cem"] and "0/5" in rows["dan"] and "not valid JSON" in rows["dan"]
     with (root / "build" / "grades.csv").open() as file:
-        scores = {row["student"]: (row["score"], row["max_score"]) for row in csv.DictReader(file)}
-    assert scores == {"ann": ("5", "9"), "bob": ("2", "9"), "cem": ("2", "9"), "dan": ("0", "9")}
+        scores = {row["student"]: (row["score"], row["waiting"]) for row in csv.DictReader(file)}
+    assert scores == {"ann": ("5", "1"), "bob": ("2", "1"), "cem": ("2", "1"), "dan": ("0", "0")}
     for student in scores:
         assert (root / "build" / "feedback" / student / "toy" / "toy.html").is_file()
 
@@ -139,6 +165,18 @@ def test_a_class_is_graded_once_and_only_what_changed_again(root: Path) -> None:
     assert len(json.loads(run(root, "export", "gradescope")[1])) == 4
 
 
+def family_with_a_worker(process: subprocess.Popen[str]) -> list[psutil.Process]:
+    """Wait until a submission is being run, and return every process below this one."""
+    deadline = time.monotonic() + 60
+    while time.monotonic() < deadline and process.poll() is None:
+        with contextlib.suppress(psutil.NoSuchProcess):
+            family = psutil.Process(process.pid).children(recursive=True)
+            if any("autograder.grading.worker" in member.cmdline() for member in family):
+                return family
+        time.sleep(0.05)
+    pytest.fail("no submission is being run")
+
+
 def test_an_interrupt_keeps_finished_results_and_leaves_nothing_running(root: Path, tmp_path: Path) -> None:
     course = toy.make_course(tmp_path / "course")
     hand_in(course, "ann", "print('hello')")
@@ -147,14 +185,40 @@ def test_an_interrupt_keeps_finished_results_and_leaves_nothing_running(root: Pa
     process = start(course, "grade", "toy", "class", "--jobs", "4", start_new_session=True)
     assert process.stderr is not None
     assert "ann" in process.stderr.readline()
-    family = psutil.Process(process.pid).children(recursive=True)
-    assert any("autograder.grading.worker" in member.cmdline() for member in family)
+    family = family_with_a_worker(process)
     os.killpg(process.pid, signal.SIGINT)
     _, err = process.communicate(timeout=30)
     assert process.returncode == 130 and "1 of 4 results are kept" in err and "Traceback" not in err
     assert [path.name for path in (course / "build" / "results" / "toy").iterdir()] == ["ann.json"]
     _, alive = psutil.wait_procs(family, timeout=10)
     assert alive == []
+
+
+def test_an_interrupted_check_says_so(root: Path, tmp_path: Path) -> None:
+    course = toy.make_course(tmp_path / "course")
+    stuck = hand_in(course, "stuck", STUCK)
+    process = start(course, "check", str(stuck), start_new_session=True)
+    family = family_with_a_worker(process)
+    os.killpg(process.pid, signal.SIGINT)
+    _, err = process.communicate(timeout=30)
+    assert process.returncode == 130 and err == "\nInterrupted.\n"
+    _, alive = psutil.wait_procs(family, timeout=10)
+    assert alive == []
+
+
+def test_json_tells_what_was_left_out_and_fails_like_the_table(tmp_path: Path) -> None:
+    course = toy.make_course(tmp_path / "course")
+    for student in ("ann", "bob", "*"):
+        toy.hand_in(course / "class", student, "{")
+    (course / "build" / "autograded").mkdir(parents=True)
+    (course / "build" / "autograded" / "bob").touch()  # nbgrader needs a folder there
+    (course / "build" / "gradebook.db").touch()
+    for arguments in (("--json",), ()):
+        status, out, err = run(course, "grade", "toy", "class", *arguments)
+        told = err if arguments else out
+        assert status == 2 and "bob is not in the gradebook" in told and "'*' cannot be" in told
+        if arguments:
+            assert {result["student"] for result in json.loads(out)} == {"ann", "bob"}
 
 
 def test_release_writes_what_students_receive(root: Path) -> None:

@@ -139,7 +139,7 @@ def test_no_verdict_means_manual_grading(course: Course) -> None:
     course.grade("died")
     assert course.grades("died")["check_talker"] == (None, True)
     rows = stage_b.write_grades(course.root).read_text().splitlines()
-    assert rows[0] == "student,lab,score,max_score" and "died,toy,,9" in rows
+    assert rows[0] == "student,lab,score,max_score,waiting" and "died,toy,,9,2" in rows
     assert "an instructor decides" in course.feedback("died")
 
 
@@ -149,6 +149,23 @@ def test_markers_in_an_answer_are_only_words(course: Course) -> None:
     course.grade("marker")
     page = course.feedback("marker")
     assert "# mine" in page and "what I looked for" in page
+
+
+def test_the_hook_before_grading_leaves_a_foreign_working_folder_alone(
+    course: Course, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from traitlets.config import Config
+
+    stage_b.prepare_nbgrader()
+    from autograder.grading.stages import configure
+
+    (tmp_path / "build").mkdir()
+    monkeypatch.chdir(tmp_path)
+    config = Config()
+    configure(config, course.root)
+    stage_b.register(course.root, toy.LAB)
+    config.Autograde.pre_convert_hook(assignment=toy.LAB, student="ann", notebooks=[])
+    assert list((tmp_path / "build").iterdir()) == []
 
 
 def test_a_result_that_lost_a_check_means_manual_grading(course: Course) -> None:
@@ -290,7 +307,7 @@ def test_a_manual_grade_stays_and_reaches_the_feedback(course: Course) -> None:
     course.grade("manual")
     assert "(Score: 7.5 / 9.0)" in course.feedback("manual")
     course.grade("manual", force=True)
-    assert "manual,toy,7.5,9" in stage_b.write_grades(course.root).read_text()
+    assert "manual,toy,7.5,9,0\n" in stage_b.write_grades(course.root).read_text()
 
 
 def test_changed_graded_cells_are_refused_with_a_way_out(course: Course, tmp_path: Path) -> None:

@@ -349,13 +349,43 @@ def test_an_ordinary_user_can_do_it(ordinary_folder: Path) -> None:
     assert (folder / ".venv" / bootstrap.MARKER.name).stat().st_uid == ORDINARY_USER
 
 
-@pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
-def test_a_read_only_checkout_is_explained(tmp_path: Path) -> None:
-    folder = check_out(tmp_path / "course")
+def test_a_checkout_of_somebody_elses_is_explained(ordinary_folder: Path) -> None:
+    folder = check_out(ordinary_folder / "course")
+    ordinary_folder.chmod(0o755)
     folder.chmod(0o555)
+    become = {"user": ORDINARY_USER, "group": ORDINARY_USER, "extra_groups": []} if os.geteuid() == 0 else {}
     try:
-        done = make(folder, "setup")
+        done = subprocess.run(
+            [MAKE, "-C", folder, "setup"],
+            env=ENVIRON | {"HOME": str(ordinary_folder), "PATH": SYSTEM_PATH if become else ENVIRON["PATH"]},
+            cwd="/", capture_output=True, text=True, check=False, **become,
+        )  # type: ignore[call-overload]  # fmt: skip
     finally:
         folder.chmod(0o755)
+    if "needs Python" in done.stderr:
+        pytest.skip("every Python here that would do is root's own")
     assert done.returncode == 2
-    assert "What to do" in done.stderr
+    assert f"may not write to {folder}" in done.stderr
+    assert "chown" in done.stderr and "python3-venv" not in done.stderr
+
+
+def test_a_full_disk_is_explained(tmp_path: Path) -> None:
+    # A disk of one megabyte, in a mount tree of its own.
+    unshare = ["unshare", "--mount"] if os.geteuid() == 0 else ["unshare", "--user", "--map-root-user", "--mount"]
+    mount = ["mount", "-t", "tmpfs", "-o", "size=1m", "none", str(tmp_path)]
+    if subprocess.run([*unshare, *mount], capture_output=True, check=False).returncode:
+        pytest.skip("this machine lets nobody mount a small disk")
+    steps = '"$@" && cp -r "$COPY/." "$DISK" && exec make -C "$DISK" setup'
+    copy = tmp_path.with_name(f"{tmp_path.name} copy")
+    (copy / "autograder").mkdir(parents=True)
+    for name in ("Makefile", "autograder/bootstrap.py"):
+        shutil.copy(ROOT / name, copy / name)
+    for lock in ("requirements.lock", "requirements-dev.lock"):
+        write_lock(copy, lock, "uv")
+    done = subprocess.run(
+        [*unshare, "sh", "-c", steps, "sh", *mount],
+        env=ENVIRON | {"COPY": str(copy), "DISK": str(tmp_path)}, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 2
+    assert "no space left" in done.stderr and "Free 1.5 GB" in done.stderr
+    assert "python3-venv" not in done.stderr

@@ -5,6 +5,10 @@ from __future__ import annotations
 import copy
 import json
 import os
+import shutil
+import subprocess
+import sys
+import tempfile
 import zipfile
 from pathlib import Path
 from typing import Any
@@ -19,6 +23,9 @@ from autograder.grading.collect import collect
 from autograder.submission.lab import Lab, grade_id_of, load_lab
 from autograder.submission.magics import BadNameError, parse
 from autograder.submission.reader import NOTEBOOK_BYTES, Submission, read_submission
+
+ROOT = Path(__file__).resolve().parent.parent
+ORDINARY_USER = 12345
 
 
 @pytest.fixture
@@ -228,6 +235,26 @@ def test_the_digest_follows_the_answers_and_the_lab(lab: Lab, tmp_path: Path) ->
     assert read(changed, tmp_path, solved(changed)).digest != digest
 
 
+def test_the_digest_follows_the_kit(lab: Lab, tmp_path: Path) -> None:
+    shutil.copytree(ROOT / "autograder", tmp_path / "autograder", ignore=shutil.ignore_patterns("__pycache__"))
+    path = toy.hand_in(tmp_path, "ann", solved(lab))
+    command = (
+        "import sys; from pathlib import Path; from autograder.submission import lab, reader\n"
+        "print(reader.read_submission(Path(sys.argv[1]), lab.load_lab(Path(sys.argv[2]), sys.argv[3])).digest)"
+    )
+
+    def digest() -> str:
+        arguments = [str(path), str(lab.notebook.parent.parent.parent), toy.LAB]
+        run = [sys.executable, "-c", command, *arguments]
+        environment = os.environ | {"PYTHONPATH": str(tmp_path)}
+        return subprocess.check_output(run, cwd=tmp_path, env=environment, text=True).strip()
+
+    assert digest() == read(lab, tmp_path, solved(lab)).digest
+    check = tmp_path / "autograder" / "checks" / "launch.py"
+    check.write_text(check.read_text() + "# changed\n")
+    assert digest() != read(lab, tmp_path, solved(lab)).digest
+
+
 json_values = st.recursive(
     st.none() | st.booleans() | st.integers() | st.text(max_size=5),
     lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.sampled_from(
@@ -261,6 +288,50 @@ def test_a_zip_is_taken_in(tmp_path: Path, form: str) -> None:
     assert {student: path.read_text() for student, path in found.items()} == {"ann": "ann", "bob": "bob"}
 
 
+@pytest.mark.parametrize("packing", [zipfile.ZIP_DEFLATED, zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA])
+@pytest.mark.parametrize("kept", [0, 12, 40])
+def test_a_damaged_member_of_a_zip_stops_nobody_else(tmp_path: Path, packing: int, kept: int) -> None:
+    archive = tmp_path / "in.zip"
+    with zipfile.ZipFile(archive, "w", packing) as made:
+        for student in ("ann", "bob"):
+            made.writestr(f"{student}/toy.ipynb", student + "".join(map(str, range(200))))
+        packed, size = made.getinfo("ann/toy.ipynb").header_offset, made.getinfo("ann/toy.ipynb").compress_size
+    content = bytearray(archive.read_bytes())
+    start = packed + 30 + len("ann/toy.ipynb")
+    content[start + kept : start + size] = b"\xff" * (size - kept)
+    archive.write_bytes(content)
+    collected = collect(archive, toy.LAB, tmp_path / "course")
+    assert {student: path.read_text()[:3] for student, path in collected.notebooks.items()} == {"ann": "", "bob": "bob"}
+    assert len(collected.refused) == 1 and "ann/toy.ipynb" in collected.refused[0]
+
+
+def test_a_zip_with_a_damaged_directory_is_a_sentence(tmp_path: Path) -> None:
+    archive = make_zip(tmp_path / "in.zip", {"ann/toy.ipynb": "ann", "bob/toy.ipynb": "bob"})
+    archive.write_bytes(archive.read_bytes().replace(b"PK\x01\x02", b"XX\x01\x02"))
+    with pytest.raises(KitError, match="nor a zip that can be read"):
+        collect(archive, toy.LAB, tmp_path / "course")
+
+
+def test_a_folder_that_may_not_be_entered_stops_nobody_else() -> None:
+    # Below a folder that everybody may enter, since root has to become somebody else to be refused anything.
+    folder = Path(tempfile.mkdtemp())
+    folder.chmod(0o777)
+    toy.hand_in(folder / "in", "ann", "ann")
+    closed = toy.hand_in(folder / "in", "bob", "bob").parent
+    closed.chmod(0)
+    was = os.geteuid()
+    os.seteuid(was or ORDINARY_USER)
+    try:
+        collected = collect(folder / "in", toy.LAB, folder / "course")
+        texts = {student: path.read_text() for student, path in collected.notebooks.items()}
+    finally:
+        os.seteuid(was)
+        closed.chmod(0o700)
+        shutil.rmtree(folder)
+    assert texts == {"ann": "ann", "bob": ""}
+    assert len(collected.refused) == 1 and "bob cannot be read" in collected.refused[0]
+
+
 def test_a_zip_cannot_write_elsewhere(tmp_path: Path) -> None:
     members = {"../evil/toy.ipynb": "x", "/abs/toy.ipynb": "x", "a/../../evil/toy.ipynb": "x", "ann/toy.ipynb": "ok"}
     archive = make_zip(tmp_path / "in.zip", members | {"ann/ipykernel_launcher.py": "x", "..\\evil\\toy.ipynb": "x"})
@@ -279,6 +350,7 @@ def test_a_folder_is_taken_in_without_following_links(tmp_path: Path) -> None:
     (tmp_path / "in" / "eve" / "toy.ipynb").symlink_to(secret)
     (tmp_path / "in" / "mallory").symlink_to(tmp_path)
     toy.hand_in(tmp_path / "in", "*", "glob")
+    toy.hand_in(tmp_path / "in" / "__MACOSX", "ann", "what a Mac packs")
     collected = collect(tmp_path / "in", toy.LAB, tmp_path / "course")
     assert {student: path.read_text() for student, path in collected.notebooks.items()} == {
         "ann": "ann", "bob": "", "eve": ""

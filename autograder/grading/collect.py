@@ -18,6 +18,8 @@ from autograder.files import write_beside
 from autograder.submission.reader import NOTEBOOK_BYTES
 
 _STUDENT = re.compile(r"[\w](?:[\w .@+-]{0,62}[\w@+-])?")
+_NOBODYS = (".", "__MACOSX")
+"""What the name of a folder begins with that a system or a packer made."""
 _MANY = 20_000
 """More entries than this in a zip are no class."""
 
@@ -44,16 +46,9 @@ def collect(source: Path, lab: str, root: Path) -> Collected:
     Raises:
         KitError: there is nothing to take in.
     """
-    if source.is_dir():
-        found = _from_folder(source, lab)
-    elif zipfile.is_zipfile(source):
-        found = _from_zip(source, lab)
-    else:
-        raise KitError(
-            f"{source} is neither a folder nor a zip.",
-            f"Give a folder that holds `<student>/{lab}.ipynb` for each student.",
-        )
     collected = Collected()
+    take = _from_folder if source.is_dir() else _from_zip
+    found = take(source, lab, collected.refused)
     for student, content in sorted(found.items()):
         if not _STUDENT.fullmatch(student):
             collected.refused.append(f"The folder {student[:80]!r} cannot be a student's name; it was left out.")
@@ -68,19 +63,30 @@ def collect(source: Path, lab: str, root: Path) -> Collected:
     return collected
 
 
-def _from_folder(source: Path, lab: str) -> dict[str, bytes]:
-    folders = [
-        entry for entry in source.iterdir() if entry.is_dir() and not entry.is_symlink() and entry.name[0] != "."
-    ]
-    return {folder.name: _notebook_in(folder, lab) for folder in folders}
+def _from_folder(source: Path, lab: str, refused: list[str]) -> dict[str, bytes]:
+    found: dict[str, bytes] = {}
+    for entry in sorted(source.iterdir()):
+        if not entry.is_dir() or entry.is_symlink() or entry.name.startswith(_NOBODYS):
+            continue
+        try:
+            found[entry.name] = _notebook_in(entry, lab)
+        except OSError as error:  # such as a folder that may not be entered: the class goes on
+            found[entry.name] = b""
+            refused.append(f"{entry} cannot be read ({error.strerror}); it counts as handed in without a notebook.")
+    return found
 
 
 def _notebook_in(folder: Path, lab: str) -> bytes:
-    """Return a student's notebook: by its name, or the only notebook there is, for downloads get renamed."""
+    """Return a student's notebook: by its name, or the only notebook there is, for downloads get renamed.
+
+    Raises:
+        OSError: the folder may not be read.
+    """
+    entries = sorted(folder.iterdir())
     for candidate in (folder / f"{lab}.ipynb", folder / lab / f"{lab}.ipynb"):
         if candidate.exists() or candidate.is_symlink():
             return _bytes(candidate)
-    others = sorted(folder.glob("*.ipynb")) or sorted((folder / lab).glob("*.ipynb"))
+    others = [path for path in entries if path.suffix == ".ipynb"] or sorted((folder / lab).glob("*.ipynb"))
     return _bytes(others[0]) if len(others) == 1 else b""
 
 
@@ -94,10 +100,20 @@ def _bytes(path: Path) -> bytes:
         return b""
 
 
-def _from_zip(source: Path, lab: str) -> dict[str, bytes]:
+def _open_zip(source: Path, lab: str) -> zipfile.ZipFile:
+    try:
+        return zipfile.ZipFile(source)
+    except Exception as error:  # a damaged directory raises more than BadZipFile
+        raise KitError(
+            f"{source} is neither a folder nor a zip that can be read ({error}).",
+            f"Give a folder that holds `<student>/{lab}.ipynb` for each student, or a whole zip of it.",
+        ) from error
+
+
+def _from_zip(source: Path, lab: str, refused: list[str]) -> dict[str, bytes]:
     found: dict[str, bytes] = {}
     others: dict[str, list[zipfile.ZipInfo]] = {}
-    with zipfile.ZipFile(source) as archive:
+    with _open_zip(source, lab) as archive:
         members = [member for member in archive.infolist() if not member.is_dir()]
         if len(members) > _MANY:
             raise KitError(f"{source} has {len(members)} entries; that is no class.", "Check the file.")
@@ -110,19 +126,19 @@ def _from_zip(source: Path, lab: str) -> dict[str, bytes]:
             student, rest = inside[0], inside[1:]
             found.setdefault(student, b"")
             if rest in ((f"{lab}.ipynb",), (lab, f"{lab}.ipynb")):
-                found[student] = _member(archive, member)
+                found[student] = _member(archive, member, refused)
             elif rest[-1].endswith(".ipynb") and (len(rest) == 1 or rest[:-1] == (lab,)):
                 others.setdefault(student, []).append(member)
         for student, candidates in others.items():
             if not found[student] and len(candidates) == 1:
-                found[student] = _member(archive, candidates[0])
+                found[student] = _member(archive, candidates[0], refused)
     return found
 
 
 def _parts(name: str) -> tuple[str, ...]:
     """Return a member's path as names; empty if it tries to leave its folder, or belongs to the packer."""
     path = PurePosixPath(name.replace("\\", "/"))
-    if path.is_absolute() or ".." in path.parts or any(part.startswith((".", "__MACOSX")) for part in path.parts):
+    if path.is_absolute() or ".." in path.parts or any(part.startswith(_NOBODYS) for part in path.parts):
         return ()
     return path.parts
 
@@ -135,9 +151,10 @@ def _depth(paths: list[tuple[str, ...]], lab: str) -> int:
     return 1 if one_top and not is_student and any(len(path) >= 3 for path in real) else 0
 
 
-def _member(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> bytes:
+def _member(archive: zipfile.ZipFile, member: zipfile.ZipInfo, refused: list[str]) -> bytes:
     try:
         with archive.open(member) as file:
             return file.read(NOTEBOOK_BYTES + 1)
-    except (zipfile.BadZipFile, RuntimeError, NotImplementedError, OSError):
+    except Exception as error:  # each way of packing fails in its own way (zlib.error, LZMAError); the class goes on
+        refused.append(f"{member.filename} in the zip cannot be read ({error}); it counts as an empty file.")
         return b""

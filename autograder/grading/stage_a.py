@@ -18,7 +18,6 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
-from autograder import __version__
 from autograder.errors import KitError
 from autograder.grading.job import Cell, Job
 from autograder.results import SCHEMA_VERSION, CheckResult, Isolation, Outcome, Status, SubmissionResult
@@ -46,7 +45,7 @@ class Settings:
     @property
     def parallel(self) -> int:
         """How many run at once. A run mostly waits for messages, so a core carries several."""
-        return self.jobs or min(20, 5 * (os.cpu_count() or 1))
+        return self.jobs or min(20, 5 * len(os.sched_getaffinity(0)))
 
 
 def result_path(root: Path, lab: str, student: str) -> Path:
@@ -54,20 +53,23 @@ def result_path(root: Path, lab: str, student: str) -> Path:
     return root / "build" / "results" / lab / f"{student}.json"
 
 
-def stored_result(path: Path, digest: str, isolation: Isolation | None = None) -> SubmissionResult | None:
+def stored_result(
+    path: Path, digest: str, isolation: Isolation | None = None, seed: int | None = None
+) -> SubmissionResult | None:
     """Return the result at `path` if it is of these very answers and this very kit; otherwise None.
 
     Args:
         path: of the result's JSON.
         digest: of the submission as it is now.
         isolation: that it must have been run with; None accepts any.
+        seed: that it must have been run with; None accepts any.
     """
     try:
         result = SubmissionResult.load(path)
     except (OSError, ValueError):
         return None
-    same = result.digest == digest and result.kit_version == __version__ and result.schema_version == SCHEMA_VERSION
-    return result if same and isolation in (None, result.isolation) else None
+    same = result.digest == digest and result.schema_version == SCHEMA_VERSION
+    return result if same and isolation in (None, result.isolation) and seed in (None, result.seed) else None
 
 
 def run_submission(
@@ -88,7 +90,7 @@ def run_submission(
     began = time.monotonic()
     submission = read_submission(path, lab)
     if keep_in is not None and not settings.force:
-        stored = stored_result(keep_in, submission.digest, settings.isolation)
+        stored = stored_result(keep_in, submission.digest, settings.isolation, settings.seed)
         if stored is not None and not stored.needs_instructor:
             return stored
     result = _run(submission, student, lab, settings)
@@ -247,7 +249,7 @@ def _stored(path: Path, root: Path, lab: Lab, student: str, settings: Settings) 
     keep_in = result_path(root, lab.name, student)
     if not keep_in.is_file():
         return None
-    stored = stored_result(keep_in, read_submission(path, lab).digest, settings.isolation)
+    stored = stored_result(keep_in, read_submission(path, lab).digest, settings.isolation, settings.seed)
     return None if stored is None or stored.needs_instructor else stored
 
 

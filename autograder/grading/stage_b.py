@@ -132,11 +132,10 @@ def register(root: Path, lab: str) -> None:
         generate(root, lab, Path(folder), gradebook=True)
 
 
-def before_autograde(assignment: str, student: str, notebooks: list[str]) -> None:
+def before_autograde(root: Path, assignment: str, student: str, notebooks: list[str]) -> None:
     """nbgrader's hook: note the lab's cells when `nbgrader autograde` meets a gradebook without them."""
     from nbgrader.api import Gradebook, MissingEntry
 
-    root = Path.cwd()
     with Gradebook(f"sqlite:///{root / 'build' / 'gradebook.db'}") as gradebook:
         try:
             gradebook.find_notebook(assignment, assignment)
@@ -233,6 +232,7 @@ def write_grades(root: Path) -> Path:
     """Write `build/grades.csv` from the gradebook and return its path.
 
     A row for each student and lab. The score stays empty as long as a check waits for an instructor's verdict.
+    `waiting` counts the cells that a person has yet to grade: those checks, and explanations, which count 0 until then.
     """
     path = root / "build" / "grades.csv"
     if _modified(path) > _modified(root / "build" / "gradebook.db"):
@@ -240,22 +240,19 @@ def write_grades(root: Path) -> Path:
     prepare_nbgrader()
     from nbgrader.api import Gradebook
 
-    rows: list[tuple[str, str, str, str]] = []
+    rows: list[tuple[str, str, str, str, int]] = []
     with Gradebook(f"sqlite:///{root / 'build' / 'gradebook.db'}") as gradebook:
         for assignment in gradebook.assignments:
             answers = {cell.name for notebook in assignment.notebooks for cell in notebook.solution_cells}
             for submission in assignment.submissions:
                 grades = [grade for notebook in submission.notebooks for grade in notebook.grades]
-                undecided = any(
-                    grade.auto_score is None and grade.manual_score is None and grade.name not in answers
-                    for grade in grades
-                )
-                score = "" if undecided else f"{sum(grade.score for grade in grades):g}"
+                waiting = [grade.name for grade in grades if grade.auto_score is None and grade.manual_score is None]
+                score = "" if set(waiting) - answers else f"{sum(grade.score for grade in grades):g}"
                 top = f"{sum(grade.max_score for grade in grades):g}"
-                rows.append((submission.student_id, assignment.name, score, top))
+                rows.append((submission.student_id, assignment.name, score, top, len(waiting)))
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(("student", "lab", "score", "max_score"))
+    writer.writerow(("student", "lab", "score", "max_score", "waiting"))
     writer.writerows(sorted(rows))
     write_beside(path, text.getvalue())
     return path

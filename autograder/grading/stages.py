@@ -11,6 +11,7 @@ Import it through `prepare_nbgrader` where start-up time matters.
 from __future__ import annotations
 
 import re
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -43,6 +44,7 @@ from nbgrader.preprocessors import (
 
 from autograder.errors import KitError
 from autograder.grading.stage_a import Settings, result_path, run_submission, stored_result
+from autograder.grading.stage_b import before_autograde
 from autograder.report.html import check_html, render
 from autograder.results import CheckResult, SubmissionResult
 from autograder.submission.lab import CODE_STUB, TEXT_STUB, Lab, load_lab
@@ -347,7 +349,7 @@ def configure(config: Any, root: Path) -> None:
     config.Autograde.exporter_class = SubmissionExporter
     config.Autograde.sanitize_preprocessors = SANITIZE
     config.Autograde.autograde_preprocessors = AUTOGRADE
-    config.Autograde.pre_convert_hook = "autograder.grading.stage_b.before_autograde"
+    config.Autograde.pre_convert_hook = partial(before_autograde, root)
     config.GenerateFeedback.exporter_class = FeedbackExporter
     config.GenerateFeedback.preprocessors = FEEDBACK
     config.GenerateAssignment.preprocessors = RELEASE

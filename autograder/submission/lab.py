@@ -11,7 +11,7 @@ import hashlib
 import json
 import re
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +24,15 @@ CODE_STUB = "# YOUR CODE HERE"
 TEXT_STUB = "YOUR ANSWER HERE"
 
 _HEADING = re.compile(r"^#{1,6}\s+(.*?)\s*#*\s*$", re.MULTILINE)
+
+
+@cache
+def _kit_digest() -> str:
+    """SHA-256 over the kit's own source: its version stays the same between two releases, its checks do not."""
+    package = Path(__file__).resolve().parent.parent
+    files = sorted(path for path in package.rglob("*") if path.suffix in (".py", ".html", ".xml"))
+    parts = [(str(path.relative_to(package)), hashlib.sha256(path.read_bytes()).hexdigest()) for path in files]
+    return hashlib.sha256(json.dumps(parts).encode()).hexdigest()
 
 
 @dataclass(frozen=True)
@@ -76,8 +85,9 @@ class Lab:
 
     @cached_property
     def digest(self) -> str:
-        """SHA-256 over everything that can change a result: the trusted cells and the files they use."""
+        """SHA-256 over everything that can change a result: the trusted cells, the files they use, and the kit."""
         parts = [
+            _kit_digest(),
             [cell.model_dump(exclude={"title"}) for cell in self.cells],
             sorted(self.given.items()),
             [[answer.grade_id, answer.blank] for answer in self.answers.values()],

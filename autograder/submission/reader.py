@@ -33,7 +33,7 @@ class Submission:
     """File name to text: the programs and files that cells name, the lab's own included."""
     problems: list[Outcome] = field(default_factory=list)
     digest: str = ""
-    """SHA-256 over the answers and the lab: it changes when either does."""
+    """SHA-256 over the answers, the lab and the kit: it changes when any of them does."""
     readable: bool = True
     """False: there is no notebook of this lab to grade, and `problems` says why."""
     notebook: dict[str, Any] = field(default_factory=dict)

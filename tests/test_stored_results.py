@@ -1,0 +1,38 @@
+"""A stored result is taken where running again could say nothing new, and only there."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+import toy
+
+from autograder.grading.stage_a import Settings, run_class
+from autograder.results import SubmissionResult
+from autograder.submission.lab import load_lab
+
+
+@pytest.mark.skipif(len(os.sched_getaffinity(0)) < 2, reason="one core cannot become fewer")
+def test_as_many_run_at_once_as_the_cores_that_may_be_used_carry() -> None:
+    usable = os.sched_getaffinity(0)
+    os.sched_setaffinity(0, {min(usable)})
+    try:
+        assert Settings().parallel == 5
+    finally:
+        os.sched_setaffinity(0, usable)
+
+
+def test_a_result_of_another_seed_is_not_taken(tmp_path: Path) -> None:
+    root = toy.make_course(tmp_path / "course")
+    lab, submissions = load_lab(root, toy.LAB), {"ann": toy.hand_in(tmp_path, "ann", "{")}
+
+    def graded(seed: int | None) -> SubmissionResult:
+        return run_class(submissions, root, lab, Settings(seed=seed), lambda _: None)["ann"]
+
+    first = graded(1)
+    assert first.seed == 1
+    assert graded(1) == first  # how long it took included
+    second = graded(2)
+    assert second.seed == 2
+    assert graded(None) == second
