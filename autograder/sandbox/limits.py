@@ -28,6 +28,6 @@ class Limits:
     output_kept: int = 256 * 1024
     """How much of a program's output is kept: the first half and the last half of it."""
     output_bytes: int = 1 * MIB
-    """A program that writes more is ended: on a crowded machine, too, a flood reaches it long before a check is over."""
+    """A program that writes more is ended. A flood gets here before a check is over on a crowded machine, too."""
     events: int = 2000
     """How many lines of the probe are kept."""
