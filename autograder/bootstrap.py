@@ -121,7 +121,7 @@ def refuse_closed_folder(folder: Path) -> None:
     if not os.access(str(folder), os.W_OK):
         raise SetUpError(
             "This user may not write to %s." % folder,
-            'Work in a copy that is yours, or make it yours: sudo chown -R "$USER" \'%s\'' % ROOT,
+            "Work in a copy that is yours, or make it yours: sudo chown -R \"$USER\" '%s'" % ROOT,
         )
 
 
