@@ -1,0 +1,195 @@
+"""YAML that a student wrote: one safe way to read it, for tables of answers, parameter files and launch files.
+
+What it accepts is what `yaml.safe_load` makes of plain YAML. Everything that lets a short text stand for a long one
+(anchors, aliases, merge keys), every tag beyond the plain types, and everything too large or too deep is refused; and
+whatever is wrong with a text becomes one `StudentFileError`, a sentence with the line as the notebook shows it.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+FILE_BYTES = 64 * 1024
+"""The largest file that is read, in bytes of UTF-8: as large as an answer cell may be."""
+DEPTH = 40
+"""Lists and mappings that may stand inside one another."""
+VALUES = 5000
+"""Values, keys included, that one file may have."""
+NUMBER_LENGTH = 60
+"""Characters of a number: many more than any number of ROS needs."""
+
+_PREFIX = "tag:yaml.org,2002:"
+_KINDS = {
+    "bool": "`true` or `false`",
+    "int": "a whole number",
+    "float": "a number",
+    "null": "an empty value",
+    "timestamp": "a date",
+}
+_PLAIN_TAGS = {_PREFIX + kind for kind in ("str", "bool", "int", "float", "null", "seq", "map")}
+# PyYAML's own words for what students run into most, and the same in theirs.
+_PROBLEMS = {
+    "mapping values are not allowed": "a `:` is not expected there. Check the indentation of this line and the colon of"
+    " the line above, or put a text that holds a colon in quotes",
+    "found character '\\t'": "a tab is not expected there. YAML is indented with spaces",
+    "that cannot start any token": "a value cannot begin with this character. Put it in quotes",
+    "could not find expected ':'": "a `key: value` is expected there, with a colon and a space after the key",
+    "expected <block end>": "the line is indented differently from the lines it belongs to",
+    "found unexpected end of stream": "a quotation mark is opened and never closed",
+    "expected ',' or": "a bracket is not closed, or a comma is missing",
+    "found another document": "a second document begins there. Leave out the line `---`",
+    "expected '<document start>'": "the lines above are a whole value already, to which this does not belong",
+    "found unexpected document separator": "`---` stands inside a value",
+    "special characters are not allowed": "a character that cannot be printed is not allowed",
+}
+
+
+class StudentFileError(Exception):
+    """A student's file cannot be used; the message is a sentence for the student, with the line where it is known."""
+
+    def __init__(self, because: str, code: str = "not-yaml", line: int | None = None) -> None:
+        """Keep the sentence, a short code, and the line as the notebook counts it in the cell."""
+        super().__init__(because)
+        self.because, self.code, self.line = because, code, line
+
+
+def cell_line(index: int, text: str) -> int:
+    """Return the line of a cell at which a character of its file stands: the magic above the file is line 1."""
+    return text.count("\n", 0, index) + 2
+
+
+def load(text: str, name: str = "the file") -> Any:
+    """Read a YAML text.
+
+    Args:
+        text: what stands below the cell's first line.
+        name: what the sentence of an error calls it.
+
+    Raises:
+        StudentFileError: it is not YAML, or not plain enough. Nothing else is ever raised.
+    """
+    if len(text) > FILE_BYTES or len(text.encode("utf-8", "replace")) > FILE_BYTES:
+        raise StudentFileError(f"{name} is larger than {FILE_BYTES // 1024} KiB.", "file-too-large")
+    try:
+        loader = _Loader(text)
+        try:
+            return loader.get_single_data()
+        finally:
+            loader.dispose()
+    except _RefusedError as refused:
+        raise _error(text, name, refused.index, f": {refused}") from None
+    except yaml.MarkedYAMLError as error:
+        problem = error.problem or error.context or ""
+        # Of what is never closed the beginning helps, not the end of the file.
+        mark = (error.context_mark if "end of stream" in problem else None) or error.problem_mark or error.context_mark
+        raise _error(text, name, mark.index if mark else None, f" is not YAML: {_in_plain_words(problem)}") from None
+    except yaml.reader.ReaderError as error:
+        raise _error(text, name, error.position, f" is not YAML: {_in_plain_words(error.reason)}") from None
+    except Exception:  # PyYAML lets through whatever int(), float() and its own slips raise
+        raise _error(text, name, None, " is not YAML: it cannot be read") from None
+
+
+def read(path: Path) -> Any:
+    """Read a student's YAML file.
+
+    Raises:
+        StudentFileError: it is missing, is no text, or `load` refuses it.
+    """
+    name = f"`{path.name}`"
+    try:
+        with path.open("rb") as file:
+            content = file.read(FILE_BYTES + 1)
+    except OSError:
+        because = f"No cell that begins with `%%file {path.name}` was found."
+        raise StudentFileError(because, "file-missing") from None
+    try:
+        return load(content.decode("utf-8", "strict" if len(content) <= FILE_BYTES else "replace"), name)
+    except UnicodeDecodeError:
+        raise StudentFileError(f"{name} is not text in UTF-8.") from None
+
+
+def _error(text: str, name: str, index: int | None, what: str) -> StudentFileError:
+    line = None if index is None else cell_line(index, text)
+    return StudentFileError(f"{name}{what}." if line is None else f"{name}, line {line} of the cell{what}.", line=line)
+
+
+def _in_plain_words(problem: str) -> str:
+    for theirs, ours in _PROBLEMS.items():
+        if theirs in problem:
+            return ours
+    return problem[:200] or "it cannot be read"
+
+
+class _RefusedError(Exception):
+    """Something that is refused here though YAML has it; where it stands."""
+
+    def __init__(self, mark: Any, because: str) -> None:
+        super().__init__(because)
+        self.index: int = mark.index
+
+
+class _Loader(yaml.SafeLoader):
+    """PyYAML's safe loader for plain YAML; it refuses while it reads, before anything can grow."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__(text)
+        self._text = text
+        self._depth = self._values = 0
+
+    def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
+        event: Any = self.peek_event()  # type: ignore[no-untyped-call]
+        if isinstance(event, yaml.AliasEvent):
+            raise _RefusedError(
+                event.start_mark, f"aliases (`*{str(event.anchor)[:40]}`) are not allowed; write it out"
+            )
+        if event.anchor is not None:
+            raise _RefusedError(event.start_mark, f"anchors (`&{event.anchor[:40]}`) are not allowed; leave it out")
+        if event.tag not in (None, "!", *_PLAIN_TAGS):
+            tag = event.tag.replace(_PREFIX, "!!")[:40]
+            raise _RefusedError(event.start_mark, f"the type `{tag}` is not allowed; leave it out")
+        self._values += 1
+        if self._values > VALUES:
+            raise _RefusedError(event.start_mark, f"the file has more than {VALUES} values")
+        if self._depth >= DEPTH:
+            raise _RefusedError(event.start_mark, f"more than {DEPTH} lists and mappings stand inside one another")
+        self._depth += 1
+        node = super().compose_node(parent, index)
+        self._depth -= 1
+        return node
+
+    def construct_object(self, node: yaml.Node, deep: bool = False) -> Any:
+        if not isinstance(node, yaml.ScalarNode):
+            return super().construct_object(node, deep)
+        kind = node.tag.removeprefix(_PREFIX)
+        shown = f"`{node.value[:40]}{'…' if len(node.value) > 40 else ''}`"
+        if kind in ("int", "float") and len(node.value) > NUMBER_LENGTH:
+            raise _RefusedError(node.start_mark, f"the number {shown} is longer than {NUMBER_LENGTH} characters")
+        try:
+            return super().construct_object(node, deep)
+        except Exception:
+            what = _KINDS.get(kind, "a plain value")
+            because = f"{shown} is not {what}; if a text is meant, put it in quotes"
+            raise _RefusedError(node.start_mark, because) from None
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
+        """The mapping, whose keys must be plain and differ: of two equal ones the first would be lost."""
+        if not isinstance(node, yaml.MappingNode):
+            raise _RefusedError(node.start_mark, "`key: value` lines are expected there")
+        first: dict[Any, yaml.Node] = {}
+        for key_node, _ in node.value:
+            if not isinstance(key_node, yaml.ScalarNode):
+                raise _RefusedError(key_node.start_mark, "a key is a plain word, not a list or a mapping")
+            if key_node.tag == _PREFIX + "merge":
+                raise _RefusedError(key_node.start_mark, "merge keys (`<<`) are not allowed; write the lines out")
+            key = self.construct_object(key_node)
+            if key in first:
+                line = cell_line(first[key].start_mark.index, self._text)
+                raise _RefusedError(
+                    key_node.start_mark,
+                    f"the key `{key_node.value[:40]}` stands a second time; it is also in line {line}",
+                )
+            first[key] = key_node
+        return super().construct_mapping(node, deep)

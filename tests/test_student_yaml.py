@@ -1,0 +1,135 @@
+"""The one way in for YAML that a student wrote: plain files as PyYAML reads them, everything else a sentence."""
+
+from __future__ import annotations
+
+import contextlib
+from pathlib import Path
+
+import pytest
+import yaml
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from autograder.student_yaml import DEPTH, FILE_BYTES, VALUES, StudentFileError, load, read
+
+
+def refused(text: str) -> StudentFileError:
+    with pytest.raises(StudentFileError) as caught:
+        load(text, "`a.yaml`")
+    assert str(caught.value).startswith("`a.yaml`") and str(caught.value).endswith(".")
+    assert len(str(caught.value)) < 400
+    return caught.value
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "", "a: 1\nb: [1, 2.5, yes, ~]\n", "a: {b: {c: d}}", "- a\n- b", "word", "a: 0x1f\nb: 0o7\nc: 1e3\nd: 12:30",
+        "a: 2026-11-21", "a: !!str 5\nb: !!float 5\nc: ! x", "a: |\n  two\n  lines\n", "---\na: 1\n...\n", "é: ü",
+        "a: .inf", "true: 1\nno: 2", "# only a comment",
+    ],
+)  # fmt: skip
+def test_plain_yaml_is_read_as_pyyaml_reads_it(text: str) -> None:
+    assert load(text) == yaml.safe_load(text)
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "words"),
+    [
+        ("a: 1\nb: c: d", 3, "a `:` is not expected"),
+        ("a:\n\t- b", 3, "tab"),
+        ("a: 1\nb: @x", 3, "quotes"),
+        ("a: 'x\nb: 1\n", 2, "never closed"),
+        ("a: [1, 2\nb: 3", 3, "bracket"),
+        ("a:\n  b: 1\n c: 2", 4, "indented"),
+        ("a: 1\n---\nb: 1", 3, "second document"),
+        ("a: 1\nb: 2\na: 3", 4, "`a` stands a second time; it is also in line 2"),
+        ("1: a\n0x1: b", 3, "second time"),
+        ("x:\n  y: 1\n  y: 2", 4, "second time"),
+        ("a: 1\nb: &x 1", 3, "anchors"),
+        ("a: 1\nb: *x", 3, "aliases"),
+        ("a: 1\nb:\n  <<: {c: 1}", 4, "merge keys"),
+        ("a: 1\nb: !!python/object/apply:os.system [ls]", 3, "type"),
+        ("a: 1\nb: !!binary abc", 3, "type"),
+        ("a: 1\nb: !mine abc", 3, "type"),
+        ("a: 1\nb: !!int x", 3, "`x` is not a whole number"),
+        ("a: 1\nb: !!int ''", 3, "not a whole number"),
+        ("a: 1\nb: !!bool x", 3, "not `true` or `false`"),
+        ("a: 1\nb: !!float x", 3, "not a number"),
+        ("a: 1\nb: 2026-13-45", 3, "not a date"),
+        ("a: 1\nb: 0000-00-00", 3, "not a date"),
+        ("a: 1\nb: 2001-12-14t21:59:43.10+99:99", 3, "not a date"),
+        ("a: 1\nb: " + "9" * 5000, 3, "longer than"),
+        ("a: 1\nb: 0x" + "f" * 5000, 3, "longer than"),
+        ("a: 1\nb: 1" + ":59" * 3000, 3, "longer than"),
+        ("a: 1\nb: =", 3, "quotes"),
+        ("a: 1\n? [b]\n: c", 3, "a key is"),
+        ("a: 1\nb: \x07", 3, "cannot be printed"),
+        ("a: 1\nb: \ud800", 3, "cannot be printed"),
+        ("a: 1\nb: " + "[" * 3000, 3, "inside one another"),
+        ("- 1\n" * 6000, VALUES + 1, "more than"),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_is_a_sentence_with_the_line_of_the_cell(text: str, line: int, words: str) -> None:
+    error = refused(text)
+    assert error.line == line and f"line {line} of the cell" in str(error) and words in str(error)
+
+
+def test_other_characters_that_end_a_line_do_not_shift_the_number() -> None:
+    assert refused("a: 'x\u2028y\u2029z\x85'\nb: @").line == 3
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "a0: &a0 [x]\n" + "".join(f"a{n}: &a{n} [{f'*a{n - 1},' * 9}]\n" for n in range(1, 12)),
+        "".join(f"a{n}: &a{n}\n  <<: [*a{n - 1}, *a{n - 1}]\n" for n in range(1, 2000)),
+        *(opening * (FILE_BYTES // len(opening)) for opening in (
+            "[", "{", "[{", "? ", "- ", "a: ", "!", "&", "*", "{a: ", "[a,", "? a\n", "a\n", '"\n\n', "'", "%",
+            "#", "\n", " ", "-", "| \n", "[a:", "{?", "!<", "\\", "é", "\u2028", "\t", ": ", "a:\n ", "- a\n ",
+            "---\n", "...\n",
+        )),
+        "a: " + "[" * (DEPTH + 1) + "]" * (DEPTH + 1), "x" * (FILE_BYTES + 1), "é" * (FILE_BYTES // 2 + 1),
+    ],
+    ids=lambda text: ascii(text[:12]),
+)  # fmt: skip
+def test_nothing_of_64_kib_takes_long_or_gets_out_as_something_else(text: str) -> None:
+    # A hundredth of a second each; whatever grew with the square of the length would keep this test for minutes.
+    with contextlib.suppress(StudentFileError):
+        load(text)
+
+
+pieces = st.sampled_from(
+    [
+        "a", "b", "1", "0x", "9" * 30, ": ", "- ", "\n", "\n  ", "[", "]", "{", "}", ",", "&x ", "*x", "<<", "!!int ",
+        "!!bool ", "!!map ", "!x ", "!", "'", '"', "\\", "|\n", ">\n", "#", "%", "@", "? ", "---\n", "...",
+        "2026-99-01", "1:99", ".5", ".nan", "e+999", "=", "~", "\t", "\r", "\x00", "\u2028", "\ufeff", "é",
+        "\ud800", "yes",
+    ]
+)  # fmt: skip
+
+
+@settings(max_examples=400)
+@given(st.lists(pieces, max_size=40).map("".join) | st.text(max_size=60))
+def test_any_text_is_either_what_pyyaml_makes_of_it_or_a_sentence(text: str) -> None:
+    try:
+        found = load(text)
+    except StudentFileError as error:
+        assert error.line is None or 2 <= error.line <= text.count("\n") + 2
+    else:
+        assert repr(found) == repr(yaml.safe_load(text))
+
+
+def test_a_file_is_read_or_named(tmp_path: Path) -> None:
+    path = tmp_path / "a.yaml"
+    with pytest.raises(StudentFileError, match=r"No cell that begins with `%%file a\.yaml`") as caught:
+        read(path)
+    assert caught.value.code == "file-missing"
+    path.write_bytes(b"a: \xff")
+    with pytest.raises(StudentFileError, match="not text"):
+        read(path)
+    path.write_bytes(b"\xff" * (FILE_BYTES + 1))
+    with pytest.raises(StudentFileError, match="larger than 64 KiB"):
+        read(path)
+    path.write_text("a: ü", encoding="utf-8")
+    assert read(path) == {"a": "ü"}
