@@ -25,8 +25,8 @@ from rclpy.exceptions import InvalidNamespaceException, InvalidNodeNameException
 from rclpy.validate_namespace import validate_namespace
 from rclpy.validate_node_name import validate_node_name
 
-FILE_BYTES = 64 * 1024
-"""The largest launch file that is read."""
+from autograder import student_yaml
+
 INCLUDE_DEPTH = 8
 """Launch files that may include one another, one inside the next."""
 MOST_NODES = 32
@@ -133,16 +133,6 @@ class _Scope:
         return _Scope(dict(self.configurations), self.namespace, list(self.remappings), list(self.parameters))
 
 
-class _NoAliases(yaml.SafeLoader):
-    """Reads plain YAML only."""
-
-    def compose_node(self, parent: Any, index: Any) -> Any:
-        if self.check_event(yaml.events.AliasEvent):
-            mark = self.peek_event().start_mark  # type: ignore[no-untyped-call]
-            raise yaml.MarkedYAMLError(problem="aliases (`*name`) are not covered", problem_mark=mark)
-        return super().compose_node(parent, index)
-
-
 @dataclass
 class _Place:
     """Where in which file something stands, to be named in an error."""
@@ -174,18 +164,11 @@ class _Reader:
             raise place.error(
                 "there is no such file.", "Its name is the one after `%%file` in the first line of its cell."
             )
-        if path.stat().st_size > FILE_BYTES:
-            raise place.error(f"it is larger than {FILE_BYTES // 1024} KiB.")
         try:
-            content = yaml.load(path.read_text(encoding="utf-8"), Loader=_NoAliases)
-        except yaml.YAMLError as error:
-            mark, problem = getattr(error, "problem_mark", None), getattr(error, "problem", None)
-            line = f"line {mark.line + 1}" if mark else ""
-            raise place.at(line).error(
-                f"it is not YAML: {problem or 'it cannot be read'}.", "Look at the indentation and the `-` there."
-            ) from None
-        except (UnicodeDecodeError, RecursionError):
-            raise place.error("it is not YAML: it cannot be read.") from None
+            content = student_yaml.read(path)
+        except student_yaml.StudentFileError as error:
+            because = error.because.removeprefix(f"`{path.name}`, ")
+            raise place.error(because, error.hint or "Look at the indentation and the `-` there.") from None
         if not isinstance(content, dict) or list(content) != ["launch"] or not isinstance(content["launch"], list):
             raise place.error(
                 "a launch file has one key at the top, `launch:`, with a list below it.",
@@ -417,8 +400,8 @@ class _Attributes:
         if isinstance(value, str):
             text = self.substitute(value, key)
             try:
-                value = yaml.load(text, Loader=_NoAliases)
-            except (yaml.YAMLError, RecursionError):
+                value = student_yaml.load(text)
+            except student_yaml.StudentFileError:
                 value = text
         simple = (bool, int, float, str)
         if isinstance(value, simple) or (

@@ -75,23 +75,20 @@ def _defect(file: CellFile) -> str:
             return f"line {(error.lineno or 0) + 1} of the cell is not Python: {error.msg}" + (
                 f"\n    {text}" if text else ""
             )
-        except ValueError as error:
+        except (ValueError, RecursionError, MemoryError) as error:
             return f"it is not Python: {error}"
     elif file.name.endswith((".yaml", ".yml")):
-        import yaml
+        from autograder import student_yaml
 
         try:
-            yaml.safe_load(file.text)
-        except yaml.MarkedYAMLError as error:
-            line = f"line {error.problem_mark.line + 2} of the cell" if error.problem_mark else "it"
-            return f"{line} is not YAML: {error.problem}"
-        except yaml.YAMLError:
-            return "it is not YAML"
+            student_yaml.load(file.text)
+        except student_yaml.StudentFileError as error:
+            return error.because.removeprefix("the file, ").rstrip(".")
     elif file.name.endswith(".json"):
         import json
 
         try:
             json.loads(file.text)
-        except ValueError as error:
+        except (ValueError, RecursionError) as error:
             return f"it is not JSON: {error}"
     return ""

@@ -39,6 +39,7 @@ _PROBLEMS = {
     "could not find expected ':'": "a `key: value` is expected there, with a colon and a space after the key",
     "expected <block end>": "the line is indented differently from the lines it belongs to",
     "found unexpected end of stream": "a quotation mark is opened and never closed",
+    "expected the node content": "a value is expected there; perhaps a bracket above is not closed",
     "expected ',' or": "a bracket is not closed, or a comma is missing",
     "found another document": "a second document begins there. Leave out the line `---`",
     "expected '<document start>'": "the lines above are a whole value already, to which this does not belong",
@@ -50,10 +51,10 @@ _PROBLEMS = {
 class StudentFileError(Exception):
     """A student's file cannot be used; the message is a sentence for the student, with the line where it is known."""
 
-    def __init__(self, because: str, code: str = "not-yaml", line: int | None = None) -> None:
-        """Keep the sentence, a short code, and the line as the notebook counts it in the cell."""
+    def __init__(self, because: str, code: str = "not-yaml", line: int | None = None, hint: str = "") -> None:
+        """Keep the sentence, a short code, the line as the notebook counts it in the cell, and what to do."""
         super().__init__(because)
-        self.because, self.code, self.line = because, code, line
+        self.because, self.code, self.line, self.hint = because, code, line, hint
 
 
 def cell_line(index: int, text: str) -> int:
@@ -104,7 +105,8 @@ def read(path: Path) -> Any:
             content = file.read(FILE_BYTES + 1)
     except OSError:
         because = f"No cell that begins with `%%file {path.name}` was found."
-        raise StudentFileError(because, "file-missing") from None
+        hint = "Check the first line of the cell; it must stand there unchanged."
+        raise StudentFileError(because, "file-missing", hint=hint) from None
     try:
         return load(content.decode("utf-8", "strict" if len(content) <= FILE_BYTES else "replace"), name)
     except UnicodeDecodeError:

@@ -12,7 +12,8 @@ import rclpy
 from rclpy.node import Node
 from sample_class import ROOT
 
-from autograder.launch_files import FILE_BYTES, LaunchedNode, LaunchFileError, ParamsFile, read_launch_file
+from autograder.launch_files import LaunchedNode, LaunchFileError, ParamsFile, read_launch_file
+from autograder.student_yaml import FILE_BYTES
 from autograder.submission.lab import load_lab
 from autograder.submission.magics import parse
 
@@ -155,7 +156,7 @@ def test_what_an_included_file_sets_stays_set_unless_a_group_holds_it(tmp_path: 
 @pytest.mark.parametrize(
     ("text", "told"),
     [
-        ("launch:\n- node:\n\tpkg: x\n", "line 3: it is not YAML"),
+        ("launch:\n- node:\n\tpkg: x\n", "line 4 of the cell is not YAML"),
         ("- node: {}\n", "one key at the top"),
         ("launch: {node: {}}\n", "one key at the top"),
         ("launch:\n- node: {pkg: camera_lab, exec: a}\n  name: x\n", "entry 1: each entry"),
@@ -176,10 +177,10 @@ def test_what_an_included_file_sets_stays_set_unless_a_group_holds_it(tmp_path: 
         ("launch:\n- include: {file: other.launch.yaml}\n", "there is no file `other.launch.yaml`"),
         ("launch:\n- include: {file: /etc/passwd}\n", "there is no file `/etc/passwd`"),
         ("launch:\n- include: {file: $(dirname)/a.launch.yaml}\n", "more than 8 deep"),
-        ("launch: &all\n- group: *all\n", "aliases (`*name`) are not covered"),
+        ("launch: &all\n- group: *all\n", "anchors (`&all`) are not allowed"),
         (f"launch:\n{CAMERA}, param: [{{name: p, value: {{}}}}]}}\n", "a parameter is a bool"),
         ("launch:\n" + f"{CAMERA}}}\n" * 33, "more than 32 nodes"),
-        ("launch: [" + "[" * 5000 + "]" * 5000 + "]", "it is not YAML"),
+        ("launch: [" + "[" * 5000 + "]" * 5000 + "]", "inside one another"),
         ("#" * (FILE_BYTES + 1), "larger than 64 KiB"),
     ],
 )

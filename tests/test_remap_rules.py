@@ -175,3 +175,20 @@ def test_words_that_are_no_ros_arguments_are_refused_with_a_reason(table: Path, 
 def test_a_missing_table_is_told(table: Path) -> None:
     with pytest.raises(CommandLineError, match=r"%%file rules\.yaml"):
         command_line("rules.yaml", "front").words()
+
+
+@pytest.mark.parametrize(
+    ("key", "reached"),
+    [("/**" * 200, True), ("/**" * 200 + "/x", False), ("/**/*" * 200, False), ("/*/**/**/*", True)],
+)
+def test_a_key_of_many_wildcards_is_matched_at_once(key: str, reached: bool) -> None:
+    text = f"{key}:\n  ros__parameters:\n    rate: 40\n"
+    assert (params_file.why_not_reached(text, "/vehicle/right_demo") is None) is reached
+
+
+def test_a_parameter_file_that_grows_has_no_keys() -> None:
+    tree = "a0: &a0 {x: 1}\n" + "".join(
+        f"a{n}: &a{n} {{{', '.join(f'k{i}: *a{n - 1}' for i in range(9))}}}\n" for n in range(1, 9)
+    )
+    assert params_file.node_keys(tree) == []
+    assert params_file.node_keys("a: &a {ros__parameters: {b: 1}}\nc: {<<: *a}\n") == []

@@ -80,6 +80,7 @@ def test_a_cell_without_the_magic_is_no_file(source: str) -> None:
         "%%node talker # mine", "%%node täl", "%%file", "%%file a.py", "%%file /etc/passwd.yaml", "%%file ../a.yaml",
         "%%file a/b.yaml", "%%file a\\b.yaml", "%%file .yaml", "%%file .hidden.yaml", "%%file a.yaml.py",
         "%%file -rf.yaml", "%%file a\x00.yaml", "%%file " + "a" * 300 + ".yaml",
+        "%%file a" + ".bbbbbbbb" * 28 + ".yaml",
     ],
 )  # fmt: skip
 def test_a_bad_name_is_refused_with_a_reason(line: str) -> None:

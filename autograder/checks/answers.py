@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import yaml
-
+from autograder import student_yaml
 from autograder.checks import outcomes, session
 from autograder.checks.scoring import score
 from autograder.checks.session import Score
@@ -30,21 +29,12 @@ class Answers:
 
     def _read(self) -> None:
         """The file exists and is a table; fails the check if not."""
-        path = session.current.folder / self.file
         title = f"`{self.file}` is a table of answers"
-        if not path.is_file():
-            outcomes.failed(
-                title,
-                because=f"No cell that begins with `%%file {self.file}` was found.",
-                hint="Check the first line of the cell; it must stand there unchanged.",
-                code="file-missing",
-            )
         try:
-            table = yaml.safe_load(path.read_text(encoding="utf-8"))
-        except yaml.YAMLError as error:
-            where = getattr(error, "problem_mark", None)
-            line = f" in line {where.line + 1}" if where else ""
-            outcomes.failed(title, because=f"It is not YAML{line}.", hint="Write `question: answer`.", code="not-yaml")
+            table = student_yaml.read(session.current.folder / self.file)
+        except student_yaml.StudentFileError as error:
+            hint = error.hint or "Write `question: answer`."
+            outcomes.failed(title, because=error.because, hint=hint, code=error.code)
         if not isinstance(table, dict):
             outcomes.failed(title, because="It has no `question: answer` lines.", code="not-yaml")
         self._table = {str(key): value for key, value in table.items()}

@@ -6,8 +6,7 @@ import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import yaml
-
+from autograder import student_yaml
 from autograder.checks import session
 
 _OPTIONS = {"-r", "--remap", "-p", "--param", "--params-file"}
@@ -60,19 +59,10 @@ class CommandLine:
         return [*words, *self.then]
 
     def _text(self) -> str:
-        path = session.current.folder / self.file
-        if not path.is_file():
-            raise CommandLineError(
-                f"No cell that begins with `%%file {self.file}` was found.",
-                "file-missing",
-                "Check the first line of the cell; it must stand there unchanged.",
-            )
         try:
-            table = yaml.safe_load(path.read_text(encoding="utf-8"))
-        except (yaml.YAMLError, RecursionError) as error:
-            mark = getattr(error, "problem_mark", None)
-            line = f" in line {mark.line + 1}" if mark else ""
-            raise CommandLineError(f"`{self.file}` is not YAML{line}.", "not-yaml", "Write `entry: words`.") from None
+            table = student_yaml.read(session.current.folder / self.file)
+        except student_yaml.StudentFileError as error:
+            raise CommandLineError(error.because, error.code, error.hint or "Write `entry: words`.") from None
         text = table.get(self.entry) if isinstance(table, dict) else None
         if text is None or text == "?":
             raise CommandLineError(f"`{self.entry}` in `{self.file}` has no answer yet.", "unanswered")

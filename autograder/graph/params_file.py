@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import re
 from typing import Any
 
-import yaml
+from autograder.student_yaml import StudentFileError, load
 
 
 def node_keys(text: str) -> list[str]:
     """The node names that the file's values are for, as full names; wildcards are kept. Empty if it is no such file."""
     try:
-        content = yaml.safe_load(text)
-    except (yaml.YAMLError, RecursionError):
+        content = load(text)
+    except StudentFileError:
         return []
     found: list[str] = []
 
@@ -31,8 +30,16 @@ def node_keys(text: str) -> list[str]:
 
 def is_for(key: str, node: str) -> bool:
     """Whether values below this key reach the node with this full name: `*` is one part of a name, `**` any number."""
-    parts = [{"**": r"(/\w+)*", "*": r"/\w+"}.get(part, f"/{re.escape(part)}") for part in key.strip("/").split("/")]
-    return re.fullmatch("".join(parts), node) is not None
+    names = node.strip("/").split("/")
+    reached = {0}  # how many of the node's names the key's parts so far can stand for
+    for part in key.strip("/").split("/"):
+        if part == "**":
+            reached = set(range(min(reached), len(names) + 1))
+        else:
+            reached = {at + 1 for at in reached if at < len(names) and part in ("*", names[at])}
+        if not reached:
+            return False
+    return len(names) in reached
 
 
 def why_not_reached(text: str, node: str) -> str | None:
@@ -40,5 +47,5 @@ def why_not_reached(text: str, node: str) -> str | None:
     keys = node_keys(text)
     if not keys or any(is_for(key, node) for key in keys):
         return None
-    written = ", ".join(f"`{key}`" for key in keys)
+    written = ", ".join(f"`{key[:60]}`" for key in keys[:4]) + (", …" if len(keys) > 4 else "")
     return f"The file has values for {written}, and the node is `{node}`: they are left out without a word."

@@ -8,6 +8,9 @@ from dataclasses import dataclass
 CELL_BYTES = 64 * 1024
 """The largest answer cell that is read, in bytes of UTF-8."""
 
+NAME_LENGTH = 100
+"""Characters of a file's name; file systems allow 255 bytes."""
+
 _NODE_NAME = re.compile(r"[a-z][a-z0-9_]{0,63}")
 _FILE_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}(\.[A-Za-z0-9_-]{1,32})*\.(yaml|yml|json|csv)")
 
@@ -47,6 +50,8 @@ def check_name(magic: str, name: str) -> None:
             f"`{name[:80]}` cannot name a program: use small letters, digits and underscores, begin with a letter,"
             " and leave out `.py`."
         )
+    if len(name) > NAME_LENGTH:
+        raise BadNameError(f"The name `{name[:40]}…` is too long: at most {NAME_LENGTH} characters.")
     if magic == "file" and not _FILE_NAME.fullmatch(name):
         raise BadNameError(
             f"`{name[:80]}` cannot name a file: use letters, digits, `-`, `_` and dots, no folder,"
