@@ -58,6 +58,18 @@ class Outcome(_Model):
     """A short stable word for the reason, such as `qos-reliability`; tests and statistics use it."""
     hidden: bool = False
     """It stems from a hidden test: students see that it failed and the hint, nothing else."""
+    part: str = ""
+    """Title of the part of the check that it belongs to; empty: it holds for all parts of its launch."""
+
+
+class Part(_Model):
+    """One requirement of a check that gives points of its own."""
+
+    title: str
+    max_points: float
+    points: float
+    more_at_grading: bool = False
+    """What is visible of it holds; the points are decided by tests that are hidden here."""
 
 
 class CheckResult(_Model):
@@ -70,6 +82,24 @@ class CheckResult(_Model):
     """None: the grader could not find out; an instructor decides."""
     seconds: float = 0.0
     outcomes: list[Outcome] = Field(default_factory=list)
+    parts: list[Part] = Field(default_factory=list)
+    """The parts that give points independently of each other; empty: all or nothing."""
+    more_at_grading: bool = False
+    """Hidden tests were taken out of this copy of the check: what is passed here is not yet earned."""
+
+    @property
+    def sure_points(self) -> float | None:
+        """Points that grading will give as well, whatever its hidden tests find; None: nobody could find out."""
+        if self.points is None or not self.more_at_grading:
+            return self.points
+        return sum(part.points for part in self.parts if not part.more_at_grading)
+
+    @property
+    def possible_points(self) -> float:
+        """Points that grading can still give: all but those that are lost already."""
+        if self.points is None or not self.more_at_grading:
+            return self.max_points if self.points is None else self.points
+        return self.points
 
     @property
     def status(self) -> Status:
@@ -121,7 +151,12 @@ class SubmissionResult(_Model):
     @property
     def points(self) -> float:
         """Points earned so far; a check nobody could decide counts 0 until an instructor does."""
-        return sum(check.points or 0.0 for check in self.checks)
+        return sum(check.sure_points or 0.0 for check in self.checks)
+
+    @property
+    def possible_points(self) -> float:
+        """Points that grading can still give; more than `points` where hidden tests or a person decide."""
+        return sum(check.possible_points for check in self.checks)
 
     @property
     def max_points(self) -> float:

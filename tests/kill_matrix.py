@@ -27,18 +27,20 @@ def members(lab: Lab) -> list[Expected]:
     return [sample_class.expected(lab, student) for student in sample_class.students(lab.name)]
 
 
+def lost(lab: Lab, student: Expected) -> list[str]:
+    """Checks in which a student loses points."""
+    full = {check.grade_id: check.points for check in lab.checks}
+    return [name for name, points in student.points.items() if points is not None and points < (full[name] or 0)]
+
+
 def one_mistake(lab: Lab) -> list[Expected]:
     """Students who lose points by mistakes of their own in a notebook that is otherwise complete."""
-    return [
-        student
-        for student in members(lab)
-        if any(points == 0 for points in student.points.values()) and any(student.points.values())
-    ]
+    return [student for student in members(lab) if lost(lab, student) and any(student.points.values())]
 
 
 def unbeaten(lab: Lab) -> list[str]:
     """Checks that no student with a mistake fails: each is missing a mistake, or is useless."""
-    beaten = {name for student in one_mistake(lab) for name, points in student.points.items() if points == 0}
+    beaten = {name for student in one_mistake(lab) for name in lost(lab, student)}
     return [check.grade_id for check in lab.checks if check.grade_id not in beaten]
 
 
@@ -49,7 +51,8 @@ def table(lab: Lab) -> list[str]:
     lines.append("| student | mistake | " + " | ".join(str(number) for number in range(1, len(checks) + 1)) + " |")
     lines.append("|---|---|" + "---|" * len(checks))
     for student in one_mistake(lab):
-        marks = [student.codes.get(name, "lost") if student.points[name] == 0 else "" for name in checks]
+        gone = lost(lab, student)
+        marks = [student.codes.get(name, "lost") if name in gone else "" for name in checks]
         lines.append(f"| {student.student} | {student.about} | " + " | ".join(marks) + " |")
     return [*lines, ""]
 

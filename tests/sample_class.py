@@ -33,6 +33,8 @@ class Expected:
     """Code of the first failed outcome, by grade_id of the check."""
     because: dict[str, str] = field(default_factory=dict)
     """A part of its reason."""
+    lost: dict[str, list[str]] = field(default_factory=dict)
+    """Titles of the parts that were lost, sorted, by grade_id of a check that has parts."""
     problems: list[str] = field(default_factory=list)
     """Codes of the notebook's own problems, sorted."""
 
@@ -67,10 +69,12 @@ def expected(lab: Lab, student: str, folder: Path | None = None) -> Expected:
     points: dict[str, float | None] = {name: told.get("rest", top) for name, top in full.items()}
     result = Expected(student, told["about"], points, problems=sorted(told.get("problems") or []))
     for name, check in (told.get("checks") or {}).items():
-        _only(check, {"points", "code", "because"}, path)
+        _only(check, {"points", "code", "because", "lost"}, path)
         result.points[name] = check["points"]
         if "code" in check:
             result.codes[name] = check["code"]
+        if "lost" in check:
+            result.lost[name] = sorted(check["lost"])
         if "because" in check:
             result.because[name] = check["because"]
     return result

@@ -279,26 +279,6 @@ def test_a_second_publisher_on_a_counted_topic_is_told(grade: Grade) -> None:
     assert failure(result).code == "extra-publisher"
 
 
-def test_a_table_of_answers_is_compared_question_by_question(grade: Grade) -> None:
-    check = """\
-        with answers("table.yaml") as table:
-            table.expect_filled({"overlap": ["yes", "no"], "threads": [1, 2]})
-            table.expect_answer("threads", 2)
-        table.score(2)
-        """
-    assert grade(check, table__yaml="overlap: 'yes'\nthreads: 2\n").points == 2.0
-    assert failure(grade(check, table__yaml="overlap: 'yes'\nthreads: 1\n")).code == "wrong-answer"
-    assert failure(grade(check, table__yaml="overlap: ?\nthreads: 1\n")).code in (
-        "unanswered",
-        "answer-form",
-        "not-yaml",
-    )
-    wrong = failure(grade(check.replace("[1, 2]", "range(1, 99)"), table__yaml="overlap: 'no'\nthreads: two\n"))
-    assert wrong.because == "`threads` is 'two'; it must be a whole number from 1 to 98."
-    assert failure(grade(check, table__yaml="overlap\n")).code == "not-yaml"
-    assert failure(grade(check.replace("table.yaml", "other.yaml"))).code == "file-missing"
-
-
 TWIN = """
 import time
 class Twin(Node):

@@ -11,7 +11,7 @@ import sample_class
 from sample_class import ROOT
 
 from autograder.grading.stage_a import Settings, run_class
-from autograder.results import SubmissionResult
+from autograder.results import CheckResult, SubmissionResult
 from autograder.submission.lab import Lab, load_lab
 
 LABS = kill_matrix.labs()
@@ -19,11 +19,11 @@ MEMBERS = [(lab, student) for lab in LABS for student in sample_class.students(l
 
 
 @functools.cache
-def graded(lab_name: str, into: Path) -> dict[str, SubmissionResult]:
-    """Grade a lab's whole class once, several at a time, as `autograder grade` does."""
+def graded(lab_name: str, members: tuple[str, ...], into: Path) -> dict[str, SubmissionResult]:
+    """Grade a lab's class once, or those of it that are asked for, several at a time, as `autograder grade` does."""
     lab = load_lab(ROOT, lab_name)
     submissions = {}
-    for student in sample_class.students(lab_name):
+    for student in members:
         folder = sample_class.build_student(lab, student, into / "submitted")
         found = sorted(folder.glob("*.ipynb"))
         submissions[student] = found[0] if found else folder / f"{lab_name}.ipynb"
@@ -39,6 +39,8 @@ def differences(lab: Lab, student: str, result: SubmissionResult) -> list[str]:
     """Where a result is not what was expected, as lines to read."""
     expected = sample_class.expected(lab, student)
     found = []
+    lab_parts = {check.grade_id for check in result.checks if check.parts}
+    found += [f"{name}: it has no parts" for name in expected.lost.keys() - lab_parts]
     if sorted(problem.code for problem in result.problems) != expected.problems:
         found.append(f"problems {[p.code for p in result.problems]}, expected {expected.problems}")
     for check in result.checks:
@@ -46,6 +48,8 @@ def differences(lab: Lab, student: str, result: SubmissionResult) -> list[str]:
         told = f"{first.code}: {first.title}: {first.because}" if first else "passed"
         if check.points != expected.points[name]:
             found.append(f"{name}: {check.points} points, expected {expected.points[name]} ({told})")
+        elif name in expected.lost and lost_parts(check) != expected.lost[name]:
+            found.append(f"{name}: lost {lost_parts(check)}, expected {expected.lost[name]} ({told})")
         elif first and first.code != expected.codes.get(name, first.code):
             found.append(f"{name}: expected the reason {expected.codes[name]} ({told})")
         elif first and expected.because.get(name, "") not in first.because:
@@ -53,11 +57,24 @@ def differences(lab: Lab, student: str, result: SubmissionResult) -> list[str]:
     return found
 
 
+def lost_parts(check: CheckResult) -> list[str]:
+    """Titles of the parts that did not give all their points, sorted."""
+    return sorted(part.title for part in check.parts if part.points < part.max_points)
+
+
+@pytest.fixture(scope="session")
+def asked_for(request: pytest.FixtureRequest) -> dict[str, tuple[str, ...]]:
+    """Students whose test runs, by lab: `-k` may leave most of a class out."""
+    chosen = [item.callspec.params for item in request.session.items if hasattr(item, "callspec")]
+    chosen = [params for params in chosen if {"lab_name", "student"} <= params.keys()]
+    return {lab: tuple(p["student"] for p in chosen if p["lab_name"] == lab) for lab in LABS}
+
+
 @pytest.mark.parametrize(("lab_name", "student"), MEMBERS)
 def test_a_student_gets_exactly_the_expected_points_and_reasons(
-    lab_name: str, student: str, class_folder: Path
+    lab_name: str, student: str, asked_for: dict[str, tuple[str, ...]], class_folder: Path
 ) -> None:
-    result = graded(lab_name, class_folder / lab_name)[student]
+    result = graded(lab_name, asked_for[lab_name], class_folder / lab_name)[student]
     assert differences(load_lab(ROOT, lab_name), student, result) == []
 
 

@@ -1,4 +1,7 @@
-"""Tables of answers: a `%%file NAME.yaml` cell of plain `question: answer` lines."""
+"""Tables of answers: a `%%file NAME.yaml` cell of plain `question: answer` lines.
+
+Each question is a part of its own: a wrong line costs that line's share of the points.
+"""
 
 from __future__ import annotations
 
@@ -7,8 +10,11 @@ from typing import Any
 
 from autograder import student_yaml
 from autograder.checks import outcomes, session
+from autograder.checks.forms import allowed, one_of, same, seal
+from autograder.checks.parts import part
 from autograder.checks.scoring import score
 from autograder.checks.session import Score
+from autograder.results import Status
 
 
 class Answers:
@@ -18,8 +24,11 @@ class Answers:
         """Name the file; it is read on entering the block."""
         self.file = file
         self._table: dict[str, Any] = {}
+        self._forms: dict[str, Sequence[Any]] = {}
+        self._questions: dict[str, None] = {}
 
     def __enter__(self) -> Answers:
+        session.current.block_began = len(session.current.outcomes)
         return self
 
     def __exit__(self, kind: object, error: BaseException | None, trace: object) -> bool:
@@ -29,58 +38,95 @@ class Answers:
 
     def _read(self) -> None:
         """The file exists and is a table; fails the check if not."""
+        if self._table:
+            return
         title = f"`{self.file}` is a table of answers"
         try:
             table = student_yaml.read(session.current.folder / self.file)
         except student_yaml.StudentFileError as error:
-            hint = error.hint or "Write `question: answer`."
+            hint = error.hint or "Write one line for each question: `question: answer`."
             outcomes.failed(title, because=error.because, hint=hint, code=error.code)
-        if not isinstance(table, dict):
+        if not isinstance(table, dict) or not table:
             outcomes.failed(title, because="It has no `question: answer` lines.", code="not-yaml")
-        self._table = {str(key): value for key, value in table.items()}
+        self._table = {str(key).strip(): value for key, value in table.items()}
 
     def expect_filled(self, questions: Mapping[str, Sequence[Any]] | Sequence[str]) -> None:
-        """Every question has an answer; where a sequence of allowed answers is given, one of them."""
+        """Every question has an answer, which is one of its allowed values if they are given.
+
+        Args:
+            questions: allowed values by question, a list of them or a range of whole numbers; or questions only.
+        """
+        self._questions |= dict.fromkeys(questions)
         self._read()
-        title = f"Every question in `{self.file}` is answered"
+        self._forms |= questions if isinstance(questions, Mapping) else {}
         for question in questions:
-            answer = self._table.get(question)
-            if answer is None or answer == "?":
-                outcomes.failed(title, because=f"`{question}` has no answer yet.", code="unanswered")
-            if isinstance(questions, Mapping) and answer not in questions[question]:
-                because = f"`{question}` is {answer!r}; it must be {_one_of(questions[question])}."
-                outcomes.failed(title, because=because, code="answer-form")
-        outcomes.passed(title)
+            with part(question):
+                outcomes.passed(f"`{question}` is answered", observed=str(self._answer(question)))
+
+    def _answer(self, question: str) -> Any:
+        """The answer to a question, of an allowed form; fails the question's part if there is none."""
+        self._questions[question] = None
+        self._read()
+        title = f"`{question}` is answered"
+        answer = self._table.get(question)
+        form = self._forms.get(question, ())
+        if answer is None or answer == "?":
+            expected = one_of(form) if form else ""
+            outcomes.failed(title, expected=expected, because=f"`{question}` has no answer yet.", code="unanswered")
+        if form and not allowed(answer, form):
+            because = f"`{question}` is `{_spelt(answer)}`, which is none of the allowed answers: {one_of(form)}."
+            outcomes.failed(title, expected=one_of(form), observed=_spelt(answer), because=because, code="answer-form")
+        return answer
 
     def expect_answer(self, question: str, *right: Any, hint: str = "") -> None:
-        """The answer to one question is one of the right ones."""
-        if not self._table:
-            self._read()
-        answer = self._table.get(question)
+        """The answer to one question says the same as one of the right ones."""
+        if not self._lost(question):
+            with part(question):
+                answer = self._answer(question)
+                self._judge(question, answer, any(same(answer, one) for one in right), hint)
+
+    def _lost(self, question: str) -> bool:
+        """Whether it has been said already that there is no usable answer."""
+        found = session.current.outcomes[session.current.block_began :]
+        return any(outcome.part == question and outcome.status is Status.FAILED for outcome in found)
+
+    def expect_sealed(self, answers: Mapping[str, str], hint: str = "") -> None:
+        """The answers are the right ones, which the check knows by their seals only (`autograder.checks.forms.seal`).
+
+        So a fact that students have measured is checked in their own notebook, without being given away there.
+        """
+        for question, sealed in answers.items():
+            if not self._lost(question):
+                with part(question):
+                    answer = self._answer(question)
+                    seals = (seal(question, answer), seal(question, f"/{answer}"))
+                    self._judge(question, answer, sealed in seals, hint)
+
+    def _judge(self, question: str, answer: Any, right: bool, hint: str) -> None:
         title = f"`{question}`"
-        if answer in right and isinstance(answer, bool) == any(isinstance(r, bool) for r in right if r == answer):
-            outcomes.passed(title, observed=str(answer))
+        if right:
+            outcomes.passed(title, observed=_spelt(answer))
             return
         outcomes.failed(
             title,
-            observed=str(answer),
-            because="There is no answer." if answer is None else f"{answer!r} is not what happens.",
+            observed=_spelt(answer),
+            because=f"`{_spelt(answer)}` is not what happens.",
             hint=hint or "Run the experiment again and look at what it prints.",
-            code="unanswered" if answer is None else "wrong-answer",
+            code="wrong-answer",
         )
 
     def score(self, points: float) -> Score:
-        """The score of the cell, as `ros.score`."""
-        return score(points)
+        """The score of the cell: the points in equal shares over all questions."""
+        return score({question: points / len(self._questions) for question in self._questions} or points)
 
 
-def _one_of(allowed: Sequence[Any]) -> str:
-    """Name the allowed answers, of many only what they look like."""
-    if isinstance(allowed, range):
-        return f"a whole number from {allowed[0]} to {allowed[-1]}"
-    if len(allowed) > 10:
-        return f"of the form {allowed[0]}, {allowed[1]}, …"
-    return "one of " + ", ".join(str(value) for value in allowed)
+def _spelt(answer: Any) -> str:
+    """An answer as a student would type it."""
+    if isinstance(answer, bool):
+        return "yes" if answer else "no"
+    if isinstance(answer, list):
+        return f"[{', '.join(map(_spelt, answer))}]"
+    return str(answer)
 
 
 def answers(file: str) -> Answers:

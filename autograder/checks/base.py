@@ -40,7 +40,7 @@ class ExpectationBase:
         self._ended: float | None = None
         self.may_end: list[Program] = []
         """Programs that the check itself has stopped, or that are asked to end by themselves."""
-        self._first_outcome = len(session.current.outcomes)
+        session.current.block_began = len(session.current.outcomes)
 
     def start(self, node: Node | str) -> None:
         """Start one more program."""
@@ -105,7 +105,6 @@ class ExpectationBase:
         if gone is None:
             outcomes.failed(title, expected=expected, observed=observed, because=because, hint=hint, code=code)
         outcomes.failed_as_a_whole(
-            self._first_outcome,
             f"`{gone.name}` runs until it is stopped",
             expected="running",
             observed=gone.stopped_by()

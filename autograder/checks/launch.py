@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import TracebackType
@@ -20,6 +21,7 @@ from autograder.checks.expect_lifecycle import LifecycleExpectations
 from autograder.checks.expect_messages import MessageExpectations
 from autograder.checks.expect_programs import ProgramExpectations
 from autograder.checks.expect_services import ServiceExpectations
+from autograder.checks.parts import part
 from autograder.checks.scoring import score
 from autograder.checks.session import Score
 from autograder.graph import remap_rules
@@ -178,8 +180,12 @@ class Launch(MessageExpectations, ServiceExpectations, LifecycleExpectations, Pr
         self._end()
         return error is None or isinstance(error, Exception)
 
-    def score(self, points: float) -> Score:
-        """The score of the cell, over all its launches since the last score."""
+    def part(self, title: str) -> AbstractContextManager[None]:
+        """A block whose expectations give points of their own; see `autograder.checks.parts`."""
+        return part(title)
+
+    def score(self, points: float | Mapping[str, float]) -> Score:
+        """The score of the cell, over all its launches since the last score: all or nothing, or points by part."""
         return score(points)
 
     def _end(self) -> None:

@@ -4,20 +4,26 @@ from __future__ import annotations
 
 import ast
 import linecache
+import re
 import sys
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from types import FrameType
 from typing import NoReturn
 
 from autograder.checks import session
 from autograder.results import Outcome, Status
+from autograder.submission.markers import MORE_AT_GRADING, hidden_lines
 
 _PACKAGE = str(Path(__file__).resolve().parent.parent)
-_BEGIN, _END = "### BEGIN HIDDEN TESTS", "### END HIDDEN TESTS"
 
 
 class CheckEnded(Exception):
     """A failed outcome was recorded; the rest of the `with` block is not checked. Never leaves the block."""
+
+
+class LaunchEnded(CheckEnded):
+    """The launch, or the table, failed as a whole: none of its parts is worth anything."""
 
 
 def passed(title: str, *, expected: str = "", observed: str = "") -> None:
@@ -28,28 +34,40 @@ def passed(title: str, *, expected: str = "", observed: str = "") -> None:
 def failed(
     title: str, *, expected: str = "", observed: str = "", because: str = "", hint: str = "", code: str = ""
 ) -> NoReturn:
-    """Record that an expectation does not hold, and end the block.
+    """Record that an expectation does not hold, and end the block: the part, or the whole launch outside of any.
 
     Raises:
         CheckEnded: always.
     """
     _record(_failure(title, expected, observed, because, hint, code))
     _rest_not_checked()
-    raise CheckEnded(title)
+    if session.current.part:
+        raise CheckEnded(title)
+    _lose_parts()
+    raise LaunchEnded(title)
+
+
+def _lose_parts() -> None:
+    """Take the points of every part that the current launch or table has looked at, or would have."""
+    found = session.current.outcomes[session.current.block_began :]
+    session.current.lost_parts |= {outcome.part for outcome in found if outcome.part}
 
 
 def failed_as_a_whole(
-    first: int, title: str, *, expected: str = "", observed: str = "", because: str = "", hint: str = "", code: str = ""
+    title: str, *, expected: str = "", observed: str = "", because: str = "", hint: str = "", code: str = ""
 ) -> NoReturn:
-    """As `failed`, in place of all that was found out since outcome number `first`: it is worth nothing any more.
+    """As `failed`, in place of all that the launch has found out: it is worth nothing any more.
 
     Raises:
-        CheckEnded: always.
+        LaunchEnded: always.
     """
-    del session.current.outcomes[first:]
+    _lose_parts()
+    del session.current.outcomes[session.current.block_began :]
+    session.current.part = ""
     _record(_failure(title, expected, observed, because, hint, code))
     _rest_not_checked(whole=True)
-    raise CheckEnded(title)
+    _lose_parts()
+    raise LaunchEnded(title)
 
 
 def _failure(title: str, expected: str, observed: str, because: str, hint: str, code: str) -> Outcome:
@@ -70,15 +88,16 @@ def unknown(title: str, because: str) -> None:
     In a cell with hidden tests the text is for instructors only: it may quote a line or a value of them.
     """
     frame = _check_frame()
-    hidden = frame is not None and bool(_hidden_lines(frame))
+    hidden = frame is not None and bool(hidden_lines(_lines(frame)))
     _record(Outcome(status=Status.UNKNOWN, title=title, because=because, code="grader", hidden=hidden))
 
 
 def _record(outcome: Outcome) -> None:
+    outcome.part = session.current.part
     frame = _check_frame()
     # A cell's own helper function records for the line that called it: hidden there is hidden here.
     while frame is not None and not outcome.hidden:
-        outcome.hidden = frame.f_lineno in _hidden_lines(frame)
+        outcome.hidden = frame.f_lineno in hidden_lines(_lines(frame))
         frame = frame.f_back if frame.f_code.co_name != "<module>" else None
     session.current.outcomes.append(outcome)
 
@@ -98,43 +117,66 @@ def _lines(frame: FrameType) -> list[str]:
     return linecache.getlines(frame.f_code.co_filename, frame.f_globals)
 
 
-def _hidden_lines(frame: FrameType) -> set[int]:
-    hidden, inside = set(), False
-    for number, line in enumerate(_lines(frame), start=1):
-        inside = (inside or _BEGIN in line) and _END not in line
-        if inside:
-            hidden.add(number)
-    return hidden
+def parts_with_more_at_grading() -> set[str]:
+    """Titles of the parts whose hidden tests were taken out of this copy of the cell; "" for those of no part."""
+    frame = _check_frame()
+    lines = _lines(frame) if frame is not None else []
+    return {_part_around(lines, number) for number, line in enumerate(lines) if line.strip() == MORE_AT_GRADING}
 
 
-def _block() -> tuple[FrameType | None, ast.With | None]:
-    """The check cell's frame, and the `with` block that it is in."""
+def _part_around(lines: Sequence[str], number: int) -> str:
+    """The title of the `with ros.part("title"):` block that a line is in, by its indentation."""
+    indent = _indent(lines[number])
+    for line in reversed(lines[:number]):
+        if line.strip() and _indent(line) < indent:
+            indent = _indent(line)
+            match = _PART.search(line)
+            if match:
+                return str(ast.literal_eval(match[1]))
+    return ""
+
+
+_EXPECTS = re.compile(r"expect_|require$")
+_PART = re.compile(r"""\.part\(\s*("[^"]*"|'[^']*')""")
+
+
+def _indent(line: str) -> int:
+    return len(line) - len(line.lstrip())
+
+
+def _blocks() -> tuple[FrameType | None, list[ast.With]]:
+    """The check cell's frame, and the `with` blocks that it is in, the innermost first."""
     frame = _check_frame()
     if frame is None:
-        return None, None
+        return None, []
     try:
         tree = ast.parse("".join(_lines(frame)))
     except SyntaxError:  # only the shell knows this source (IPython syntax around it): nothing to list
-        return frame, None
+        return frame, []
     blocks = [
         n for n in ast.walk(tree) if isinstance(n, ast.With) and n.lineno <= frame.f_lineno <= (n.end_lineno or 0)
     ]
-    return frame, min(blocks, key=lambda node: (node.end_lineno or 0) - node.lineno, default=None)
+    return frame, sorted(blocks, key=lambda node: (node.end_lineno or 0) - node.lineno)
+
+
+def _part_title(block: ast.With) -> str:
+    """The title if it is a `with ros.part("title"):` block."""
+    call = block.items[0].context_expr
+    named = isinstance(call, ast.Call) and isinstance(call.func, ast.Attribute) and call.func.attr == "part"
+    title = call.args[0] if named and isinstance(call, ast.Call) and call.args else None
+    return title.value if isinstance(title, ast.Constant) and isinstance(title.value, str) else ""
 
 
 def _rest_not_checked(whole: bool = False) -> None:
-    """Record what the source still wanted to check in the same `with` block, or all that it wanted there."""
-    frame, block = _block()
-    if frame is None or block is None:
+    """Record what the source still wanted to check in the same block, or all that it wanted in the launch."""
+    frame, blocks = _blocks()
+    if whole or not session.current.part:
+        blocks = [block for block in blocks if not _part_title(block)]
+    if frame is None or not blocks:
         return
-    hidden = _hidden_lines(frame)
-    for node in ast.walk(block):
-        if (
-            isinstance(node, ast.Call)
-            and isinstance(node.func, ast.Attribute)
-            and node.func.attr.startswith("expect")
-            and (whole or node.lineno > frame.f_lineno)
-        ):
+    hidden = hidden_lines(_lines(frame))
+    for node, part in _expectations(blocks[0], session.current.part):
+        if whole or node.lineno > frame.f_lineno:
             text = " ".join(ast.unparse(node).split(".", 1)[-1].split())
             session.current.outcomes.append(
                 Outcome(
@@ -142,5 +184,15 @@ def _rest_not_checked(whole: bool = False) -> None:
                     title=text if len(text) <= 120 else text[:117] + "...",
                     because="The program ended too early." if whole else "Something before it failed.",
                     hidden=node.lineno in hidden,
+                    part=part,
                 )
             )
+
+
+def _expectations(node: ast.AST, part: str) -> Iterator[tuple[ast.Call, str]]:
+    """The calls of expectations below a node, each with the title of its part, in the order of the source."""
+    for child in ast.iter_child_nodes(node):
+        inside = (isinstance(child, ast.With) and _part_title(child)) or part
+        if isinstance(child, ast.Call) and isinstance(child.func, ast.Attribute) and _EXPECTS.match(child.func.attr):
+            yield child, part
+        yield from _expectations(child, inside)

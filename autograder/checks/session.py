@@ -13,7 +13,7 @@ import socket
 import time
 from pathlib import Path
 
-from autograder.results import CheckResult, Isolation, NodeLog, Outcome, Status
+from autograder.results import CheckResult, Isolation, NodeLog, Outcome
 from autograder.sandbox.nodes import NodeSandbox
 
 NOTEBOOK_FOLDER = Path("nodes")
@@ -49,6 +49,12 @@ class Session:
     def reset(self) -> None:
         """Forget the findings so far: a new cell begins."""
         self.outcomes: list[Outcome] = []
+        self.part = ""
+        """Title of the part of the check that is being looked at."""
+        self.lost_parts: set[str] = set()
+        """Parts of launches that failed as a whole, or outside of any part."""
+        self.block_began = 0
+        """Number of the first outcome of the current launch or table."""
         self.logs: list[NodeLog] = []
         self.scored_logs: list[NodeLog] = []
         """Logs of what has been scored since the cell began."""
@@ -78,28 +84,13 @@ class Session:
                 return domain
         return next(self._domains)
 
-    def score(self, points: float) -> CheckResult:
-        """Close the collection: all of the points when every outcome passed, none otherwise.
-
-        Nothing found out, or something the grader could not find out, gives None: an instructor decides.
-        """
-        statuses = {outcome.status for outcome in self.outcomes}
-        earned: float | None = 0.0
-        if not statuses or Status.UNKNOWN in statuses:
-            earned = None
-        elif statuses == {Status.PASSED}:
-            earned = points
-        result = CheckResult(
-            grade_id="",
-            max_points=points,
-            points=earned,
-            seconds=time.monotonic() - self.started,
-            outcomes=self.outcomes,
-        )
+    def take(self) -> tuple[list[Outcome], set[str], float]:
+        """Close the collection: its outcomes, the parts lost as a whole, and the seconds that it took."""
+        taken = self.outcomes, self.lost_parts, time.monotonic() - self.started
         logs = self.scored_logs + self.logs
         self.reset()
         self.scored_logs = logs
-        return result
+        return taken
 
 
 class Score:

@@ -27,7 +27,6 @@ from nbgrader.converters import Autograde
 from nbgrader.preprocessors import (
     AssignLatePenalties,
     CheckCellMetadata,
-    ClearHiddenTests,
     ClearMarkScheme,
     ClearOutput,
     ClearSolutions,
@@ -48,6 +47,7 @@ from autograder.grading.stage_b import before_autograde
 from autograder.report.html import check_html, render
 from autograder.results import CheckResult, SubmissionResult
 from autograder.submission.lab import CODE_STUB, TEXT_STUB, Lab, load_lab
+from autograder.submission.markers import without_hidden_tests
 from autograder.submission.reader import Submission, read_submission
 
 _POINTS = "autograder_points"
@@ -209,22 +209,25 @@ class SanitizeOutputs(SanitizeHTML):  # type: ignore[misc]
         return cell, resources
 
 
-class _NotInAnswers:
-    """A stage that cuts between markers in the lab's own cells; a student who types a marker only types a word."""
+class HideTests(NbGraderPreprocessor):  # type: ignore[misc]
+    """Keeps hidden tests out of what students receive, and says where they were."""
 
     def preprocess_cell(self, cell: Any, resources: dict[str, Any], index: int) -> tuple[Any, dict[str, Any]]:
+        """Cut in the lab's own cells; a student who types a marker only types a word."""
+        if not utils.is_solution(cell):
+            cell.source = without_hidden_tests(cell.source)
+        return cell, resources
+
+
+class HideMarkScheme(ClearMarkScheme):  # type: ignore[misc]
+    """Keeps mark schemes out of feedback."""
+
+    def preprocess_cell(self, cell: Any, resources: dict[str, Any], index: int) -> tuple[Any, dict[str, Any]]:
+        """Cut in the lab's own cells; a student who types a marker only types a word."""
         if utils.is_solution(cell):
             return cell, resources
-        made: tuple[Any, dict[str, Any]] = super().preprocess_cell(cell, resources, index)  # type: ignore[misc]
+        made: tuple[Any, dict[str, Any]] = super().preprocess_cell(cell, resources, index)
         return made
-
-
-class HideTests(_NotInAnswers, ClearHiddenTests):  # type: ignore[misc]
-    """Keeps hidden tests out of feedback."""
-
-
-class HideMarkScheme(_NotInAnswers, ClearMarkScheme):  # type: ignore[misc]
-    """Keeps mark schemes out of feedback."""
 
 
 class StableNotebook(NbGraderPreprocessor):  # type: ignore[misc]
@@ -300,7 +303,7 @@ RELEASE = [
     CheckCellMetadata,
     ComputeChecksums,
     SaveCells,
-    ClearHiddenTests,
+    HideTests,
     ClearMarkScheme,
     ComputeChecksums,
     CheckCellMetadata,

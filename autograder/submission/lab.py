@@ -18,6 +18,7 @@ from typing import Any
 from autograder.errors import KitError
 from autograder.grading.job import Cell
 from autograder.submission.magics import BadNameError, CellFile, parse
+from autograder.submission.markers import without_hidden_tests, without_region
 
 CODE_STUB = "# YOUR CODE HERE"
 """What students find in place of a solution: a comment in Python and in YAML."""
@@ -195,7 +196,7 @@ def _read(name: str, notebook: Path, raw: dict[str, Any], released_only: bool) -
                 grade_id, cell["cell_type"], blank, _without_markers(source), _file(grade_id, blank), points
             )
         elif cell["cell_type"] == "code" and (nbgrader.get("locked") or nbgrader.get("grade")):
-            blank = _without_region(source, "HIDDEN TESTS")
+            blank = without_hidden_tests(source)
             file = _file(grade_id, source)
             if file is not None:
                 given[file.file_name] = file.text
@@ -215,27 +216,11 @@ def _file(grade_id: str, source: str) -> CellFile | None:
         raise ValueError(f"cell `{grade_id}`: {error}") from error
 
 
-def _without_region(source: str, mark: str, stub: str | None = None) -> str:
-    """Drop the lines between `BEGIN mark` and `END mark`, or put a stub in their place, as nbgrader does."""
-    lines: list[str] = []
-    inside = False
-    for line in source.split("\n"):
-        if f"BEGIN {mark}" in line:
-            inside = True
-            if stub is not None:
-                lines.append(re.match(r"\s*", line).group() + stub)  # type: ignore[union-attr]
-        elif f"END {mark}" in line:
-            inside = False
-        elif not inside:
-            lines.append(line)
-    return "\n".join(lines)
-
-
 def _without_solution(source: str, cell_type: str) -> str:
     stub = CODE_STUB if cell_type == "code" else TEXT_STUB
     if "BEGIN SOLUTION" not in source:
         return stub
-    return _without_region(source, "SOLUTION", stub)
+    return without_region(source, "SOLUTION", stub)
 
 
 def _without_markers(source: str) -> str:

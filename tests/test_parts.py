@@ -1,0 +1,210 @@
+"""Points by requirement: what is wrong costs its own part, a table its own line, and nothing visible claims too much."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from test_checks import TALKER, grade  # noqa: F401  a fixture
+
+from autograder.checks.forms import allowed, plain, same, seal
+from autograder.results import CheckResult, Status
+from autograder.submission.markers import MORE_AT_GRADING, without_hidden_tests
+
+PARTS = """\
+with launch("talker") as ros:
+    with ros.part("the name"):
+        ros.expect_node("/talker", hint="")
+    with ros.part("the words"):
+        ros.expect_messages("/chatter", String, where=lambda m: m.data.startswith("{word}"), within={within})
+        ros.expect_publisher("/chatter", String)
+    with ros.part("the service"):
+        ros.expect_service("/how_many", Trigger)
+ros.score({{"the name": 0.5, "the words": 1, "the service": 0.5}})
+"""
+Grade = Callable[..., CheckResult]
+
+
+def earned(result: CheckResult) -> dict[str, float]:
+    return {part.title: part.points for part in result.parts}
+
+
+def test_a_part_that_fails_costs_its_own_points_and_the_next_is_still_looked_at(grade: Grade) -> None:  # noqa: F811
+    result = grade(PARTS.format(word="nonsense", within=1), talker__py=TALKER)
+    assert earned(result) == {"the name": 0.5, "the words": 0.0, "the service": 0.5}
+    assert (result.points, result.max_points, result.status) == (1.0, 2.0, Status.FAILED)
+    assert [(o.part, o.status) for o in result.outcomes] == [
+        ("the name", Status.PASSED),
+        ("the words", Status.FAILED),
+        ("the words", Status.NOT_CHECKED),
+        ("the service", Status.PASSED),
+    ]
+
+
+def test_all_parts_give_all_points(grade: Grade) -> None:  # noqa: F811
+    result = grade(PARTS.format(word="", within=5), talker__py=TALKER)
+    assert (result.points, result.status) == (2.0, Status.PASSED)
+
+
+def test_a_program_that_ends_takes_every_part_of_its_launch_and_none_of_another(grade: Grade) -> None:  # noqa: F811
+    check = """\
+        with launch("talker") as ros:
+            with ros.part("first"):
+                ros.expect_node("/talker")
+        with launch("broken") as ros:
+            with ros.part("second"):
+                ros.expect_node("/broken")
+            with ros.part("third"):
+                ros.expect_node("/broken")
+        ros.score({"first": 1, "second": 0.5, "third": 0.5})
+        """
+    result = grade(check, talker__py=TALKER, broken__py="raise ValueError(1)\n")
+    assert earned(result) == {"first": 1.0, "second": 0.0, "third": 0.0}
+    assert [(o.part, o.status) for o in result.outcomes][1:] == [
+        ("", Status.FAILED),
+        ("second", Status.NOT_CHECKED),
+        ("third", Status.NOT_CHECKED),
+    ]
+
+
+def test_what_fails_outside_the_parts_takes_those_of_its_launch(grade: Grade) -> None:  # noqa: F811
+    check = """\
+        with launch("talker") as ros:
+            with ros.part("before"):
+                ros.expect_node("/talker")
+            ros.require(False, "It holds for all", because="It does not.")
+            with ros.part("after"):
+                ros.expect_node("/talker")
+        ros.score({"before": 1, "after": 1})
+        """
+    assert earned(grade(check, talker__py=TALKER)) == {"before": 0.0, "after": 0.0}
+
+
+@pytest.mark.parametrize("mistake", ['{"the name": 2}', '{"the name": 1, "the words": 0.5}', "2"])
+def test_a_score_that_does_not_fit_the_parts_decides_nothing(grade: Grade, mistake: str) -> None:  # noqa: F811
+    check = PARTS.format(word="", within=5).rsplit("ros.score", 1)[0] + f"ros.score({mistake})"
+    assert grade(check, talker__py=TALKER).points is None
+
+
+def released(check: str) -> str:
+    return without_hidden_tests(check)
+
+
+HIDDEN = """\
+with launch("talker") as ros:
+    with ros.part("the name"):
+        ros.expect_node("/talker")
+    with ros.part("the words"):
+        ros.expect_publisher("/chatter", String)
+        ### BEGIN HIDDEN TESTS
+        ros.expect_messages("/chatter", String, at_least=2)
+        ### END HIDDEN TESTS
+ros.score({"the name": 1, "the words": 1})
+"""
+
+
+def test_a_released_check_claims_only_what_grading_will_give_as_well(grade: Grade) -> None:  # noqa: F811
+    visible = grade(released(HIDDEN), talker__py=TALKER)
+    assert visible.more_at_grading and visible.status is Status.PASSED
+    assert (visible.sure_points, visible.possible_points) == (1.0, 2.0)
+    assert [(part.title, part.more_at_grading) for part in visible.parts] == [("the name", False), ("the words", True)]
+    full = grade(HIDDEN, talker__py=TALKER)
+    assert (full.points, full.sure_points, full.more_at_grading) == (2.0, 2.0, False)
+
+
+def test_a_check_without_parts_that_hides_tests_is_sure_of_nothing_but_a_failure(grade: Grade) -> None:  # noqa: F811
+    check = HIDDEN.replace('    with ros.part("the name"):\n', "    if True:\n").replace(
+        '    with ros.part("the words"):\n', "    if True:\n"
+    )
+    check = check.rsplit("ros.score", 1)[0] + "ros.score(2)"
+    assert MORE_AT_GRADING in released(check)
+    visible = grade(released(check), talker__py=TALKER)
+    assert (visible.sure_points, visible.possible_points, visible.more_at_grading) == (0.0, 2.0, True)
+    failed = grade(released(check).replace('"/talker"', '"/other"'), talker__py=TALKER)
+    assert (failed.sure_points, failed.possible_points, failed.more_at_grading) == (0.0, 0.0, False)
+
+
+TABLE = """\
+with answers("table.yaml") as table:
+    table.expect_filled({"reliability": ["best_effort", "reliable"], "late": range(99), "heard": [True, False]})
+    table.expect_answer("reliability", "best_effort")
+    table.expect_sealed({"late": "%s", "heard": "%s"})
+table.score(2)
+""" % (seal("late", 5), seal("heard", True))
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "reliability: best_effort\nlate: 5\nheard: yes",
+        "reliability: Best effort\nlate: '5'\nheard: 'Yes'",
+        "reliability: BEST-EFFORT \nlate: 5.0\nheard: true",
+        'reliability: "`best effort`"\n" late ": " 5 "\nheard: "TRUE"',
+    ],
+)
+def test_an_answer_counts_however_it_is_spelt(grade: Grade, text: str) -> None:  # noqa: F811
+    result = grade(TABLE, table__yaml=text + "\n")
+    assert result.points == 2.0, result.outcomes
+
+
+@pytest.mark.parametrize(
+    ("text", "lost", "code", "because"),
+    [
+        ("reliability: reliable\nlate: 5\nheard: yes", "reliability", "wrong-answer", "`reliable` is not what happens"),
+        ("reliability: best_effort\nlate: five\nheard: yes", "late", "answer-form", "a whole number from 0 to 98"),
+        ("reliability: best_effort\nlate: 5\nheard: maybe", "heard", "answer-form", "yes or no"),
+        ("reliability: best_effort\nlate: 5\nheard: ?", "heard", "unanswered", "has no answer yet"),
+        ("reliability: best_effort\nlate: 5\nheard: no", "heard", "wrong-answer", "`no` is not what happens"),
+        ("reliability: best_effort\nlate: 5\nheard: 1", "heard", "answer-form", "yes or no"),
+        ("reliability: best_effort\nlate: yes\nheard: yes", "late", "answer-form", "a whole number"),
+    ],
+)
+def test_a_wrong_line_costs_its_share_and_a_wrong_form_is_not_called_a_wrong_fact(
+    grade: Grade,  # noqa: F811
+    text: str,
+    lost: str,
+    code: str,
+    because: str,
+) -> None:
+    result = grade(TABLE, table__yaml=text + "\n")
+    assert [part.title for part in result.parts if not part.points] == [lost]
+    assert result.points == 1.33
+    first = result.first_failure
+    assert first is not None and first.code == code and because in first.because
+    assert sum(o.status is Status.FAILED for o in result.outcomes) == 1
+
+
+@pytest.mark.parametrize("text", ["overlap\n", "", "# only a comment\n", "{}\n", "- a\n- b\n"])
+def test_what_is_no_table_gives_nothing(grade: Grade, text: str) -> None:  # noqa: F811
+    result = grade(TABLE, table__yaml=text)
+    assert result.points == 0.0
+    assert result.first_failure is not None and result.first_failure.code == "not-yaml"
+
+
+def test_a_table_that_is_missing_gives_nothing(grade: Grade) -> None:  # noqa: F811
+    result = grade(TABLE)
+    assert result.points == 0.0
+    assert result.first_failure is not None and result.first_failure.code == "file-missing"
+
+
+def test_a_list_of_words_has_a_form_too() -> None:
+    rows = [["all", "none"], ["none", "all"]]
+    assert allowed(["All", "'none'"], rows) and not allowed(["all", "nothing"], rows)
+
+
+def test_a_name_may_lack_its_slash_but_underscores_and_slashes_count() -> None:
+    assert (
+        same("rear/image", "/rear/image")
+        and same("'/rear/image'", "/rear/image")
+        and same("/rear/image/", "/rear/image")
+    )
+    assert not same("/rear/image", "/rear_image") and not same("none", "/none/x")
+
+
+@given(st.recursive(st.text() | st.integers() | st.booleans() | st.floats() | st.none(), st.lists, max_leaves=5))
+def test_any_answer_can_be_read_and_compared(answer: Any) -> None:
+    assert plain(plain(answer)) == plain(answer) or answer != answer or isinstance(answer, (str, list, float))
+    assert isinstance(same(answer, "reliable"), bool) and len(seal("q", str(answer))) == 12
