@@ -1,4 +1,4 @@
-"""Points by requirement: what is wrong costs its own part, a table its own line, and nothing visible claims too much."""
+"""Points by requirement: a mistake costs its own part, or its line of a table; no visible check claims too much."""
 
 from __future__ import annotations
 
@@ -127,13 +127,13 @@ def test_a_check_without_parts_that_hides_tests_is_sure_of_nothing_but_a_failure
     assert (failed.sure_points, failed.possible_points, failed.more_at_grading) == (0.0, 0.0, False)
 
 
-TABLE = """\
+TABLE = f"""\
 with answers("table.yaml") as table:
-    table.expect_filled({"reliability": ["best_effort", "reliable"], "late": range(99), "heard": [True, False]})
+    table.expect_filled({{"reliability": ["best_effort", "reliable"], "late": range(99), "heard": [True, False]}})
     table.expect_answer("reliability", "best_effort")
-    table.expect_sealed({"late": "%s", "heard": "%s"})
+    table.expect_sealed({{"late": "{seal("late", 5)}", "heard": "{seal("heard", True)}"}})
 table.score(2)
-""" % (seal("late", 5), seal("heard", True))
+"""
 
 
 @pytest.mark.parametrize(
@@ -156,7 +156,7 @@ def test_an_answer_counts_however_it_is_spelt(grade: Grade, text: str) -> None: 
         ("reliability: reliable\nlate: 5\nheard: yes", "reliability", "wrong-answer", "`reliable` is not what happens"),
         ("reliability: best_effort\nlate: five\nheard: yes", "late", "answer-form", "a whole number from 0 to 98"),
         ("reliability: best_effort\nlate: 5\nheard: maybe", "heard", "answer-form", "yes or no"),
-        ("reliability: best_effort\nlate: 5\nheard: ?", "heard", "unanswered", "has no answer yet"),
+        ("reliability: best_effort\nlate: 5\nheard: '?'", "heard", "unanswered", "has no answer yet"),
         ("reliability: best_effort\nlate: 5\nheard: no", "heard", "wrong-answer", "`no` is not what happens"),
         ("reliability: best_effort\nlate: 5\nheard: 1", "heard", "answer-form", "yes or no"),
         ("reliability: best_effort\nlate: yes\nheard: yes", "late", "answer-form", "a whole number"),
