@@ -404,3 +404,79 @@ def test_a_missing_action_and_a_silent_one_are_told_apart(grade: Grade, old: str
         counter__py=COUNTER.replace(old, new),
     )
     assert failure(result).code == code, result
+
+
+SECOND = '        self.create_publisher(String, "chatter", BEST)\n        self.create_service'
+PAIR = TALKER.replace("        self.create_service", SECOND).replace(
+    "import rclpy\n", "import rclpy\nfrom rclpy.qos import qos_profile_sensor_data as BEST\n", 1
+)
+
+
+@pytest.mark.parametrize("swapped", [False, True])
+def test_the_qos_of_every_endpoint_counts_whichever_was_made_first(grade: Grade, swapped: bool) -> None:
+    program = PAIR.replace('"chatter", 10)', '"chatter", "x")').replace('"chatter", BEST)', '"chatter", 10)')
+    program = program.replace('"chatter", "x")', '"chatter", BEST)') if swapped else PAIR
+    result = grade(
+        'with launch("talker") as ros:\n    ros.expect_qos("/chatter", reliability="reliable")\nros.score(2)',
+        talker__py=program,
+    )
+    assert failure(result).code == "qos-reliability"
+    assert "best effort" in failure(result).observed and "`/talker`" in failure(result).because
+
+
+def test_names_keep_their_capitals_and_an_end_that_is_not_there_has_its_nearest_name(grade: Grade) -> None:
+    program = TALKER.replace('"chatter"', '"camRaw/Image"')
+    result = grade(
+        """\
+        with launch("talker") as ros:
+            ros.expect_messages("/camRaw/Image", String, at_least=1)
+            ros.expect_qos("/CamRaw/Image", reliability="reliable", within=4)
+        ros.score(2)
+        """,
+        talker__py=program,
+    )
+    assert result.outcomes[0].title == "At least 1 message arrives on `/camRaw/Image`"
+    assert failure(result).code == "topic-name" and "`/camRaw/Image`" in failure(result).because
+
+
+def test_what_a_lab_author_gets_wrong_is_no_students_failure(grade: Grade) -> None:
+    for wrong, word in (('reliabilty="reliable"', "reliabilty"), ("depth=10", "depth")):
+        result = grade(
+            f'with launch("talker") as ros:\n    ros.expect_qos("/chatter", {wrong})\nros.score(2)', talker__py=TALKER
+        )
+        assert result.points is None and word in result.outcomes[0].because
+
+
+def test_what_is_true_in_another_form_holds_and_none_at_all_means_silence(grade: Grade) -> None:
+    result = grade(
+        """\
+        import re
+        import numpy as np
+        with launch("talker") as ros:
+            ros.expect_messages("/chatter", String, where=lambda m: re.match("hello", m.data),
+                                values=lambda heard: np.all([m.data for m in heard]))
+            ros.expect_messages("/chatter", String, values=lambda heard: re.match("hello", heard[0].data))
+            ros.expect_messages("/nothing", String, at_most=0, window=0.2)
+            ros.expect_messages("/chatter", String, at_most=0, window=2)
+        ros.score(2)
+        """,
+        talker__py=TALKER,
+    )
+    assert [outcome.status for outcome in result.outcomes] == [Status.PASSED] * 3 + [Status.FAILED]
+    assert failure(result).code == "too-many"
+
+
+def test_the_fields_that_a_check_looked_at_stand_first_in_what_was_observed(grade: Grade) -> None:
+    program = TALKER.replace("import rclpy\n", "import rclpy\nfrom sensor_msgs.msg import Range\n", 1)
+    program = program.replace('String, "chatter"', 'Range, "chatter"')
+    program = program.replace("String(data=f\"{self.get_parameter('word').value} {self.count}\")", "Range(range=2.5)")
+    result = grade(
+        """\
+        from sensor_msgs.msg import Range
+        with launch("talker") as ros:
+            ros.expect_messages("/chatter", Range, where=lambda m: m.range > 3 and m.header.frame_id == "x", within=2)
+        ros.score(2)
+        """,
+        talker__py=program,
+    )
+    assert "`header.frame_id='', range=2.5, " in failure(result).because

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, NoReturn
@@ -23,6 +24,15 @@ SETTLE = 2.0
 
 AFTER_EXIT = 0.3
 """Seconds that evidence may still be under way after the last program has ended."""
+
+
+_POINTER = re.compile(r"lecture \d", re.IGNORECASE)
+
+
+def where_to_read(hint: str) -> str:
+    """The parts of a check's hint that point to a lecture; the others presume what went wrong."""
+    parts = [part.strip() for part in hint.split(";")]
+    return " ".join(f"{part[:1].upper()}{part[1:]}" for part in parts if _POINTER.search(part))
 
 
 class ExpectationBase:
@@ -101,7 +111,7 @@ class ExpectationBase:
             reason = trouble if trouble and trouble.code != "exited" else reason or trouble
         because = reason.because if reason else ""
         code = reason.code if reason else ""
-        hint = " ".join(part for part in (reason.hint if reason else "", hint) if part)
+        hint = reason.hint + " " * bool(reason.hint) + where_to_read(hint) if reason and reason.hint else hint
         if gone is None:
             outcomes.failed(title, expected=expected, observed=observed, because=because, hint=hint, code=code)
         outcomes.failed_as_a_whole(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from collections import Counter
+from dataclasses import replace
 from typing import Any, Literal
 
 from rcl_interfaces.srv import ListParameters
@@ -11,6 +12,7 @@ from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from autograder.checks import outcomes
 from autograder.checks.base import SETTLE, WITHIN, ExpectationBase
+from autograder.errors import KitError
 from autograder.graph import diagnosis, qos
 from autograder.graph.diagnosis import Diagnosis
 from autograder.graph.names import full_name, type_name
@@ -24,6 +26,12 @@ GONE_WITHIN = 2.0
 
 class GraphExpectations(ExpectationBase):
     """What must be on the graph, and what must not."""
+
+    def prepare(self) -> None:
+        """Set up what is known of the nodes."""
+        super().prepare()
+        self._built: set[str] = set()
+        """Nodes that have answered, or had their time to."""
 
     def expect_node(self, name: str, *, within: float = WITHIN, hint: str = "") -> None:
         """The node with this full name is on the graph, exactly once."""
@@ -138,30 +146,29 @@ class GraphExpectations(ExpectationBase):
     ) -> None:
         title = f"{f'`{node}`' if node else 'A node'} has a {kind} on `{topic}` ({type_name(msg_type)})"
         if count != 1:
-            title = f"`{topic}` has {count} {kind}s ({type_name(msg_type)})"
+            title = f"{f'`{node}`' if node else 'The topic'} has {count} {kind}s on `{topic}` ({type_name(msg_type)})"
 
         def number() -> int:
             return len(self._ends(topic, msg_type, kind, node))
 
-        if not self.wait(lambda: number() >= count, within):
-            found = number()
+        found = self.wait(lambda: number() >= count, within)
+        if found and number() == count:
+            outcomes.passed(title, observed=topic)
+            return
+        those = f"{number()} {kind}{'s' * (number() != 1)}"
+        owners = self._owners(topic, kind, msg_type, node)
+        reason = Diagnosis(f"`{topic}` has {those}, not {count}: {owners}.", "count")
+        if found:
+            reason = replace(reason, code=f"extra-{kind}")
+        elif not number():
             reason = diagnosis.why_no_endpoint(self.scene(), topic, msg_type, kind, node)
-            if found:
-                reason = Diagnosis(f"`{topic}` has {found} {kind}{'s' if found > 1 else ''}, not {count}.", "count")
-            self.fail(title, reason, expected=f"{topic} ({type_name(msg_type)})", observed=self._topics(), hint=hint)
-        if number() > count:
-            owners = Counter(
-                full_name(end.node_namespace, end.node_name) for end in self._ends(topic, msg_type, kind, node)
-            )
-            told = ", ".join(f"{owner} ({times})" for owner, times in sorted(owners.items()))
-            self.fail(
-                title,
-                Diagnosis(f"`{topic}` has {number()} {kind}s instead of {count}: {told}.", f"extra-{kind}"),
-                expected=f"{count} {kind}",
-                observed=told,
-                hint=hint,
-            )
-        outcomes.passed(title, observed=topic)
+        self.fail(
+            title,
+            reason,
+            expected=f"{count} {kind}{'s' * (count != 1)} on {topic} ({type_name(msg_type)})",
+            observed=f"{those}: {owners}" if owners else f"none; topics: {self._topics()}",
+            hint=hint,
+        )
 
     def expect_publisher(
         self, topic: str, msg_type: type, *, node: str = "", count: int = 1, within: float = WITHIN, hint: str = ""
@@ -175,9 +182,12 @@ class GraphExpectations(ExpectationBase):
         """The topic has exactly `count` subscriptions of this type, of the node `node` if one is given."""
         self._expect_end(topic, msg_type, "subscription", node, count, within, hint)
 
-    def _owners(self, topic: str, kind: End) -> str:
-        ends = self._ends(topic, None, kind, "")
-        return ", ".join(sorted({full_name(end.node_namespace, end.node_name) for end in ends}))
+    def _owners(self, topic: str, kind: End, msg_type: type | None = None, node: str = "") -> str:
+        """Whose ends of this kind are on the topic, with their number where a node has several."""
+        owners = Counter(
+            full_name(end.node_namespace, end.node_name) for end in self._ends(topic, msg_type, kind, node)
+        )
+        return ", ".join(owner if times == 1 else f"{owner} ({times})" for owner, times in sorted(owners.items()))
 
     def _expect_no_end(self, topic: str, kind: End, within: float, hint: str) -> None:
         gone = self.observer.wait(lambda: not self._ends(topic, None, kind, ""), within)
@@ -220,33 +230,47 @@ class GraphExpectations(ExpectationBase):
             policies: any of reliability, durability, liveliness (in words) and deadline, lifespan, lease (seconds, or
                 None for "never"). History and depth are not on the graph.
         """
+        unknown = sorted(policies.keys() - qos.POLICIES)
+        if unknown or not policies:
+            raise KitError(
+                f"expect_qos knows no policy called {', '.join(unknown) or 'nothing'}.",
+                f"Policies on the graph are {', '.join(sorted(qos.POLICIES))}.",
+            )
         wanted = ", ".join(f"{policy} {_value(value)}" for policy, value in policies.items())
         title = f"The {of} on `{topic}` has {wanted}"
         if not self.wait(lambda: self._ends(topic, None, of, node), within):
-            # The type does not matter here; the diagnosis wants one to compare, so it gets the one that is there.
-            trouble = diagnosis.program_trouble(self.scene())
             self.fail(
                 title,
-                trouble or Diagnosis(f"There is no {of} on `{topic}`.", "no-topic"),
+                diagnosis.why_no_endpoint(self.scene(), topic, None, of, node),
+                expected=f"a {of} on {topic}",
                 observed=self._topics(),
                 hint=hint,
             )
-        have = qos.describe(self._ends(topic, None, of, node)[0].qos_profile)
-        wrong = [policy for policy, value in policies.items() if not _same(have[policy], value)]
+        self._all_there(topic, of)
+        seen, wrong = [], []
+        for end in self._ends(topic, None, of, node):
+            owner, have = full_name(end.node_namespace, end.node_name), qos.describe(end.qos_profile)
+            seen.append(", ".join(f"{policy} {_value(have[policy])}" for policy in policies))
+            wrong += [
+                (policy, f"The {policy} of the {of} of `{owner}` is {_value(have[policy])}, not {_value(value)}.")
+                for policy, value in policies.items()
+                if not _same(have[policy], value)
+            ]
         self.expect_that(
             not wrong,
             title,
-            lambda: Diagnosis(
-                "; ".join(
-                    f"its {policy} is {_value(have[policy])}, not {_value(policies[policy])}" for policy in wrong
-                ).capitalize()
-                + ".",
-                f"qos-{wrong[0]}",
-            ),
+            lambda: Diagnosis(" ".join(dict.fromkeys(said for _, said in wrong)), f"qos-{wrong[0][0]}"),
             expected=wanted,
-            observed=", ".join(f"{policy} {_value(have[policy])}" for policy in policies),
+            observed="; ".join(seen),
             hint=hint,
         )
+
+    def _all_there(self, topic: str, kind: End) -> None:
+        """Wait until the nodes at this end are built: their constructors may be about to make further ends."""
+        for owner in {full_name(end.node_namespace, end.node_name) for end in self._ends(topic, None, kind, "")}:
+            if owner not in self._built:
+                self._built.add(owner)
+                self._settle(owner)
 
     def expect_match(self, topic: str, *, within: float = WITHIN, hint: str = "") -> None:
         """Every subscription to the topic accepts the QoS that every publisher of it offers."""
@@ -256,9 +280,16 @@ class GraphExpectations(ExpectationBase):
             return self._ends(topic, None, kind, "")
 
         if not self.wait(lambda: ends("publisher") and ends("subscription"), within):
-            missing = "subscription" if ends("publisher") else "publisher"
-            trouble = diagnosis.program_trouble(self.scene())
-            self.fail(title, trouble or Diagnosis(f"There is no {missing} on `{topic}`.", "no-topic"), hint=hint)
+            missing: End = "subscription" if ends("publisher") else "publisher"
+            self.fail(
+                title,
+                diagnosis.why_no_endpoint(self.scene(), topic, None, missing),
+                expected=f"a publisher and a subscription on {topic}",
+                observed=self._topics(),
+                hint=hint,
+            )
+        self._all_there(topic, "publisher")
+        self._all_there(topic, "subscription")
         reasons = [
             diagnosis.why_not_matched(self.scene(), topic, end.qos_profile, "publisher") for end in ends("subscription")
         ]

@@ -13,6 +13,7 @@ from autograder.checks import outcomes
 from autograder.checks.activity import Activity
 from autograder.checks.base import WITHIN
 from autograder.checks.expect_graph import GraphExpectations
+from autograder.checks.message_text import in_words, shorten
 from autograder.graph import diagnosis
 from autograder.graph.diagnosis import Diagnosis
 from autograder.graph.names import full_name
@@ -49,8 +50,8 @@ class MessageExpectations(GraphExpectations):
         tolerance: float = 0.2,
         window: float = 1.0,
         after: int = 0,
-        where: Callable[[Any], bool] | None = None,
-        values: Callable[[list[Any]], bool | str] | None = None,
+        where: Callable[[Any], object] | None = None,
+        values: Callable[[list[Any]], object] | None = None,
         publisher: str = "",
         publishers: int = 1,
         qos: QoSProfile | None = None,
@@ -63,14 +64,14 @@ class MessageExpectations(GraphExpectations):
             topic: full name.
             msg_type: message class.
             at_least: so many (by default 1, or 10 with `rate`), counted from the first.
-            at_most: not more, looked at for `window` seconds more.
+            at_most: not more, looked at for `window` seconds more; 0 means silence for `window` seconds.
             exactly: both at once.
             rate: hertz; judged by the median gap of the publisher's own stamps, so that a slow grader does not matter.
             tolerance: allowed deviation of the rate, as a share.
             window: seconds.
             after: leaves out the first so many messages of the topic, for example those of a node's first life.
-            where: counts only messages for which it is true.
-            values: looks at all counted messages; false, or a sentence that says what is wrong, fails.
+            where: counts only messages for which it gives something true.
+            values: looks at all counted messages; a sentence that says what is wrong fails, and so does what is false.
             publisher: full name of the node that they must come from.
             publishers: how many publishers the topic may have.
             qos: subscribe with this profile instead of one that hears everything.
@@ -80,12 +81,12 @@ class MessageExpectations(GraphExpectations):
         Returns:
             the counted messages.
         """
-        need = exactly if exactly is not None else at_least or (10 if rate else 1)
         most = exactly if exactly is not None else at_most
+        need = exactly if exactly is not None else at_least or (0 if most == 0 else 10 if rate else 1)
         recording = self.observer.record(topic, msg_type, qos)
 
         def counted() -> list[Received]:
-            return [r for r in recording.messages[after:] if where is None or where(r.msg)]
+            return [r for r in recording.messages[after:] if where is None or bool(where(r.msg))]
 
         title = _title(topic, need, most, rate)
         if not self.wait(lambda: len(counted()) >= need, within):
@@ -95,12 +96,12 @@ class MessageExpectations(GraphExpectations):
                 reason = Diagnosis(f"Only {got} of {need} messages came in {within:g} s.", "too-few")
             elif where and not got and recording.count > after:
                 # Messages do come, so what keeps callbacks waiting is not the reason.
-                scene, last = self.scene(), _shorten(_text(recording.messages[-1].msg), 80)
+                scene, last = self.scene(), shorten(in_words(recording.messages[-1].msg, where), 120)
                 reason = (
                     diagnosis.program_trouble(scene)
                     or diagnosis.inside_reason(scene)
                     or diagnosis.lifecycle_silence(scene)
-                    or Diagnosis(f"Messages came, but none as expected; the last of them is {last!r}.", "content")
+                    or Diagnosis(f"Messages came, but none as expected; the last of them is `{last}`.", "content")
                 )
             self.fail(title, reason, expected=f"{need} messages", observed=f"{got} messages", hint=hint)
         if most is not None:
@@ -119,12 +120,12 @@ class MessageExpectations(GraphExpectations):
             self._rate(title, received, rate, tolerance, hint)
         if values is not None:
             verdict = values([r.msg for r in received])
-            if verdict is not True:
-                told = verdict if isinstance(verdict, str) else "The content of the messages is not as expected."
+            if isinstance(verdict, str) or not verdict:
+                said = verdict if isinstance(verdict, str) and verdict else "The messages do not say what they should."
                 self.fail(
                     title,
-                    Diagnosis(told, "content"),
-                    observed=_shorten("; ".join(_text(r.msg) for r in received[:3])),
+                    Diagnosis(said, "content"),
+                    observed=shorten("; ".join(in_words(r.msg, values) for r in received[:3])),
                     hint=hint,
                 )
         outcomes.passed(title, observed=f"{len(received)} messages")
@@ -424,16 +425,9 @@ class MessageExpectations(GraphExpectations):
 
 
 def _title(topic: str, need: int, most: int | None, rate: float | None) -> str:
-    number = f"exactly {need}" if most == need else f"at least {need}" + (f", at most {most}," if most else "")
-    return f"{number} message{' arrives' if need == 1 else 's arrive'} on `{topic}`".capitalize() + (
+    if most == 0:
+        return f"No message arrives on `{topic}`"
+    number = f"Exactly {need}" if most == need else f"At least {need}" + (f", at most {most}," if most else "")
+    return f"{number} message{' arrives' if need == 1 else 's arrive'} on `{topic}`" + (
         f" at {rate:g} Hz" if rate else ""
     )
-
-
-def _text(message: Any) -> str:
-    data = getattr(message, "data", None)
-    return str(data) if isinstance(data, (str, int, float, bool)) else str(message)
-
-
-def _shorten(text: str, length: int = 200) -> str:
-    return text if len(text) <= length else text[: length - 3] + "..."

@@ -454,16 +454,16 @@ def why_doubled(scene: Scene, name: str) -> Diagnosis:
     )
 
 
-def why_no_endpoint(scene: Scene, topic: str, msg_type: type, kind: str, node: str = "") -> Diagnosis:
-    """Why no `kind` ("publisher" or "subscription") of this type is on the topic."""
+def why_no_endpoint(scene: Scene, topic: str, msg_type: type | None, kind: str, node: str = "") -> Diagnosis:
+    """Why no `kind` ("publisher" or "subscription") of this type (None: of any) is on the topic."""
     trouble = program_trouble(scene)
     if trouble:
         return trouble
     observer = scene.observer
     ends = observer.publishers(topic) if kind == "publisher" else observer.subscriptions(topic)
-    wanted = type_name(msg_type)
+    wanted = type_name(msg_type) if msg_type else ""
     others = sorted({end.topic_type for end in ends if end.topic_type != wanted})
-    if others:
+    if others and wanted:
         return Diagnosis(f"The {kind} on `{topic}` has the type {others[0]}, not {wanted}.", "wrong-type")
     if ends and node:
         owners = sorted({full_name(end.node_namespace, end.node_name) for end in ends})

@@ -9,6 +9,10 @@ _INFINITE = 2**62
 """Nanoseconds from which a duration on the graph means "never": the middleware's own infinity is about 2**63."""
 
 
+POLICIES = frozenset({"reliability", "durability", "deadline", "lifespan", "liveliness", "lease"})
+"""The policies that the graph shows; history and depth are not among them."""
+
+
 def seconds(duration: Duration) -> float | None:
     """A duration in seconds; None for "never", which the middleware writes as zero or as infinity."""
     nanoseconds = duration.nanoseconds
