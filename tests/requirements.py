@@ -135,8 +135,8 @@ def page() -> str:
     lines = [
         "# Requirement, check, mistake",
         "",
-        "Made by `python tests/requirements.py`. Each line: words of the lab's text, the check (and its part) that holds",
-        "them, and the sample student who breaks just that.",
+        "Made by `python tests/requirements.py`. Each line: words of the lab, the check (and its part) that",
+        "holds them, and the sample student who breaks just that.",
         "",
     ]
     for name in labs():
