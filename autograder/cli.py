@@ -46,9 +46,11 @@ def main() -> None:
             refuse_foreign_ros(os.environ)
         app()
     except (KitError, SetUpError) as error:
-        print(f"error: {error.what}", file=sys.stderr)
+        from autograder.report.terminal import plain  # a student may have named the file that it is about
+
+        print(plain(f"error: {error.what}"), file=sys.stderr)
         if error.do:
-            print(f"  {error.do}", file=sys.stderr)
+            print(plain(f"  {error.do}"), file=sys.stderr)
         sys.exit(2)
     except (KeyboardInterrupt, SystemExit) as end:
         if isinstance(end, SystemExit) and end.code != INTERRUPTED:
@@ -96,7 +98,7 @@ def _lab_of(notebook: Path, name: str | None, root: Path) -> Lab:
     if best is None or not ids & best.answers.keys():
         raise KitError(
             f"{notebook.name} is no notebook of a lab of this course.",
-            f"Name the lab: --lab NAME. Labs in {root}: {', '.join(names) or 'none'}.",
+            f"Name the lab: --lab NAME, or another course: --course FOLDER. Labs in {root}: {', '.join(names)}.",
         )
     return best
 
@@ -110,17 +112,23 @@ def check(
     instructor: Annotated[bool, typer.Option("--instructor", help="Show what the hidden checks look at.")] = False,
     isolation: IsolationOption = Isolation.FULL,
     seed: SeedOption = None,
+    course: Annotated[
+        Path | None, typer.Option(help="The folder of the course whose checks are run; default: the kit's own.")
+    ] = None,
 ) -> None:
     """Check one notebook as grading would, and report what is wrong and why."""
     if not notebook.is_file():
         raise KitError(f"There is no notebook {notebook}.", "Name an .ipynb file.")
-    from autograder.course import course_root
+    from autograder.course import trusted_course
     from autograder.grading.stage_a import Settings, run_submission
     from autograder.report.audience import Audience, result_for
     from autograder.results import Status
     from autograder.sandbox.isolation import choose
 
-    found = _lab_of(notebook, lab, course_root(notebook.parent))
+    found = _lab_of(notebook, lab, trusted_course(course))
+    if found.notebook.resolve() == notebook.resolve():
+        note = "This notebook is the course's own copy of the lab: its checks are run as they stand in it."
+        print(f"note: {note}", file=sys.stderr)
     settings = Settings(isolation=choose(isolation), seed=seed)
     result = run_submission(notebook, notebook.parent.resolve().name, found, settings)
     audience: Audience = "instructor" if instructor else "student"
@@ -161,6 +169,11 @@ def grade(
         raise KitError(
             f"There are no submissions at {source}.",
             "Name a folder or zip." if submissions else f"Build the sample class: python tests/sample_class.py {lab}",
+        )
+    if root.is_relative_to(source.resolve()):
+        raise KitError(
+            f"The working folder lies in the submissions, and {root} would be taken for the course.",
+            "Change to the folder of your course, and name the submissions from there.",
         )
     from autograder.grading.class_run import grade_class
     from autograder.sandbox.isolation import choose

@@ -6,18 +6,42 @@ from pathlib import Path
 
 from autograder.errors import KitError
 
+_KIT = Path(__file__).resolve().parent.parent
 
-def course_root(*starts: Path) -> Path:
-    """Return the course that one of these paths lies in; then that of the working folder; then the kit's own.
+
+def course_root() -> Path:
+    """Return the course that the working folder lies in, for who works on a course; then the kit's own.
 
     Raises:
         KitError: there is none.
     """
-    kit = Path(__file__).resolve().parent.parent
-    for start in (*starts, Path.cwd(), kit):
-        for folder in (start.resolve(), *start.resolve().parents):
-            if (folder / "solutions").is_dir() or (folder / "labs").is_dir():
-                return folder
+    for folder in (Path.cwd(), *Path.cwd().parents, _KIT):
+        if _is_course(folder):
+            return folder
     raise KitError(
         "There is no course here: no folder with `solutions` or `labs`.", "Run it inside the course's folder."
+    )
+
+
+def trusted_course(named: Path | None) -> Path:
+    """Return the course whose checks may be run on a notebook: the one that was named, or the kit's own.
+
+    Never what lies beside the notebook, above it, or in the working folder: whoever handed in the notebook may have put
+    it there, and check cells are trusted code.
+
+    Raises:
+        KitError: there is none.
+    """
+    root = _KIT if named is None else named.resolve()
+    if _is_course(root):
+        return root
+    if named is None:
+        raise KitError(f"There is no course in {_KIT}.", "Name the folder of yours: --course FOLDER")
+    raise KitError(f"There is no course in {root}.", "It needs a folder `solutions` (or `labs`) with NAME/NAME.ipynb.")
+
+
+def _is_course(folder: Path) -> bool:
+    """Whether there is a lab in it; many folders called `labs` hold something else."""
+    return any(
+        path.stem == path.parent.name for name in ("solutions", "labs") for path in (folder / name).glob("*/*.ipynb")
     )

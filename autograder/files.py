@@ -1,9 +1,12 @@
-"""Writing files whole or not at all."""
+"""Writing files whole or not at all, and reading those of others without being led elsewhere."""
 
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
+import stat
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 
@@ -23,3 +26,53 @@ def write_beside(path: Path, content: str | bytes) -> None:
             beside.unlink()
         error.filename = str(path)  # a full disk names no file, and nobody knows the one beside it
         raise
+
+
+def read_plain(folder: Path, parts: Sequence[str], most: int) -> bytes:
+    """Read a file that somebody else placed below a folder: never through a link, never from anything but a file.
+
+    Args:
+        folder: where the way begins; how one gets there is the caller's business.
+        parts: the names from there to the file.
+        most: bytes that are read.
+
+    Raises:
+        OSError: it cannot be read, or a part of the way is not what it must be; `strerror` says why, for a person.
+    """
+    passing = os.O_PATH | os.O_DIRECTORY  # a folder may be one that can be entered but not listed
+    here = os.open(folder, passing)
+    try:
+        for number, part in enumerate(parts, start=1):
+            last = number == len(parts)
+            # Looked at first, for opening a device may already do something. O_NOFOLLOW and the second look hold where
+            # the name has come to mean something else since; O_NONBLOCK, since a FIFO would wait for its writer.
+            _refuse_kind(part, os.stat(part, dir_fd=here, follow_symlinks=False).st_mode, last)
+            how = os.O_RDONLY | os.O_NONBLOCK if last else passing
+            there = os.open(part, how | os.O_NOFOLLOW, dir_fd=here)
+            os.close(here)
+            here = there
+            _refuse_kind(part, os.fstat(here).st_mode, last)
+        with os.fdopen(here, "rb", closefd=False) as file:
+            return file.read(most)
+    finally:
+        os.close(here)
+
+
+_KINDS: dict[str, Callable[[int], bool]] = {
+    "a link": stat.S_ISLNK,
+    "a folder": stat.S_ISDIR,
+    "a file": stat.S_ISREG,
+    "a FIFO": stat.S_ISFIFO,
+    "a socket": stat.S_ISSOCK,
+    "a device": lambda mode: stat.S_ISCHR(mode) or stat.S_ISBLK(mode),
+}
+
+
+def _refuse_kind(name: str, mode: int, last: bool) -> None:
+    wanted = stat.S_ISREG if last else stat.S_ISDIR
+    if wanted(mode):
+        return
+    kind = next((word for word, test in _KINDS.items() if test(mode)), "something else")
+    what = "file" if last else "folder"
+    more = "; links are not followed" if stat.S_ISLNK(mode) else ""
+    raise OSError(errno.EINVAL, f"{name[:60]!r} is {kind}, not a {what}{more}")

@@ -7,6 +7,7 @@ import csv
 import json
 import os
 import resource
+import shutil
 import signal
 import subprocess
 import sys
@@ -57,13 +58,13 @@ def hand_in(root: Path, student: str, talker: str) -> Path:
 
 
 def test_check_passes_with_status_0(root: Path) -> None:
-    status, out, _ = run(root, "check", "class/ann/toy.ipynb")
+    status, out, _ = run(root, "check", "--course", ".", "class/ann/toy.ipynb")
     assert status == 0 and "toy: 5 of 5 points" in out
 
 
 def test_check_fails_with_status_1_and_the_reason(root: Path) -> None:
     junit = root / "build" / "junit.xml"
-    status, out, _ = run(root, "check", "class/bob/toy.ipynb", "--json", "--junit", str(junit))
+    status, out, _ = run(root, "check", "--course", ".", "class/bob/toy.ipynb", "--json", "--junit", str(junit))
     assert status == 1
     result = json.loads(out)
     assert [check["points"] for check in result["checks"]] == [0, 2]
@@ -74,13 +75,31 @@ def test_check_fails_with_status_1_and_the_reason(root: Path) -> None:
 def test_check_finds_the_lab_of_a_renamed_notebook(root: Path) -> None:
     renamed = root / "class" / "ann" / "my copy (1).ipynb"
     renamed.write_bytes((root / "class" / "ann" / "toy.ipynb").read_bytes())
-    status, out, _ = run(root, "check", str(renamed))
+    status, out, _ = run(root, "check", "--course", ".", str(renamed))
     renamed.unlink()
     assert status == 0 and "5 of 5" in out
 
 
+def test_what_lies_around_a_notebook_is_never_the_course(root: Path, tmp_path: Path) -> None:
+    evil = toy.make_course(tmp_path / "evil")
+    shutil.copytree(evil / "solutions", evil / "labs", dirs_exist_ok=True)
+    (evil / "toy.ipynb").write_bytes((root / "class" / "ann" / "toy.ipynb").read_bytes())
+    for folder in (evil, evil / "labs"):
+        status, _, err = run(folder, "check", str(evil / "toy.ipynb"))
+        assert status == 2 and "no notebook of a lab of this course" in err and f"Labs in {KIT}: lab" in err
+    status, _, err = run(evil, "grade", "toy", ".")
+    assert status == 2 and "lies in the submissions" in err
+
+
+def test_who_checks_the_courses_own_copy_is_told(root: Path, tmp_path: Path) -> None:
+    course = tmp_path / "course"
+    shutil.copytree(root / "solutions", course / "labs")
+    status, _, err = run(course, "check", "--course", ".", "labs/toy/toy.ipynb", "--isolation", "none")
+    assert "the course's own copy" in err and status in (0, 1)
+
+
 def test_a_broken_notebook_fails_its_checks(root: Path) -> None:
-    status, out, _ = run(root, "check", "class/dan/toy.ipynb")
+    status, out, _ = run(root, "check", "--course", ".", "class/dan/toy.ipynb")
     assert status == 1 and "not valid JSON" in out
 
 
@@ -89,6 +108,8 @@ def test_a_broken_notebook_fails_its_checks(root: Path) -> None:
     [
         ["check", "nowhere.ipynb"],
         ["check", "class/ann/toy.ipynb", "--lab", "nowhere"],
+        ["check", "class/ann/toy.ipynb"],
+        ["check", "class/ann/toy.ipynb", "--course", "class"],
         ["grade", "nowhere", "class"],
         ["grade", "toy", "nowhere"],
         ["grade", "toy"],
@@ -104,7 +125,7 @@ def test_usage_errors_are_sentences_with_status_2(root: Path, arguments: list[st
 
 
 def test_what_the_machine_refuses_is_named_with_a_way_out(root: Path, tmp_path: Path) -> None:
-    status, _, err = run(root, "check", "class/dan/toy.ipynb", "--junit", "/proc/nowhere/j.xml")
+    status, _, err = run(root, "check", "--course", ".", "class/dan/toy.ipynb", "--junit", "/proc/nowhere/j.xml")
     assert status == 2 and "/proc/nowhere/j.xml: No such file" in err and "disk has room" in err
     course = toy.make_course(tmp_path / "course")
     (course / "build").touch()
@@ -197,7 +218,7 @@ def test_an_interrupt_keeps_finished_results_and_leaves_nothing_running(root: Pa
 def test_an_interrupted_check_says_so(root: Path, tmp_path: Path) -> None:
     course = toy.make_course(tmp_path / "course")
     stuck = hand_in(course, "stuck", STUCK)
-    process = start(course, "check", str(stuck), start_new_session=True)
+    process = start(course, "check", "--course", ".", str(stuck), start_new_session=True)
     family = family_with_a_worker(process)
     os.killpg(process.pid, signal.SIGINT)
     _, err = process.communicate(timeout=30)
@@ -226,5 +247,5 @@ def test_release_writes_what_students_receive(root: Path) -> None:
     assert status == 0 and "toy" in out
     text = (root / "labs" / "toy" / "toy.ipynb").read_text()
     assert "YOUR CODE HERE" in text and "secret" not in text and "hello" not in text
-    status, out, _ = run(root, "check", "labs/toy/toy.ipynb")
+    status, out, _ = run(root, "check", "--course", ".", "labs/toy/toy.ipynb")
     assert status == 1 and "3 of 5" in out  # a program of comments ends well

@@ -8,7 +8,9 @@ from pathlib import Path
 import pytest
 import toy
 
-from autograder.grading.stage_a import Settings, run_class
+from autograder.grading import stage_a
+from autograder.grading.job import Job
+from autograder.grading.stage_a import Settings, run_class, run_submission
 from autograder.results import SubmissionResult
 from autograder.submission.lab import load_lab
 
@@ -36,3 +38,22 @@ def test_a_result_of_another_seed_is_not_taken(tmp_path: Path) -> None:
     second = graded(2)
     assert second.seed == 2
     assert graded(None) == second
+
+
+@pytest.mark.parametrize(("gives_a_result", "runs"), [(True, [1, 1]), (False, [2, 4])])
+def test_only_a_worker_without_a_result_is_asked_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, gives_a_result: bool, runs: list[int]
+) -> None:
+    root = toy.make_course(tmp_path / "course")
+    lab = load_lab(root, toy.LAB)
+    notebook = toy.hand_in(tmp_path, "ann", lab.clean_notebook({"talker": "%%node talker\ndie\n"})["cells"])
+    asked: list[Job] = []
+
+    def worker(job: Job) -> SubmissionResult:
+        asked.append(job)
+        return stage_a.believed(job, toy.judge(job)) if gives_a_result else stage_a.unknown(job, "It hung.", "")
+
+    monkeypatch.setattr(stage_a, "run_in_worker", worker)
+    for expected in runs:
+        assert run_submission(notebook, "ann", lab, Settings(), tmp_path / "result.json").needs_instructor
+        assert len(asked) == expected

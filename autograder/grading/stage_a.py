@@ -28,6 +28,8 @@ SECONDS_PER_CHECK = 30.0
 """After this long for each check cell, in seconds, the worker itself is stuck: its own deadlines are shorter."""
 ATTEMPTS = 2
 """A worker that dies is the grader's fault, so it gets a second chance before an instructor is asked."""
+_NO_RESULT = "no-result"
+"""The reason code of a check that the worker said nothing about."""
 
 
 @dataclass(frozen=True)
@@ -91,7 +93,7 @@ def run_submission(
     submission = read_submission(path, lab)
     if keep_in is not None and not settings.force:
         stored = stored_result(keep_in, submission.digest, settings.isolation, settings.seed)
-        if stored is not None and not stored.needs_instructor:
+        if stored is not None and not _to_be_repeated(stored):
             return stored
     result = _run(submission, student, lab, settings)
     result.seconds["total"] = round(time.monotonic() - began, 3)
@@ -106,9 +108,14 @@ def _run(submission: Submission, student: str, lab: Lab, settings: Settings) -> 
         return _all_checks(job, [_refused(submission.problems)] * len(lab.checks), points=0.0)
     for _ in range(ATTEMPTS):
         result = run_in_worker(job)
-        if not result.needs_instructor:
+        if not _to_be_repeated(result):
             break
     return result
+
+
+def _to_be_repeated(result: SubmissionResult) -> bool:
+    """Whether the worker kept back a check's result. What it decided, undecided checks included, stands."""
+    return any(outcome.code == _NO_RESULT for check in result.checks for outcome in check.outcomes)
 
 
 def _job(submission: Submission, student: str, lab: Lab, settings: Settings) -> Job:
@@ -184,7 +191,7 @@ def _undecided(cell: Cell, because: str, stderr: str) -> CheckResult:
         because=because,
         observed="\n".join(stderr.strip().splitlines()[-5:])[-1000:],
         hint="No points are taken. Your instructor decides.",
-        code="no-result",
+        code=_NO_RESULT,
     )
     return CheckResult(
         grade_id=cell.grade_id, title=cell.title, max_points=cell.points or 0.0, points=None, outcomes=[outcome]
@@ -250,7 +257,7 @@ def _stored(path: Path, root: Path, lab: Lab, student: str, settings: Settings) 
     if not keep_in.is_file():
         return None
     stored = stored_result(keep_in, read_submission(path, lab).digest, settings.isolation, settings.seed)
-    return None if stored is None or stored.needs_instructor else stored
+    return None if stored is None or _to_be_repeated(stored) else stored
 
 
 def _run_pool(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import unicodedata
 from collections.abc import Sequence
 
 from rich.console import Console, Group, RenderableType
@@ -14,13 +15,28 @@ from autograder.results import CheckResult, Outcome, Status, SubmissionResult
 
 SYMBOL = {Status.PASSED: "✓", Status.FAILED: "✗", Status.NOT_CHECKED: "-", Status.UNKNOWN: "?"}
 STYLE = {Status.PASSED: "blue", Status.FAILED: "bold red", Status.NOT_CHECKED: "dim", Status.UNKNOWN: "bold magenta"}
-_CONTROL = dict.fromkeys((*range(9), *range(11, 32), *range(127, 160)), "�")
+_JOINERS = "\u200c\u200d"
+"""Invisible, but part of how some scripts and emoji are written."""
 _LOG_LINES = 20
 
 
+class _Shown(dict[int, int | str]):
+    """What stands on the terminal for each character; worked out once for each that occurs."""
+
+    def __missing__(self, code: int) -> int | str:
+        character = chr(code)
+        # Control and format characters (which turn the direction of writing), other ends of lines, half characters.
+        hidden = unicodedata.category(character) in ("Cc", "Cf", "Zl", "Zp", "Cs") and character not in "\n" + _JOINERS
+        self[code] = "�" if hidden else code
+        return self[code]
+
+
+_SHOWN = _Shown()
+
+
 def plain(text: str) -> str:
-    """Take out the control characters: a student's output must not drive the terminal."""
-    return text.replace("\t", "    ").translate(_CONTROL)
+    """Take out what cannot be seen: a student's output must not drive the terminal, nor seem to say something else."""
+    return text.replace("\t", "    ").translate(_SHOWN)
 
 
 def points_text(check: CheckResult) -> str:

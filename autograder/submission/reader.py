@@ -8,13 +8,12 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
-import stat
 from collections import defaultdict
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from autograder.files import read_plain
 from autograder.results import Outcome, Status
 from autograder.submission.lab import Lab, grade_id_of, nbgrader_of, source_of
 from autograder.submission.magics import CELL_BYTES, BadNameError, parse
@@ -66,15 +65,22 @@ def _problem(code: str, title: str, because: str, hint: str = "") -> Outcome:
     return Outcome(status=Status.FAILED, title=title, because=because, hint=hint, code=code)
 
 
+def _way(path: Path) -> tuple[Path, tuple[str, ...]]:
+    """The folder that a path is trusted up to, and the names below it, none of which may be a link.
+
+    A submission is `<student>/<lab>/<lab>.ipynb`. A link in place of any of the three could lead to the solution, or to
+    what another student handed in.
+    """
+    first = max(len(path.parts) - 3, path.parts.index(path.anchor) + 1 if path.anchor else 0)
+    while ".." in path.parts[first:]:
+        first += 1
+    return Path(*path.parts[:first]), path.parts[first:]
+
+
 def _bytes(path: Path) -> bytes:
     title = "the notebook can be read"
     try:
-        # O_NOFOLLOW: a link could point at the instructor's files. O_NONBLOCK: a FIFO would wait for ever.
-        descriptor = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK)
-        with os.fdopen(descriptor, "rb") as file:
-            if not stat.S_ISREG(os.fstat(descriptor).st_mode):
-                raise OSError("it is not a file")
-            content = file.read(NOTEBOOK_BYTES + 1)
+        content = read_plain(*_way(path), NOTEBOOK_BYTES + 1)
     except OSError as error:
         because = f"There is no file {path.name} to read ({error.strerror or error})."
         raise _UnreadableError(_problem("no-notebook", title, because, f"Submit {path.name}.")) from error
