@@ -18,7 +18,7 @@ echo "No Python was found. The kit needs Python 3.11 to 3.14." >&2; \
 echo "What to do: sudo apt-get install python3 python3-venv   or name one: make PYTHON=/path/to/python3.12" >&2; exit 2
 endef
 
-.PHONY: help setup setup-dev doctor grade check test lint jupyter lectures release soak bench lock clean distclean
+.PHONY: help setup setup-dev doctor grade check test lint jupyter lectures release soak mutants bench lock clean distclean
 
 help: ## this list
 	@echo 'make TARGET [LAB=$(LAB)] [PYTHON=python3.12] [ARGS="more options"]'; echo
@@ -61,6 +61,9 @@ lint: setup-dev ## ruff and mypy --strict
 
 soak: setup-dev ## grade every sample student N=20 times, half of them under load: nothing may differ
 	@$(RUN) python tests/soak.py --times $(N) $(if $(filter command line,$(origin LAB)),--lab $(LAB)) $(ARGS)
+
+mutants: setup-dev ## change LAB's solutions by rule, one change at a time, and grade each: what survives lacks a check
+	@$(RUN) python tests/mutants.py $(LAB) $(ARGS)
 
 bench: setup-dev ## measure this grader against stock nbgrader on the same submissions
 	@$(RUN) python tests/bench.py $(ARGS)

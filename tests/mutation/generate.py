@@ -1,0 +1,93 @@
+"""The mutants of a lab, and the checks that each can reach."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from autograder.grading.job import Cell
+from autograder.submission.lab import Answer, Lab, grade_id_of, source_of
+from autograder.submission.magics import parse
+from mutation.python_rules import changes, swaps
+from mutation.source import Mutant, Source
+from mutation.text_rules import text_changes
+
+
+def mutants(lab: Lab) -> list[Mutant]:
+    """Every mutant of a lab's solutions; those with equal words are numbered."""
+    found: list[Mutant] = []
+    counts: dict[str, int] = {}
+    for answer in lab.answers.values():
+        if answer.file is None:
+            continue
+        for rule, changed in _variants(lab, answer):
+            before, after = _difference(answer.solution, changed)
+            mutant = Mutant(answer.grade_id, rule, before, after, changed)
+            counts[mutant.key] = counts.get(mutant.key, 0) + 1
+            if counts[mutant.key] > 1:
+                mutant = Mutant(answer.grade_id, f"{rule} {counts[mutant.key]}", before, after, changed)
+            found.append(mutant)
+    return found
+
+
+def _variants(lab: Lab, answer: Answer) -> Iterator[tuple[str, str]]:
+    magic, _, body = answer.solution.partition("\n")
+    if answer.file is not None and answer.file.magic == "file":
+        for rule, changed in text_changes(body):
+            yield rule, f"{magic}\n{changed}"
+        return
+    lines = {number - 1 for number in _solution_lines(lab, answer)}
+    source = Source(body)
+    for change in (*changes(body, lines), *swaps(body, lines)):
+        yield change.rule, f"{magic}\n{source.with_change(change)}"
+
+
+def _solution_lines(lab: Lab, answer: Answer) -> set[int]:
+    """Numbers of the lines of the solution, as `answer.solution` counts them, that students write themselves."""
+    raw = next(source_of(cell) for cell in lab.raw["cells"] if grade_id_of(cell) == answer.grade_id)
+    if "BEGIN SOLUTION" not in raw:
+        return set(range(1, len(answer.solution.split("\n")) + 1))
+    own, inside, number = set(), False, 0
+    for line in raw.split("\n"):
+        if "BEGIN SOLUTION" in line or "END SOLUTION" in line:
+            inside = "BEGIN" in line
+            continue
+        number += 1
+        if inside:
+            own.add(number)
+    return own
+
+
+def _difference(before: str, after: str) -> tuple[str, str]:
+    """The first line that differs, and what became of it."""
+    old, new = before.split("\n"), after.split("\n")
+    first = next((n for n, (a, b) in enumerate(zip(old, new, strict=False)) if a != b), min(len(old), len(new)) - 1)
+    shorter = len(new) < len(old)
+    then = "(dropped)" if shorter and new[first].strip() != "pass" and new[first:] == old[first + 1 :] else new[first]
+    return old[first].strip(), then.strip()
+
+
+def reached(lab: Lab, answer_id: str) -> list[Cell]:
+    """The cells to run for a changed answer: set-up, and the checks that use its file or one that mentions it."""
+    names = {answer_id}
+    files = {answer.grade_id: answer.file for answer in lab.answers.values() if answer.file is not None}
+    grown = True
+    while grown:
+        grown = False
+        for other in files:
+            text = lab.answers[other].solution
+            if other not in names and any(files[name].name in text.split("\n", 1)[1] for name in names):
+                names.add(other)
+                grown = True
+    words = [word for name in names for word in (f'"{files[name].name}"', f"'{files[name].name}'")]
+    return [cell for cell in lab.cells if cell.points is None or any(word in cell.source for word in words)]
+
+
+def handed_in(lab: Lab, mutant: Mutant) -> dict[str, str]:
+    """The files of a submission that is the solution but for this change."""
+    files = dict(lab.given)
+    for answer in lab.answers.values():
+        if answer.file is not None:
+            file = parse(mutant.source if answer.grade_id == mutant.answer else answer.solution)
+            if file is not None:
+                files[file.file_name] = file.text
+    return files
