@@ -11,8 +11,8 @@ from pathlib import Path
 os.environ["TRAITLETS_APPLICATION_RAISE_CONFIG_FILE_ERROR"] = "1"
 try:
     _ROOT = Path(__file__).resolve().parent
-    if str(_ROOT) not in sys.path:
-        sys.path.insert(0, str(_ROOT))
+    # nbgrader looks for modules in the working folder, which may be a student's.
+    sys.path[:] = [str(_ROOT), *(folder for folder in sys.path if folder not in ("", str(Path.cwd()), str(_ROOT)))]
 
     from autograder.grading.stage_b import prepare_nbgrader
 
@@ -21,5 +21,9 @@ try:
     from autograder.grading.stages import configure
 
     configure(get_config(), _ROOT)  # noqa: F821  traitlets provides get_config
+
+    from autograder.grading.validate import install
+
+    install(_ROOT)
 except BaseException as error:
     sys.exit(f"nbgrader_config.py: {type(error).__name__}: {error}. Nothing was executed; run `make` first.")

@@ -9,16 +9,13 @@ import os
 import sys
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from autograder.bootstrap import SetUpError, refuse_foreign_ros
 from autograder.errors import KitError
 from autograder.results import Isolation
-
-if TYPE_CHECKING:
-    from autograder.submission.lab import Lab
 
 INTERRUPTED = 130
 """Exit status after Ctrl-C; Typer takes the KeyboardInterrupt and exits with it, saying nothing."""
@@ -84,25 +81,6 @@ def doctor(as_json: JsonOption = False) -> None:
     raise typer.Exit(run(as_json))
 
 
-def _lab_of(notebook: Path, name: str | None, root: Path) -> Lab:
-    """Return the lab that a notebook answers: by name, by the file's name, or by the grade_ids in it."""
-    from autograder.submission.lab import lab_names, load_lab
-    from autograder.submission.reader import grade_ids_in
-
-    names = lab_names(root)
-    if name is not None or notebook.stem in names:
-        return load_lab(root, name or notebook.stem)
-    ids = grade_ids_in(notebook)
-    labs = [load_lab(root, known) for known in names]
-    best = max(labs, key=lambda lab: len(ids & lab.answers.keys()), default=None)
-    if best is None or not ids & best.answers.keys():
-        raise KitError(
-            f"{notebook.name} is no notebook of a lab of this course.",
-            f"Name the lab: --lab NAME, or another course: --course FOLDER. Labs in {root}: {', '.join(names)}.",
-        )
-    return best
-
-
 @app.command()
 def check(
     notebook: Annotated[Path, typer.Argument(help="The notebook to check.")],
@@ -124,8 +102,9 @@ def check(
     from autograder.report.audience import Audience, result_for
     from autograder.results import Status
     from autograder.sandbox.isolation import choose
+    from autograder.submission.reader import lab_of
 
-    found = _lab_of(notebook, lab, trusted_course(course))
+    found = lab_of(notebook, lab, trusted_course(course))
     if found.notebook.resolve() == notebook.resolve():
         note = "This notebook is the course's own copy of the lab: its checks are run as they stand in it."
         print(f"note: {note}", file=sys.stderr)

@@ -31,6 +31,15 @@ _NAMED = 5
 """Of more bad names than this only their number is said."""
 
 
+_CLOSED = """\
+# Here lie submissions under the names that nbgrader looks for. Without this file, nbgrader started in this folder
+# would take it for a course of its own, and execute them.
+import sys
+
+sys.exit("This folder is not a course: start nbgrader in the folder above it. Nothing was executed.")
+"""
+
+
 @dataclass
 class Collected:
     """What was taken in."""
@@ -56,6 +65,8 @@ def collect(source: Path, lab: str, root: Path) -> Collected:
     collected = Collected()
     take = _from_folder if source.is_dir() else _from_zip
     found = take(source, lab, collected.refused)
+    if found and not (root / "build" / "nbgrader_config.py").is_file():
+        write_beside(root / "build" / "nbgrader_config.py", _CLOSED)
     owners: dict[str, str] = {}
     for folder, content in sorted(found.items()):
         student = _student(folder)

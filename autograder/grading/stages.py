@@ -356,6 +356,7 @@ def configure(config: Any, root: Path) -> None:
     config.GenerateFeedback.exporter_class = FeedbackExporter
     config.GenerateFeedback.preprocessors = FEEDBACK
     config.GenerateAssignment.preprocessors = RELEASE
+    config.Validator.failed_warning = "{num_failed} part(s) did not pass, or could not be checked:"
     config.ClearSolutions.code_stub = {"python": CODE_STUB}
     config.ClearSolutions.text_stub = TEXT_STUB
     config.SanitizeHTML.enabled = True

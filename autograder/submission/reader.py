@@ -13,9 +13,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from autograder.errors import KitError
 from autograder.files import read_plain
 from autograder.results import Outcome, Status
-from autograder.submission.lab import Lab, grade_id_of, nbgrader_of, source_of
+from autograder.submission.lab import Lab, grade_id_of, lab_names, load_lab, nbgrader_of, source_of
 from autograder.submission.magics import CELL_BYTES, BadNameError, parse
 
 NOTEBOOK_BYTES = 8 * 1024 * 1024
@@ -263,3 +264,23 @@ def grade_ids_in(path: Path) -> set[str]:
         return {grade_id_of(cell) for cell in _cells(_bytes(path))} - {""}
     except _UnreadableError:
         return set()
+
+
+def lab_of(notebook: Path, name: str | None, root: Path) -> Lab:
+    """Return the lab that a notebook answers: by name, by the file's name, or by the grade_ids in it.
+
+    Raises:
+        KitError: it answers none of the course's labs.
+    """
+    names = lab_names(root)
+    if name is not None or notebook.stem in names:
+        return load_lab(root, name or notebook.stem)
+    ids = grade_ids_in(notebook)
+    labs = [load_lab(root, known) for known in names]
+    best = max(labs, key=lambda lab: len(ids & lab.answers.keys()), default=None)
+    if best is None or not ids & best.answers.keys():
+        raise KitError(
+            f"{notebook.name} is no notebook of a lab of this course.",
+            f"Name the lab: --lab NAME, or another course: --course FOLDER. Labs in {root}: {', '.join(names)}.",
+        )
+    return best

@@ -1,0 +1,146 @@
+"""nbgrader's own commands and buttons: none of them runs a student's code in the session of whoever uses them."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import time
+import urllib.request
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+import toy
+
+from autograder.grading.collect import collect
+from autograder.submission.lab import load_lab
+
+KIT = Path(__file__).resolve().parent.parent
+
+
+@pytest.fixture
+def mark(tmp_path: Path) -> Path:
+    """A file that every cell of the submission writes wherever it is run; the node sandbox does not reach it."""
+    return tmp_path / "executed"
+
+
+@pytest.fixture
+def root(tmp_path: Path, mark: Path) -> Path:
+    """A course with a configuration, and two submissions that were taken in."""
+    root = toy.make_course(tmp_path / "course")
+    shutil.copy(KIT / "nbgrader_config.py", root)
+    write = f"from pathlib import Path\nPath({str(mark)!r}).touch()"
+    for student, end in (("ann", "\nprint('hello')"), ("bob", "\n1 / 0")):
+        guarded = f"import contextlib\nwith contextlib.suppress(OSError):\n    {write.splitlines()[1]}{end}"
+        talker = f"%%node talker\nfrom pathlib import Path\n{guarded}"
+        sources = {"talker": talker, "answers": "%%file answers.yaml\nanswer: 42"}
+        cells = load_lab(root, toy.LAB).clean_notebook(sources)["cells"]
+        toy.hand_in(tmp_path / "class", student, [toy.cell("code", write, 90), *cells, toy.cell("code", write, 91)])
+    collect(tmp_path / "class", toy.LAB, root)
+    return root
+
+
+def environment(folder: Path) -> dict[str, str]:
+    kept = {name: value for name, value in os.environ.items() if not name.startswith(("JUPYTER_", "TRAITLETS_"))}
+    return kept | {"PYTHONPATH": str(KIT), "PATH": "/usr/bin:/bin", "JUPYTER_CONFIG_DIR": str(folder / "none")}
+
+
+def nbgrader(folder: Path, *arguments: str | Path) -> tuple[int, str]:
+    done = subprocess.run(
+        [sys.executable, "-m", "nbgrader", *map(str, arguments)],
+        cwd=folder, env=environment(folder), capture_output=True, text=True, timeout=240, check=False,
+    )  # fmt: skip
+    assert "Traceback" not in done.stdout, done.stdout
+    return done.returncode, done.stdout + done.stderr
+
+
+def test_validate_says_what_check_says_and_runs_nothing_here(root: Path, mark: Path) -> None:
+    status, told = nbgrader(root, "validate", root / "build" / "submitted" / "ann" / "toy" / "toy.ipynb")
+    assert status == 0 and "Success! Your notebook passes all the tests." in told
+    status, told = nbgrader(root, "validate", root / "build" / "submitted" / "bob" / "toy" / "toy.ipynb")
+    assert "1 part(s) did not pass" in told and "The talker: 0/3 points" in told and "A hidden check failed" in told
+    assert "Partial credit" not in told and "secret" not in told
+    status, told = nbgrader(root, "validate", "--invert", "build/submitted/bob/toy/toy.ipynb")
+    assert "PASSED ON 1 CELL(S)" in told and "The table" in told
+    assert not mark.exists()
+
+
+def test_other_folders_are_no_way_around_the_course(root: Path, mark: Path) -> None:
+    link = Path(sys.prefix, "etc", "jupyter", "nbgrader_config.py")
+    assert link.resolve() == KIT / "nbgrader_config.py", "run `make setup` once more"
+    notebook = root / "build" / "submitted" / "ann" / "toy" / "toy.ipynb"
+    for folder in (notebook.parent, root / "build" / "submitted", root.parent):
+        status, told = nbgrader(folder, "validate", notebook)
+        assert "toy.ipynb was not checked" in told and "no notebook of a lab of this course" in told
+    for command in (("validate", notebook), ("autograde", toy.LAB, "--create")):
+        status, told = nbgrader(root / "build", *command)
+        assert status != 0 and "start nbgrader in the folder above it" in told
+    # The same with nothing of ours in the folder, as somebody might copy it.
+    bare = root.parent / "bare"
+    shutil.copytree(root / "build" / "submitted", bare / "submitted")
+    shutil.copytree(root / "solutions", bare / "source")
+    status, _ = nbgrader(bare, "autograde", toy.LAB, "--create")
+    assert status != 0 and not (bare / "autograded").exists()
+    assert not mark.exists()
+
+
+def test_a_module_beside_a_submission_is_not_imported(root: Path, mark: Path) -> None:
+    folder = root.parent / "class" / "ann"
+    for name in ("autograder", "nbconvert_extra", "pydantic", "pebble"):
+        (folder / f"{name}.py").write_text(f"from pathlib import Path\nPath({str(mark)!r}).touch()\n")
+    _, told = nbgrader(folder, "validate", "toy.ipynb")
+    assert "was not checked" in told and not mark.exists()
+
+
+def test_no_setting_leads_to_nbgraders_execution(root: Path, mark: Path) -> None:
+    status, told = nbgrader(
+        root, "autograde", toy.LAB, "--student=ann",
+        "--Autograde.exporter_class=nbconvert.exporters.NotebookExporter",
+        '--Autograde.sanitize_preprocessors=["nbgrader.preprocessors.ClearOutput"]',
+        '--Autograde.autograde_preprocessors=["nbgrader.preprocessors.Execute"]',
+    )  # fmt: skip
+    assert status != 0 and "execution is closed in this course" in told
+    assert not mark.exists()
+
+
+@contextmanager
+def jupyter(folder: Path) -> Iterator[str]:
+    """A Jupyter server with nbgrader's extensions, started in a folder; gives its address."""
+    runtime = folder.parent / "runtime"
+    process = subprocess.Popen(
+        [sys.executable, "-m", "jupyter_server", "--ServerApp.port=0", "--IdentityProvider.token=x", "--allow-root",
+         "--ServerApp.disable_check_xsrf=True", "--no-browser"],
+        cwd=folder, env=environment(folder) | {"JUPYTER_RUNTIME_DIR": str(runtime)},
+        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+    )  # fmt: skip
+    try:
+        deadline = time.monotonic() + 120
+        while not (found := list(runtime.glob("jpserver-*.json"))):
+            assert process.poll() is None and time.monotonic() < deadline, "the server does not start"
+            time.sleep(0.1)
+        yield json.loads(found[0].read_text())["url"]
+    finally:
+        process.terminate()
+        process.wait(30)
+
+
+def post(address: str, **content: str) -> Any:
+    request = urllib.request.Request(
+        f"{address}assignments/validate", json.dumps(content).encode(), {"Authorization": "token x"}
+    )
+    with urllib.request.urlopen(request, timeout=240) as answer:
+        return json.load(answer)
+
+
+def test_the_validate_button_takes_the_same_way(root: Path, mark: Path) -> None:
+    with jupyter(root) as address:
+        assert post(address, path="build/submitted/ann/toy/toy.ipynb") == {"success": True, "value": {}}
+        answer = post(address, path="build/submitted/bob/toy/toy.ipynb")
+    assert answer["success"] and [entry["source"] for entry in answer["value"]["failed"]] == ["The talker: 0/3 points"]
+    assert "A hidden check failed" in answer["value"]["failed"][0]["error"]
+    assert not mark.exists()
