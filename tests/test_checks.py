@@ -480,3 +480,38 @@ def test_the_fields_that_a_check_looked_at_stand_first_in_what_was_observed(grad
         talker__py=program,
     )
     assert "`header.frame_id='', range=2.5, " in failure(result).because
+
+
+LAUNCHED = """\
+launch:
+- arg: {name: "side"%s}
+- node: {pkg: "lab", exec: "robot", name: "$(var side)_robot", args: "word"}
+"""
+
+
+def test_a_launch_file_starts_the_course_s_program_in_place_of_a_student_s(grade: Grade) -> None:
+    check = """\
+        from autograder.checks import launch_file
+        course = Node("talker", arguments_of_its_own=("first",))
+        with launch_file("a.launch.yaml", {"side": "left"}, package="lab", programs={"robot": course}) as ros:
+            ros.expect_node("/left_robot")
+            ros.require(ros.nodes[0].arguments()[:2] == ["first", "word"], "Both have their words")
+        ros.score(2)
+        """
+    result = grade(check, talker__py=TALKER, robot__py="raise ValueError(1)\n", a__launch__yaml=LAUNCHED % "")
+    assert result.points == 2.0, result
+
+
+@pytest.mark.parametrize(
+    ("default", "points", "code"), [("", 2.0, ""), (', default: "left"', 0.0, "argument-not-needed")]
+)
+def test_an_argument_without_a_default_is_needed(grade: Grade, default: str, points: float, code: str) -> None:
+    check = """\
+        from autograder.checks import launch_file
+        with launch_file("a.launch.yaml", package="lab") as ros:
+            ros.expect_argument_needed("side")
+        ros.score(2)
+        """
+    result = grade(check, robot__py=TALKER, a__launch__yaml=LAUNCHED % default)
+    assert result.points == points
+    assert (result.first_failure.code if result.first_failure else "") == code

@@ -204,6 +204,40 @@ def test_a_name_may_lack_its_slash_but_underscores_and_slashes_count() -> None:
     assert not same("/rear/image", "/rear_image") and not same("none", "/none/x")
 
 
+NAMES = f"""\
+from autograder.checks import NAME_OR_NONE, answers
+with answers("table.yaml") as table:
+    table.expect_filled({{"images": NAME_OR_NONE, "digit": NAME_OR_NONE}})
+    table.expect_sealed({{"images": "{seal("images", "/rear/image")}", "digit": "{seal("digit", "none")}"}})
+table.score(2)
+"""
+
+
+@pytest.mark.parametrize(
+    ("images", "digit", "code", "because"),
+    [
+        ("/rear/image", "none", "", ""),
+        ("rear/image/", "None", "", ""),
+        ("'`/rear/image`'", "'None.'", "", ""),
+        ("/front/image", "none", "wrong-answer", "is not what happens"),
+        ("the program ends", "none", "answer-form", "a full name, such as `/front/points` or none"),
+        ("/rear/image", "error", "answer-form", "neither a full name, which begins with `/`, nor `none`"),
+        ("/rear/image", "[none]", "answer-form", "a full name"),
+    ],
+)
+def test_a_name_or_none_is_read_as_it_is_meant(
+    grade: Grade,  # noqa: F811
+    images: str,
+    digit: str,
+    code: str,
+    because: str,
+) -> None:
+    result = grade(NAMES, table__yaml=f"images: {images}\ndigit: {digit}\n")
+    first = result.first_failure
+    assert result.points == (1.0 if code else 2.0)
+    assert (first.code if first else "") == code and because in (first.because if first else "")
+
+
 @given(st.recursive(st.text() | st.integers() | st.booleans() | st.floats() | st.none(), st.lists, max_leaves=5))
 def test_any_answer_can_be_read_and_compared(answer: Any) -> None:
     assert plain(plain(answer)) == plain(answer) or answer != answer or isinstance(answer, (str, list, float))

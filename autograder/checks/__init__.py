@@ -3,6 +3,7 @@
 from autograder.checks import vary
 from autograder.checks.answers import answers
 from autograder.checks.command_line import command_line
+from autograder.checks.forms import NAME_OR_NONE
 from autograder.checks.launch import Node, launch, launch_file
 
-__all__ = ["Node", "answers", "command_line", "launch", "launch_file", "vary"]
+__all__ = ["NAME_OR_NONE", "Node", "answers", "command_line", "launch", "launch_file", "vary"]

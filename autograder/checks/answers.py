@@ -10,7 +10,7 @@ from typing import Any
 
 from autograder import student_yaml
 from autograder.checks import outcomes, session
-from autograder.checks.forms import allowed, one_of, same, seal
+from autograder.checks.forms import NAME_OR_NONE, allowed, begins_with_slash, one_of, same, seal
 from autograder.checks.parts import part
 from autograder.checks.scoring import score
 from autograder.checks.session import Score
@@ -107,6 +107,9 @@ class Answers:
         if right:
             outcomes.passed(title, observed=_spelt(answer))
             return
+        if self._forms.get(question) is NAME_OR_NONE and not begins_with_slash(answer) and not same(answer, "none"):
+            because = f"`{_spelt(answer)}` is neither a full name, which begins with `/`, nor `none`."
+            outcomes.failed(title, observed=_spelt(answer), because=because, code="answer-form")
         outcomes.failed(
             title,
             observed=_spelt(answer),

@@ -80,6 +80,17 @@ class ProgramExpectations(GraphExpectations):
             hint=hint,
         )
 
+    def expect_argument_needed(self, name: str, *, hint: str = "") -> None:
+        """The launch file cannot be run, because its launch argument `name` has no default and was not given."""
+        title = f"Without `{name}` the launch file is refused"
+        told = self._trouble[0].because if self._trouble else ""
+        if f"the launch argument `{name}` has no value" in told:
+            outcomes.passed(title)
+            return
+        started = f"It starts {len(self.nodes)} program{'' if len(self.nodes) == 1 else 's'} without it."
+        reason = self._trouble[0] if self._trouble else Diagnosis(started, "argument-not-needed")
+        self.fail(title, reason, expected=f"the launch argument `{name}` is wanted", hint=hint)
+
     def expect_log(
         self,
         text: str,

@@ -11,13 +11,16 @@ from rcl_interfaces.srv import GetParameters
 from autograder.checks import outcomes, session
 from autograder.checks.base import WITHIN
 from autograder.checks.expect_graph import GraphExpectations
-from autograder.graph import diagnosis, parameters, params_file
+from autograder.graph import diagnosis, parameters, params_file, remap_rules
 from autograder.graph.diagnosis import Diagnosis
 from autograder.graph.names import type_name
 from autograder.graph.services import Answer, OfferedService, ServiceMissing, call_all
 
 if TYPE_CHECKING:
     from autograder.graph.actions import Goal
+
+_NO_RESULT = "Callback returned an invalid type"
+"""What rclpy says in place of a reason."""
 
 ANSWER_WITHIN = 5.0
 """Seconds that an answer may take: a local round trip takes 1 to 4 ms, a stuck node takes for ever."""
@@ -144,12 +147,22 @@ class ServiceExpectations(GraphExpectations):
             title,
             lambda: (
                 self._file_for_others(node)
+                or self._given_as_a_rule(name)
                 or Diagnosis(f"It is {have[name]!r} ({type(have[name]).__name__}).", "parameter-value")
             ),
             expected=repr(value),
             observed=repr(have[name]),
             hint=hint,
         )
+
+    def _given_as_a_rule(self, name: str) -> Diagnosis | None:
+        """Whether the parameter was given with `-r`, as if it were a name to be changed."""
+        for text in self.scene().rules:
+            rule = remap_rules.parse(text)
+            if rule and rule.left == name:
+                because = f"`{text}` is given as a remap rule, and rules reach topics and services, no parameters."
+                return Diagnosis(because, "parameter-as-rule", f"Give it as a parameter: `-p {text}`.")
+        return None
 
     def _file_for_others(self, node: str) -> Diagnosis | None:
         """Whether the parameter files of the launch have nothing for this node."""
@@ -179,6 +192,8 @@ class ServiceExpectations(GraphExpectations):
             reason = "It was accepted."
         elif not reply.reason:
             reason = "It was refused without a reason."
+        elif reply.reason == _NO_RESULT:
+            reason = "rclpy refused it, because the callback returned no SetParametersResult: that is no reason."
         elif self.get_parameters(node, [name], within=within) != before:
             reason = "It was refused, yet the value has changed."
         self.expect_that(

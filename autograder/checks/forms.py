@@ -11,6 +11,11 @@ import re
 from collections.abc import Sequence
 from typing import Any
 
+NAME_OR_NONE = ("a full name, such as `/front/points`", "none")
+"""The form of an answer that is the full name of a node, topic or service, or `none`."""
+
+_AROUND = " \t'\"`."
+_NAME = re.compile(r"/?[A-Za-z_]\w*(/\w+)*/?")
 _YES, _NO = ("yes", "true", "on", "y"), ("no", "false", "off", "n")
 
 
@@ -49,10 +54,17 @@ def same(answer: Any, right: Any) -> bool:
 
 def allowed(answer: Any, form: Sequence[Any]) -> bool:
     """Whether an answer has one of the allowed values."""
+    if form is NAME_OR_NONE:
+        return bool(_NAME.fullmatch(str(answer).strip(_AROUND)))
     if isinstance(form, range):
         number = plain(answer)
         return isinstance(number, int) and not isinstance(number, bool) and number in form
     return any(same(answer, value) for value in form)
+
+
+def begins_with_slash(answer: Any) -> bool:
+    """Whether an answer is written as a full name."""
+    return str(answer).strip(_AROUND).startswith("/")
 
 
 def one_of(form: Sequence[Any]) -> str:

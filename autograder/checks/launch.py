@@ -100,10 +100,12 @@ class Launch(MessageExpectations, ServiceExpectations, LifecycleExpectations, Pr
         serve: Iterable[tuple[Any, ...]],
         lifecycle: Iterable[str],
         file: tuple[str, Mapping[str, str], str] | None = None,
+        programs: Mapping[str, Node] | None = None,
     ) -> None:
         """Use `launch` or `launch_file`."""
         self.nodes = list(nodes)
         self._file = file
+        self._stand_ins = dict(programs or {})
         self._listen, self._serve, self._lifecycle = list(listen), list(serve), list(lifecycle)
         self.programs: list[tuple[Node, Program]] = []
         self._missing: list[str] = []
@@ -150,7 +152,16 @@ class Launch(MessageExpectations, ServiceExpectations, LifecycleExpectations, Pr
         self.nodes = [
             Node(one.program, ros_arguments=one.ros_arguments(), arguments_of_its_own=one.arguments) for one in found
         ]
+        self.nodes = [self._stand_in(node) for node in self.nodes]
         return self.nodes
+
+    def _stand_in(self, node: Node) -> Node:
+        """The course's own program in place of the student's, if the check has one, started with the same words."""
+        course = self._stand_ins.get(node.program)
+        if course is None:
+            return node
+        own = [*course.arguments_of_its_own, *node.arguments_of_its_own]
+        return replace(node, program=course.program, arguments_of_its_own=own)
 
     def start(self, node: Node | str) -> None:
         """Start one more program.
@@ -262,6 +273,7 @@ def launch_file(
     arguments: Mapping[str, str] | None = None,
     *,
     package: str,
+    programs: Mapping[str, Node] | None = None,
     listen: Iterable[tuple[str, type]] = (),
     lifecycle: Iterable[str] = (),
 ) -> Launch:
@@ -271,7 +283,8 @@ def launch_file(
         file: a launch file in ROS 2's YAML schema, such as `vehicle.launch.yaml`.
         arguments: launch arguments, as `name:=value` after `ros2 launch PACKAGE FILE`.
         package: the name of the package that the student's programs are said to be in.
+        programs: the course's own program to start where the file says `exec: NAME`, by that name.
         listen: (topic, message class) to record from before the start.
         lifecycle: full names of lifecycle nodes whose transition events are recorded from before the start.
     """
-    return Launch([], listen, (), lifecycle, (file, dict(arguments or {}), package))
+    return Launch([], listen, (), lifecycle, (file, dict(arguments or {}), package), programs)

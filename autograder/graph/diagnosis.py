@@ -286,13 +286,18 @@ def _callback_failure(program: RunningProgram) -> Diagnosis | None:
 
 
 def failed_in_a_callback(scene: Scene) -> RunningProgram | None:
-    """A program with an error in a callback, which ends it; only lifecycle nodes outlive theirs.
+    """A program with an error in a callback, which ends it; a lifecycle node outlives its own.
+
+    A node outlives a parameter callback that returns nothing, too: the value is refused, and rclpy warns.
 
     When it ends is luck: a multi-threaded executor of rclpy 7.1 looks for errors only at its next event.
     """
     for program in scene.programs:
         for event in program.events():
-            if event.get("e") in ("bad_return", "callback_error") and event.get("kind") != "lifecycle":
+            kind = event.get("kind")
+            if (event.get("e") == "bad_return" and kind not in ("lifecycle", "parameter")) or (
+                event.get("e") == "callback_error" and kind != "lifecycle"
+            ):
                 return program
     return None
 
