@@ -95,12 +95,15 @@ class PlainPrograms:
         self.programs.append(PlainProgram(program, args, env or {}))
         return self.programs[-1]
 
-    def end_all(self):
+    def group(self):
+        return self
+
+    def end(self):
         for program in self.programs:
             program.stop()
         self.programs.clear()
 
-    close = end_all
+    close = end
 
 
 session.current._sandbox = PlainPrograms()

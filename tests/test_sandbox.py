@@ -48,8 +48,9 @@ for name, source in attacks.items():
     (folder / (name + ".py")).write_text(source)
 with NodeSandbox(folder, Isolation.FULL) as sandbox:
     for name in attacks:
+        group = sandbox.group()
         began = time.monotonic()
-        program = sandbox.start(name, env={"ROS_DOMAIN_ID": "7", "HOST_PORT": "HOSTPORT"})
+        program = group.start(name, env={"ROS_DOMAIN_ID": "7", "HOST_PORT": "HOSTPORT"})
         if name in ("ignores_term", "stops_launcher"):
             while not program.output() and program.running():
                 time.sleep(0.01)
@@ -57,14 +58,16 @@ with NodeSandbox(folder, Isolation.FULL) as sandbox:
         else:
             program.wait(20)
         at_end = time.monotonic() - began
-        sandbox.end_all()
+        group.end()
         left = [pid for pid in descendants(os.getpid())]
-        after = sandbox.start("honest")
+        group = sandbox.group()
+        after = group.start("honest")
         after.wait(20)
         report[name] = {
             "status": program.exit_status(), "stopped_by": program.stopped_by(), "output": program.output()[-4000:],
             "seconds": round(at_end, 2), "left": len(left), "after": after.output(), "events": len(program.events()),
         }
+        group.end()
 print("REPORT" + json.dumps(report), flush=True)
 """
 
@@ -199,7 +202,7 @@ def test_when_the_parent_is_killed_nothing_remains(kind: Isolation, processes: i
         "from pathlib import Path\nfrom autograder.results import Isolation\n"
         "from autograder.sandbox.nodes import NodeSandbox\n"
         "import tempfile; p = Path(tempfile.mkdtemp()); (p / 'sleeper.py').write_text('import time; time.sleep(600)')\n"
-        f"s = NodeSandbox(p, Isolation.{kind.name}); s.start('sleeper'); s.start('sleeper').wait(600)\n"
+        f"s = NodeSandbox(p, Isolation.{kind.name}); g = s.group(); g.start('sleeper'); g.start('sleeper').wait(600)\n"
     )
     outer = (
         "from autograder.results import Isolation\nfrom autograder.sandbox.outer import run_in_sandbox\n"
@@ -259,7 +262,7 @@ def test_a_program_runs_as_python_runs_a_file(local: NodeSandbox) -> None:
         "def fail():\n    raise ValueError('no')\n"
         "fail()\n"
     )
-    program = local.start("shown", ["--ros-args", "-r", "a:=b"], {"ROS_DOMAIN_ID": "9"}, cores=2)
+    program = local.group().start("shown", ["--ros-args", "-r", "a:=b"], {"ROS_DOMAIN_ID": "9"}, cores=2)
     assert program.wait(10)
     assert program.exit_status() == 1
     said = program.output()
@@ -283,7 +286,7 @@ def test_a_program_runs_as_python_runs_a_file(local: NodeSandbox) -> None:
 def test_a_program_ends_as_python_does(tmp_path: Path, source: str, status: int, said: str) -> None:
     (tmp_path / "it.py").write_text(source)
     with NodeSandbox(tmp_path, Isolation.NONE) as sandbox:
-        program = sandbox.start("it")
+        program = sandbox.group().start("it")
         assert program.wait(10)
         assert program.exit_status() == status
         assert said in program.output()
@@ -291,14 +294,14 @@ def test_a_program_ends_as_python_does(tmp_path: Path, source: str, status: int,
 
 
 def test_a_program_starts_no_process_in_a_notebook_either(local: NodeSandbox) -> None:
-    program = local.start("fork_bomb")
+    program = local.group().start("fork_bomb")
     assert program.wait(20)
     assert program.output() == "processes 0\n"
 
 
 def test_stacks_name_the_waiting_line(local: NodeSandbox) -> None:
     (local.folder / "stuck.py").write_text("import threading\nprint('here')\nthreading.Event().wait()\n")
-    program = local.start("stuck")
+    program = local.group().start("stuck")
     _wait_for(program.output, 10)
     assert 'stuck.py", line 3' in program.stacks()
     assert program.running()
@@ -307,7 +310,7 @@ def test_stacks_name_the_waiting_line(local: NodeSandbox) -> None:
 def test_output_keeps_its_beginning_and_its_end(tmp_path: Path) -> None:
     (tmp_path / "talks.py").write_text("print('first'); print('x' * 100000); print('last')")
     with NodeSandbox(tmp_path, Isolation.NONE, limits=Limits(output_kept=2000)) as sandbox:
-        program = sandbox.start("talks")
+        program = sandbox.group().start("talks")
         assert program.wait(10)
         assert program.truncated()
         assert program.output().startswith("first") and program.output().endswith("last\n")
@@ -317,7 +320,7 @@ def test_output_keeps_its_beginning_and_its_end(tmp_path: Path) -> None:
 def test_a_program_that_takes_too_long_is_ended(tmp_path: Path) -> None:
     (tmp_path / "sleeps.py").write_text("import time; time.sleep(60)")
     with NodeSandbox(tmp_path, Isolation.NONE, limits=Limits(wall_seconds=0.5)) as sandbox:
-        program = sandbox.start("sleeps")
+        program = sandbox.group().start("sleeps")
         assert program.wait(10)
         assert program.stopped_by() == "time limit"
 
@@ -337,7 +340,7 @@ def test_reduced_isolation_hides_files_and_processes(tmp_path: Path) -> None:
         "    try:\n        act(); print('ALLOWED')\n    except PermissionError:\n        print('refused')\n"
     )
     with NodeSandbox(folder, Isolation.REDUCED) as sandbox:
-        program = sandbox.start("peeks")
+        program = sandbox.group().start("peeks")
         assert program.wait(10)
         assert program.output() == "refused\n" * 6
 
@@ -361,7 +364,7 @@ def test_a_sandbox_can_be_used_from_threads_that_end(tmp_path: Path) -> None:
     thread.start()
     thread.join()
     with made[0] as sandbox:
-        program = sandbox.start("honest")
+        program = sandbox.group().start("honest")
         assert program.wait(10)
         assert program.output() == "fine\n"
 
@@ -369,8 +372,9 @@ def test_a_sandbox_can_be_used_from_threads_that_end(tmp_path: Path) -> None:
 def test_closing_leaves_nothing_on_the_disk(tmp_path: Path) -> None:
     (tmp_path / "honest.py").write_text(ATTACKS["honest"])
     sandbox = NodeSandbox(tmp_path, Isolation.NONE)
-    sandbox.start("honest").wait(10)
-    scratch = sandbox._scratch
+    sandbox.group().start("honest").wait(10)
+    assert sandbox._scratch is not None
+    scratch = sandbox._scratch.folder
     sandbox.close()
     sandbox.close()
     assert not scratch.exists()

@@ -30,7 +30,7 @@ from autograder.graph.observer import Observer
 from autograder.launch_files import LaunchFileError, read_launch_file
 from autograder.results import NodeLog
 from autograder.sandbox.environment import profile_environment
-from autograder.sandbox.nodes import Program
+from autograder.sandbox.nodes import Program, ProgramGroup
 
 
 @dataclass(frozen=True)
@@ -110,6 +110,7 @@ class Launch(MessageExpectations, ServiceExpectations, LifecycleExpectations, Pr
         self.programs: list[tuple[Node, Program]] = []
         self._missing: list[str] = []
         self._trouble: list[Diagnosis] = []
+        self._group: ProgramGroup | None = None
 
     def __enter__(self) -> Launch:
         self.domain_id = session.current.next_domain()
@@ -119,6 +120,7 @@ class Launch(MessageExpectations, ServiceExpectations, LifecycleExpectations, Pr
         self.observer = Observer(self.domain_id)
         self.prepare()
         try:
+            self._group = session.current.sandbox.group()
             for topic, msg_type in self._listen:
                 self.observer.record(topic, msg_type)
             for offer in self._serve:
@@ -179,7 +181,8 @@ class Launch(MessageExpectations, ServiceExpectations, LifecycleExpectations, Pr
         except CommandLineError as error:
             self._trouble.append(Diagnosis(error.because, error.code, error.hint))
             return
-        program = session.current.sandbox.start(launched.program, words, environment, cores=launched.cores)
+        assert self._group is not None  # begun on entering
+        program = self._group.start(launched.program, words, environment, cores=launched.cores)
         self.programs.append((launched, program))
 
     def __exit__(
@@ -201,7 +204,8 @@ class Launch(MessageExpectations, ServiceExpectations, LifecycleExpectations, Pr
 
     def _end(self) -> None:
         try:
-            session.current.sandbox.end_all()
+            if self._group is not None:
+                self._group.end()
         finally:
             self.observer.close()
         for launched, program in self.programs:

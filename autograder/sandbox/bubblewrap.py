@@ -84,8 +84,12 @@ def outer_options(variables: Mapping[str, str]) -> list[str]:
     ]  # fmt: skip
 
 
-def inner_options(folder: Path, limits: Limits, variables: Mapping[str, str], seccomp: int) -> list[str]:
-    """The node sandbox: Python, ROS and the student's own folder; the network of whoever starts it."""
+def inner_options(folder: Path, limits: Limits, variables: Mapping[str, str]) -> list[str]:
+    """The node sandbox: Python, ROS and the student's own folder; the network of whoever starts it.
+
+    The launcher is its first process, and keeps what it needs to give each launch a process list and a /tmp of its own;
+    the launch itself gives that up, and takes the filter of system calls, before anything of a student's starts.
+    """
     size = str(limits.disk)
     kit = [
         part
@@ -93,12 +97,13 @@ def inner_options(folder: Path, limits: Limits, variables: Mapping[str, str], se
         for part in ("--ro-bind", str(HERE / name), f"{KIT_FOLDER}/{name}")
     ]
     return [
-        *_NAMESPACES, "--disable-userns", *_LIFE,
+        *_NAMESPACES, "--cap-add", "CAP_SYS_ADMIN", "--cap-add", "CAP_SETPCAP", "--disable-userns",
+        "--as-pid-1", *_LIFE,
         "--size", size, "--perms", "1777", "--tmpfs", "/tmp",
         *system_options(), *_read_only(python_folders()), *kit, "--ro-bind", str(folder), STUDENT_FOLDER,
         "--proc", "/proc", "--dev", "/dev", "--size", size, "--perms", "1777", "--tmpfs", "/dev/shm",
         "--remount-ro", "/dev", "--remount-ro", "/", "--chdir", STUDENT_FOLDER,
-        "--seccomp", str(seccomp), *_environment(variables),
+        *_environment(variables),
     ]  # fmt: skip
 
 
@@ -153,6 +158,7 @@ def rlimits(limits: Limits) -> dict[str, int]:
         "RLIMIT_NOFILE": limits.open_files,
         "RLIMIT_FSIZE": limits.file_size,
         "RLIMIT_CPU": limits.cpu_seconds,
+        "RLIMIT_SIGPENDING": limits.signals,
         "RLIMIT_CORE": 0,
         "RLIMIT_MSGQUEUE": 0,
         "RLIMIT_MEMLOCK": 64 * 1024,

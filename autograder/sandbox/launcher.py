@@ -1,15 +1,23 @@
 """Starts a student's programs by forking itself, with Python, rclpy and the usual messages already loaded.
 
-It runs beside the programs, inside their sandbox, and is trusted no more than they are. It stands alone: apart from
-`probe.py` in its folder it imports nothing of the kit.
+Three kinds of process come of this file, each a fork of the one before:
 
-Usage: launcher.py FD. FD is one end of a SOCK_SEQPACKET pair. Requests are JSON:
-    {"do": "start", "id", "path", "args", "env", "cpus", "cores", "limits", "filter"}
-        with descriptors (output, events, stacks)
-    {"do": "end_all", "everyone": true where the process list is the sandbox's own}
-Answers: {"ready": pid}, {"started": id, "pid"} with a pidfd, {"failed": id, "why"}, {"ended": id, "status"},
-    {"all_ended": true}.
-At the end of the socket everything ends.
+- the launcher, which loads everything once and starts nothing of a student's;
+- for each launch a *first process*, with a process list, a /tmp and a /dev/shm of its own where the kernel gives them
+  (`"namespaces"`), without privileges, and with the limits of a launch. When it ends, all its programs have ended;
+- the programs. They can neither see the launcher nor read, write, stop or end the first process.
+
+It stands alone: apart from `probe.py` in its folder it imports nothing of the kit.
+
+Usage: launcher.py FD [SCRATCH]. FD is one end of a SOCK_SEQPACKET pair. Requests to the launcher are JSON, each with
+one end of a further such pair, on which the first process of the new launch then answers:
+    {"namespaces", "disk", "inodes", "limits", "filter", "program_filter"}
+Requests to a first process:
+    {"id", "path", "args", "env", "cpus", "cores"} with descriptors (output, events, stacks)
+Its answers: {"first": true} with its pidfd, {"ready": true} or {"broken": why}, {"started": id} with a pidfd,
+    {"failed": id, "why"}, {"ended": id, "status"}.
+At the end of its socket each of them ends, and takes what is below it along. The launcher
+removes the folder SCRATCH, unless the process that started it still lives.
 """
 
 import contextlib
@@ -23,8 +31,10 @@ import linecache
 import os
 import resource
 import select
+import shutil
 import signal
 import socket
+import struct
 import sys
 import traceback
 import types
@@ -32,6 +42,9 @@ from typing import Any
 
 STACK_SIGNAL = signal.SIGRTMIN + 10
 PR_SET_PDEATHSIG, PR_SET_DUMPABLE, PR_SET_SECCOMP, PR_SET_CHILD_SUBREAPER, PR_SET_NO_NEW_PRIVS = 1, 4, 22, 36, 38
+PR_CAPBSET_DROP, PR_CAP_AMBIENT, PR_CAP_AMBIENT_CLEAR_ALL = 24, 47, 4
+CLONE_NEWNS, CLONE_NEWPID = 0x20000, 0x20000000
+MS_NOSUID, MS_NODEV, MS_NOEXEC, MS_REC, MS_PRIVATE = 2, 4, 8, 0x4000, 1 << 18
 EVENTS_FD, STACKS_FD = 3, 4
 
 WARM = (
@@ -53,8 +66,9 @@ WARM = (
 )
 WARM_TYPES = ("std_msgs.msg:String", "std_msgs.msg:Int32", "std_srvs.srv:Trigger", "std_srvs.srv:SetBool")
 
-_libc = ctypes.CDLL(None)
+_libc = ctypes.CDLL(None, use_errno=True)
 _prctl = _libc.prctl
+_PARENT = os.getppid()
 
 
 def _load_probe() -> Any:
@@ -73,16 +87,16 @@ probe = _load_probe()
 class Start:
     """A request to start one program, and the descriptors that came with it."""
 
-    def __init__(self, request: dict[str, Any], descriptors: list[int]) -> None:
-        """Keep what the request says."""
+    def __init__(self, request: dict[str, Any], descriptors: list[int], launch: dict[str, Any]) -> None:
+        """Keep what the request says, and what holds for the whole launch."""
         self.id: int = request["id"]
         self.path: str = request["path"]
         self.args: list[str] = request["args"]
         self.env: dict[str, str] = request["env"]
         self.cpus: list[int] = request["cpus"]
         self.cores: int = request["cores"]
-        self.limits: dict[str, int] = request["limits"]
-        self.filter = bytes.fromhex(request["filter"])
+        self.limits: dict[str, int] = launch["limits"]
+        self.filter = bytes.fromhex(launch["program_filter"])
         self.output, self.events, self.stacks = descriptors
 
 
@@ -108,16 +122,94 @@ def warm_up() -> None:
     gc.freeze()  # the collector would write to every object, and so unshare every page
 
 
-def serve(channel: socket.socket) -> Start:
-    """Answer requests until the end. Returns only in a forked child, with the program it is to run."""
+def launch(channel: socket.socket, scratch: str) -> tuple[socket.socket, dict[str, Any]]:
+    """Start the first process of each launch that is asked for. Returns only in such a process."""
+    signal.signal(signal.SIGCHLD, signal.SIG_IGN)  # nobody asks how a first process ended
+    while True:
+        packet, passed, _, _ = socket.recv_fds(channel, 1 << 20, 1)
+        if not packet:
+            end_everything(scratch)
+        request = json.loads(packet)
+        between = os.fork()
+        if between == 0:
+            channel.close()
+            answers = socket.socket(fileno=passed[0])
+            _fork_first(answers, request)
+            return answers, request
+        os.close(passed[0])
+        with contextlib.suppress(ChildProcessError):
+            os.waitpid(between, 0)
+
+
+def _fork_first(answers: socket.socket, request: dict[str, Any]) -> None:
+    """Become the first process of a launch: by one more fork, since a process never changes its own PID namespace."""
+    try:
+        if request["namespaces"]:
+            _checked(_libc.unshare(CLONE_NEWPID | CLONE_NEWNS))
+        first = os.fork()
+    except OSError as error:
+        _send(answers, {"broken": str(error)})
+        os._exit(1)
+    if first != 0:
+        handle = os.pidfd_open(first)
+        with contextlib.suppress(OSError):
+            socket.send_fds(answers, [b'{"first": true}'], [handle])
+        os._exit(0)
+    try:
+        _prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
+        if request["namespaces"]:
+            _fresh_places(request["disk"], request["inodes"])
+            _give_up_privileges()
+        for name, value in request["limits"].items():
+            if name != "RLIMIT_CPU":
+                _limit(getattr(resource, name), value)
+        if request["filter"]:
+            _filter_calls(bytes.fromhex(request["filter"]))
+    except OSError as error:
+        _send(answers, {"broken": str(error)})
+        os._exit(1)
+
+
+def _fresh_places(disk: int, inodes: int) -> None:
+    """An empty /tmp and /dev/shm of limited size and number of files, and a /proc that shows this launch alone."""
+    _checked(_libc.mount(None, b"/", None, MS_REC | MS_PRIVATE, None))
+    options = f"size={disk},nr_inodes={inodes},mode=1777".encode()
+    for place in (b"/tmp", b"/dev/shm"):
+        _checked(_libc.mount(b"tmpfs", place, b"tmpfs", MS_NOSUID | MS_NODEV, options))
+    _checked(_libc.mount(b"proc", b"/proc", b"proc", MS_NOSUID | MS_NODEV | MS_NOEXEC, None))
+
+
+def _give_up_privileges() -> None:
+    """Give up every capability, in this process and in all that it ever starts, and make sure of it."""
+    number = 0
+    while _prctl(PR_CAPBSET_DROP, number, 0, 0, 0) == 0:
+        number += 1  # fails after the last that the kernel knows
+    _checked(_prctl(PR_CAP_AMBIENT, PR_CAP_AMBIENT_CLEAR_ALL, 0, 0, 0))
+    header = struct.pack("II", 0x20080522, 0)  # capset(2), version 3
+    _checked(_libc.capset(header, bytes(24)))
+    _checked(_prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0))
+    with open("/proc/self/status") as status:
+        left = [line for line in status if line.startswith("Cap") and int(line.split()[1], 16) != 0]
+    if left:
+        raise OSError(f"privileges are left: {' '.join(left)}")
+
+
+def _checked(result: int) -> None:
+    if result != 0:
+        raise OSError(ctypes.get_errno(), os.strerror(ctypes.get_errno()))
+
+
+def serve(channel: socket.socket, request: dict[str, Any]) -> Start:
+    """Answer, as the first process of a launch, until its end. Returns only in a program's process."""
     children: dict[int, int] = {}
     wake_read, wake_write = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # of what a program may send it, the only one that would end it
     signal.signal(signal.SIGCHLD, lambda *_: None)
     signal.set_wakeup_fd(wake_write, warn_on_full_buffer=False)
     poll = select.poll()
     poll.register(channel, select.POLLIN)
     poll.register(wake_read, select.POLLIN)
-    _send(channel, {"ready": os.getpid()})
+    _send(channel, {"ready": True})
     while True:
         for descriptor, _ in poll.poll():
             if descriptor == wake_read:
@@ -126,19 +218,12 @@ def serve(channel: socket.socket) -> Start:
                 continue
             packet, passed, _, _ = socket.recv_fds(channel, 1 << 20, 3)
             if not packet:
-                end_everything(children)
-            request = json.loads(packet)
-            if request["do"] == "end_all":
-                if request["everyone"]:
+                for child in children:
                     with contextlib.suppress(ProcessLookupError):
-                        # Everything in this PID namespace but its first process and this one.
-                        os.kill(-1, signal.SIGKILL)
-                _reap(channel, children)
-                _send(channel, {"all_ended": True})
-                continue
-            start = Start(request, passed)
-            child = _fork(channel, start, children)
-            if child == 0:
+                        os.kill(child, signal.SIGKILL)
+                os._exit(0)
+            start = Start(json.loads(packet), passed, request)
+            if _fork(channel, start, children) == 0:
                 signal.set_wakeup_fd(-1)
                 signal.signal(signal.SIGCHLD, signal.SIG_DFL)
                 os.close(wake_read)
@@ -165,7 +250,8 @@ def _fork(channel: socket.socket, start: Start, children: dict[int, int]) -> int
     if child > 0:
         children[child] = start.id
         handle = os.pidfd_open(child)
-        socket.send_fds(channel, [json.dumps({"started": start.id, "pid": child}).encode()], [handle])
+        with contextlib.suppress(OSError):
+            socket.send_fds(channel, [json.dumps({"started": start.id}).encode()], [handle])
         os.close(handle)
     return child
 
@@ -189,10 +275,10 @@ def _send(channel: socket.socket, answer: dict[str, Any]) -> None:
         os._exit(0)  # nobody is left to answer to
 
 
-def end_everything(children: dict[int, int]) -> None:
+def end_everything(scratch: str) -> None:
     """End every program and then this process. Where no PID namespace does it, descendants are found one by one."""
     me = os.getpid()
-    while True:
+    while me != 1:
         parents: dict[int, int] = {}
         for entry in os.listdir("/proc"):
             with contextlib.suppress(OSError, ValueError, IndexError):
@@ -204,12 +290,13 @@ def end_everything(children: dict[int, int]) -> None:
         while grown := {pid for pid, parent in parents.items() if parent in family} - family:
             family |= grown
         if family == {me}:
-            os._exit(0)
+            break
         for pid in family - {me}:
             with contextlib.suppress(ProcessLookupError, PermissionError):
                 os.kill(pid, signal.SIGKILL)
-        with contextlib.suppress(ChildProcessError):
-            os.waitpid(-1, 0)
+    if scratch and os.getppid() != _PARENT:  # whoever lives looks after its own folder
+        shutil.rmtree(scratch, ignore_errors=True)
+    os._exit(0)
 
 
 def become(start: Start) -> None:
@@ -319,8 +406,8 @@ if __name__ == "__main__":
     _prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
     sys.path.insert(0, "")  # the place of the program's folder
     warm_up()
-    # After the imports: the programs' own ptrace and /proc access to this process ends here.
+    # After the imports: no program can trace a process of these, or open their memory or descriptors, from here on.
     _prctl(PR_SET_DUMPABLE, 0)
-    wanted = serve(socket.socket(fileno=int(sys.argv[1])))
+    wanted = serve(*launch(socket.socket(fileno=int(sys.argv[1])), "".join(sys.argv[2:])))
     become(wanted)
     run(wanted)

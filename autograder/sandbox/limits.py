@@ -18,9 +18,13 @@ class Limits:
     processes: int = 192
     """Processes and threads of all programs together; a node has about 12."""
     open_files: int = 256
+    signals: int = 1024
+    """Waiting signals and timers of all programs together."""
     file_size: int = 16 * MIB
     disk: int = 16 * MIB
     """What may lie in /tmp, and again in /dev/shm."""
+    inodes: int = 1024
+    """Files and folders there, again in each: an empty file costs the kernel a kilobyte that no limit counts."""
     cpu_seconds: int = 30
     """Of one process."""
     wall_seconds: float = 180.0

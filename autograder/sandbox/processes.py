@@ -8,8 +8,6 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-_PAGE = os.sysconf("SC_PAGE_SIZE")
-
 _HAD_ITS_CHANCE = 2.0
 """Seconds of CPU after which a thread was not kept from anything; to start a whole node takes a third of one."""
 
@@ -22,8 +20,6 @@ class Process:
     parent: int
     session: int
     threads: int
-    anonymous: int
-    """Resident bytes that belong to no file; pages shared after a fork are counted for both sides."""
 
 
 def descendants(root: int) -> dict[int, Process]:
@@ -43,23 +39,33 @@ def descendants(root: int) -> dict[int, Process]:
     front = [root]
     while front:
         for pid in children.get(front.pop(), []):
-            with contextlib.suppress(OSError, IndexError):
-                sizes = Path(f"/proc/{pid}/statm").read_text().split()
-                fields = everyone[pid]
-                found[pid] = Process(
-                    pid, int(fields[1]), int(fields[3]), int(fields[17]), (int(sizes[1]) - int(sizes[2])) * _PAGE
-                )
+            fields = everyone[pid]
+            found[pid] = Process(pid, int(fields[1]), int(fields[3]), int(fields[17]))
             front.append(pid)
     return found
 
 
+def memory(pid: int) -> int:
+    """Return the bytes of memory, swapped out or not, that belong to no file; 0 if the process is gone.
+
+    What is mapped to be shared counts in full, and so do pages that a fork still shares.
+    """
+    total = 0
+    with contextlib.suppress(OSError):
+        for line in Path(f"/proc/{pid}/status").read_text().splitlines():
+            if line.startswith(("RssAnon:", "RssShmem:", "VmSwap:")):
+                total += int(line.split()[1]) * 1024
+    return total
+
+
 def proportional_memory(pid: int) -> int:
     """Return the bytes of memory that are this process's own; a shared page counts in parts. 0 if it is gone."""
+    total = 0
     with contextlib.suppress(OSError):
         for line in Path(f"/proc/{pid}/smaps_rollup").read_text().splitlines():
-            if line.startswith("Pss:"):
-                return int(line.split()[1]) * 1024
-    return 0
+            if line.startswith(("Pss:", "SwapPss:")):
+                total += int(line.split()[1]) * 1024
+    return total
 
 
 def pid_of(handle: int) -> int:

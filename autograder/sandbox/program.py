@@ -20,18 +20,23 @@ STACK_SIGNAL = signal.SIGRTMIN + 10
 _QUIET = 0.05
 """Seconds without a further line after which a dump of stacks counts as complete: it has no end mark."""
 
+_LONGEST_NOTE = 4096
+"""Bytes; the probe's own are shorter."""
+_NOTES_KEPT = 1 << 20
+"""Bytes of notes that are kept of one program: what they become in memory is twenty times as much at worst."""
+
 
 class Program:
     """A program that was started. Its output is read all the time by the sandbox's own thread.
 
     Attributes:
-        name: what `NodeSandbox.start` was asked for.
+        name: what `ProgramGroup.start` was asked for.
     """
 
     def __init__(
         self, name: str, limits: Limits, changed: threading.Condition, catch_up: Callable[[Program], None]
     ) -> None:
-        """Made by `NodeSandbox.start`."""
+        """Made by `ProgramGroup.start`."""
         self.name = name
         self._limits = limits
         self._changed = changed
@@ -43,10 +48,13 @@ class Program:
         self._head = bytearray()
         self._tail = bytearray()
         self._written = 0
+        self._noted = 0
+        """Bytes that came from the probe, and stacks."""
         self._status: int | None = None
         self._stopped_by = ""
         self._events: list[dict[str, Any]] = []
         self._event_rest = b""
+        self._event_bytes = 0
         self._stacks = bytearray()
         self.readers: list[int] = []
         """The pipes from it that are still open."""
@@ -69,17 +77,20 @@ class Program:
             self._kill("output limit")
 
     def _take_events(self, data: bytes) -> None:
+        self._noted += len(data)
         *lines, self._event_rest = (self._event_rest + data).split(b"\n")
-        self._event_rest = self._event_rest[-8192:]
+        self._event_rest = self._event_rest[-_LONGEST_NOTE:]
         for line in lines:
-            if len(self._events) >= self._limits.events:
+            if len(self._events) >= self._limits.events or self._event_bytes > _NOTES_KEPT:
                 return
             with contextlib.suppress(ValueError, RecursionError):
-                event = json.loads(line)
+                event = json.loads(line) if len(line) < _LONGEST_NOTE else None
                 if isinstance(event, dict):
+                    self._event_bytes += len(line)
                     self._events.append(event)
 
     def _take_stacks(self, data: bytes) -> None:
+        self._noted += len(data)
         if len(self._stacks) < self._limits.output_kept:
             self._stacks += data
 

@@ -2,32 +2,30 @@
 
 from __future__ import annotations
 
-import subprocess
 import sys
 import tempfile
 from pathlib import Path
 
-from autograder.sandbox import bubblewrap
-from autograder.sandbox.environment import python_environment
-from autograder.sandbox.limits import Limits
-from autograder.sandbox.seccomp import filter_program
+from autograder.errors import KitError
+from autograder.results import Isolation
+from autograder.sandbox.nodes import NodeSandbox
 
 
 def main() -> int:
-    """Return 0 if a process started in the node sandbox, having written its word."""
-    with tempfile.TemporaryDirectory() as folder:
-        filtered = bubblewrap.memory_file("seccomp", filter_program())
-        process = bubblewrap.start_bwrap(
-            bubblewrap.inner_options(Path(folder), Limits(), python_environment(), filtered),
-            [sys.executable, "-I", "-S", "-c", "print('isolated')"],
-            (filtered,),
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-        )
-        said, trouble = process.communicate(timeout=30)
-    sys.stdout.write(said.decode())
-    sys.stderr.write(trouble.decode("utf-8", "replace"))
-    return process.returncode
+    """Return 0 if a program was started in the node sandbox, and said its word."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        folder.chmod(0o755)
+        (folder / "word.py").write_text("print('isolated')\n")
+        try:
+            with NodeSandbox(folder, Isolation.FULL) as sandbox, sandbox.group() as group:
+                program = group.start("word")
+                program.wait(30)
+                sys.stdout.write(program.output())
+        except (KitError, OSError) as error:
+            sys.stderr.write(str(error).splitlines()[0])
+            return 1
+    return 0
 
 
 if __name__ == "__main__":

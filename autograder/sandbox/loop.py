@@ -1,0 +1,110 @@
+"""One thread that waits for descriptors, does what it is asked to, and looks at something now and then."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import queue
+import selectors
+import threading
+import time
+import traceback
+from collections.abc import Callable
+
+from autograder.errors import KitError
+
+_WATCH = 0.1
+"""Seconds between two looks."""
+_SHARE = 50
+"""A look never takes more than this part of the time: on a machine with a thousand processes it costs a lot."""
+
+
+class Loop:
+    """Runs callbacks one after another, in a thread of its own that lives until `stop`.
+
+    Args:
+        busy: whether there is anything to look at.
+        look: called every 0.1 s while there is.
+    """
+
+    def __init__(self, busy: Callable[[], bool], look: Callable[[], None]) -> None:
+        """Start the thread."""
+        self._busy, self._look = busy, look
+        self._wake_read, self._wake_write = os.pipe2(os.O_CLOEXEC | os.O_NONBLOCK)
+        self._todo: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
+        self._selector = selectors.DefaultSelector()
+        self._selector.register(self._wake_read, selectors.EVENT_READ, self._on_wake)
+        self._stopped = False
+        self._thread = threading.Thread(target=self._run, name="node sandbox", daemon=True)
+        self._thread.start()
+
+    def do(self, action: Callable[[], None]) -> None:
+        """Do something in the thread, and wait until it is done. What it raises is raised here."""
+        if threading.current_thread() is self._thread:
+            action()
+            return
+        done = threading.Event()
+        problem: list[BaseException] = []
+
+        def run() -> None:
+            try:
+                action()
+            except BaseException as error:
+                problem.append(error)
+            finally:
+                done.set()
+
+        self._todo.put(run)
+        os.write(self._wake_write, b"x")
+        while not done.wait(0.5):
+            if not self._thread.is_alive():
+                raise KitError("The node sandbox has ended by itself.", "Run the command again.")
+        if problem:
+            raise problem[0]
+
+    def when_readable(self, descriptor: int, action: Callable[[], None]) -> None:
+        """Call `action` whenever there is something to read; only from the thread itself."""
+        self._selector.register(descriptor, selectors.EVENT_READ, action)
+
+    def read_now(self, descriptor: int) -> None:
+        """Call the action of a descriptor, if it is still waited for; only from the thread itself."""
+        key = self._selector.get_map().get(descriptor)
+        if key is not None:
+            key.data()
+
+    def forget(self, descriptor: int) -> None:
+        """Wait for it no more; only from the thread itself."""
+        self._selector.unregister(descriptor)
+
+    def stop(self) -> None:
+        """End the thread, and close what belongs to it."""
+        self._stopped = True
+        os.write(self._wake_write, b"x")
+        self._thread.join()
+        self._selector.close()
+        os.close(self._wake_read)
+        os.close(self._wake_write)
+
+    def _on_wake(self) -> None:
+        with contextlib.suppress(BlockingIOError):
+            os.read(self._wake_read, 4096)
+        while not self._todo.empty():
+            self._todo.get()()
+
+    def _run(self) -> None:
+        due = 0.0
+        while not self._stopped:
+            for key, _ in self._selector.select(max(0.0, due - time.monotonic()) if self._busy() else None):
+                self._guarded(key.data)
+            if time.monotonic() >= due and self._busy():
+                began = time.thread_time()
+                self._guarded(self._look)
+                due = time.monotonic() + max(_WATCH, _SHARE * (time.thread_time() - began))
+
+    @staticmethod
+    def _guarded(action: Callable[[], object]) -> None:
+        """Whatever goes wrong must not end this thread, which everyone waits for."""
+        try:
+            action()
+        except Exception:
+            traceback.print_exc()
