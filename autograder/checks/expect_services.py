@@ -167,6 +167,9 @@ class ServiceExpectations(GraphExpectations):
     def _file_for_others(self, node: str) -> Diagnosis | None:
         """Whether the parameter files of the launch have nothing for this node."""
         for launched, _ in self.programs:
+            if launched.warnings:
+                hint = "Write `$(dirname)/NAME.yaml`; NAME is a cell's `%%file`."
+                return Diagnosis(f"{launched.warnings[0]} The node started without it.", "params-file-missing", hint)
             words = launched.arguments()
             for option, file in itertools.pairwise(words):
                 path = session.current.folder / file

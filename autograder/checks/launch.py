@@ -27,7 +27,7 @@ from autograder.checks.session import Score
 from autograder.graph import remap_rules
 from autograder.graph.diagnosis import Diagnosis
 from autograder.graph.observer import Observer
-from autograder.launch_files import LaunchFileError, read_launch_file
+from autograder.launch_files import LaunchFileError, read_launch_file, remove_written
 from autograder.results import NodeLog
 from autograder.sandbox.environment import profile_environment
 from autograder.sandbox.nodes import Program, ProgramGroup
@@ -50,6 +50,10 @@ class Node:
     """Words before `--ros-args`."""
     cores: int = 2
     """CPUs that the program may use: the same number on every machine that has them."""
+    environment: Mapping[str, str] = field(default_factory=dict)
+    """Variables beside those that every program has."""
+    warnings: Sequence[str] = ()
+    """What a launch file names and does not have; the program starts without it."""
 
     def arguments(self) -> list[str]:
         """The program's command line."""
@@ -69,7 +73,7 @@ class Node:
 
     def all_rules(self) -> list[str]:
         """The remap rules, those that were typed included."""
-        return self.rules() + remap_rules.rules_in(self._typed())
+        return self.rules() + remap_rules.rules_in([*self.arguments_of_its_own, *self._typed()])
 
     def rules(self) -> list[str]:
         """The remap rules in the order in which they are given: the first that matches wins."""
@@ -152,7 +156,14 @@ class Launch(MessageExpectations, ServiceExpectations, LifecycleExpectations, Pr
             self._trouble.append(Diagnosis(str(error), "launch-file", error.hint))
             return []
         self.nodes = [
-            Node(one.program, ros_arguments=one.ros_arguments(), arguments_of_its_own=one.arguments) for one in found
+            Node(
+                one.program,
+                ros_arguments=one.ros_arguments(),
+                arguments_of_its_own=one.arguments,
+                environment=one.environment,
+                warnings=one.warnings,
+            )
+            for one in found
         ]
         self.nodes = [self._stand_in(node) for node in self.nodes]
         return self.nodes
@@ -175,7 +186,7 @@ class Launch(MessageExpectations, ServiceExpectations, LifecycleExpectations, Pr
         if not (session.current.folder / f"{launched.program}.py").is_file():
             self._missing.append(launched.program)
             return
-        environment = {**profile_environment(), "ROS_DOMAIN_ID": str(self.domain_id)}
+        environment = {**launched.environment, **profile_environment(), "ROS_DOMAIN_ID": str(self.domain_id)}
         try:
             words = launched.arguments()
         except CommandLineError as error:
@@ -208,6 +219,7 @@ class Launch(MessageExpectations, ServiceExpectations, LifecycleExpectations, Pr
                 self._group.end()
         finally:
             self.observer.close()
+            remove_written(session.current.folder)
         for launched, program in self.programs:
             session.current.logs.append(
                 NodeLog(

@@ -1,0 +1,53 @@
+"""What goes wrong with a launch file, and how large such a file and what comes of it may be."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+INCLUDE_DEPTH = 8
+"""Launch files that may include one another, one inside the next."""
+MOST_NODES = 32
+"""Nodes that one launch may start: more participants than that do not find each other on one machine."""
+MOST_ACTIONS = 1000
+"""Actions that one launch may run, those of included files counted each time."""
+TEXT_LENGTH = 8000
+"""Characters of a text after its substitutions: a few lines that double a text would fill the memory."""
+SUBSTITUTION_DEPTH = 10
+"""Substitutions that may stand inside one another."""
+
+
+class LaunchFileError(Exception):
+    """A launch file cannot be used: in which file and where in it, why, and what to do."""
+
+    def __init__(self, file: str, where: str, because: str, hint: str = "") -> None:
+        """Keep the parts; the message joins them."""
+        place = f"{file}, {where}" if where else file
+        super().__init__(f"{place}: {because}")
+        self.file, self.where, self.because, self.hint = file, where, because, hint
+
+
+class ValueRefused(Exception):
+    """Something in a value is refused; the place is not known yet."""
+
+    def __init__(self, because: str, hint: str = "") -> None:
+        """Keep the reason and the advice."""
+        super().__init__(because)
+        self.because, self.hint = because, hint
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where in which file something stands, to be named in an error."""
+
+    file: str
+    folder: Path
+    where: str = ""
+
+    def at(self, more: str) -> Place:
+        """A place further inside."""
+        return Place(self.file, self.folder, f"{self.where} > {more}" if self.where else more)
+
+    def error(self, because: str, hint: str = "") -> LaunchFileError:
+        """The error to raise for this place."""
+        return LaunchFileError(self.file, self.where, because, hint)

@@ -1,0 +1,65 @@
+"""Where a launch file finds other files: a package's share folder as it is installed, seen from the lab's one folder.
+
+An installed package has its launch files and parameter files in `share/PACKAGE/launch`; a lab has them all in one
+folder. `$(dirname)` is that folder, and `$(find-pkg-share PACKAGE)/launch` leads to it.
+"""
+
+from __future__ import annotations
+
+import os.path
+from collections.abc import Callable
+from pathlib import Path
+
+
+class Packages:
+    """The packages that a launch file may name."""
+
+    def __init__(self, find: Callable[[str], Path]) -> None:
+        """Ask `find` for the folder of a package; it raises KeyError for one that does not exist."""
+        self._find = find
+        self._folders: dict[str, Path] = {}
+
+    def folder(self, name: str) -> Path:
+        """The folder that has a package's programs and files.
+
+        Raises:
+            KeyError: there is no such package.
+        """
+        if name not in self._folders:
+            self._folders[name] = self._find(name).resolve()
+        return self._folders[name]
+
+    def share(self, name: str) -> str:
+        """What `$(find-pkg-share NAME)` stands for; only `launch/` below it holds files.
+
+        Raises:
+            KeyError: there is no such package.
+        """
+        return f"{self.folder(name)}/share/{name}"
+
+    def programs(self, name: str) -> set[str]:
+        """The names of a package's programs; empty if its folder has none at all."""
+        return {path.stem for path in self.folder(name).glob("*.py")}
+
+    def file(self, text: str, folder: Path) -> Path | None:
+        """The file that a path leads to once the package is installed; None if there is none, or not in the lab.
+
+        Args:
+            text: the path as the launch file has it.
+            folder: of the launch file.
+        """
+        if not text.startswith("/"):
+            return None  # looked for in the folder that `ros2 launch` is called from
+        installed = {str(folder.resolve()): "/share//launch"}
+        for name, place in self._folders.items():
+            installed[f"{place}/share/{name}"] = f"/share/{name}"
+        longest = max(
+            (root for root in installed if text == root or text.startswith(root + "/")), key=len, default=None
+        )
+        if longest is None:
+            return None
+        parent, name = os.path.split(os.path.normpath(f"/r{installed[longest]}{text[len(longest) :]}"))
+        places = {f"/r/share/{package}/launch": place for package, place in self._folders.items()}
+        holder = {"/r/share/launch": folder.resolve(), **places}.get(parent)
+        path = holder / name if holder else None
+        return path if path and path.is_file() and path.resolve().parent == holder else None

@@ -1,0 +1,127 @@
+"""What a launch file starts, and the command line that `ros2 launch` gives to it."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from pathlib import Path
+from typing import Any
+
+import yaml
+from pydantic import BaseModel, ConfigDict
+
+WRITTEN = ".launch_params_*.yaml"
+"""Parameter files that a launch writes into the folder of its launch file, as a pattern."""
+_ON_A_COMMAND_LINE = re.compile(r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)*")
+
+
+class Inline(BaseModel):
+    """A parameter that stands in the launch file itself."""
+
+    model_config = ConfigDict(extra="forbid")
+    name: str
+    value: Any
+
+
+class ForAll(BaseModel):
+    """A parameter of `set_parameter`: its value goes to the command line as a text, and is read there once more."""
+
+    model_config = ConfigDict(extra="forbid")
+    name: str
+    text: str
+
+
+class ParamsFile(BaseModel):
+    """A parameter file that a launch file names (`from:`)."""
+
+    model_config = ConfigDict(extra="forbid")
+    file: str
+    """Its name in the folder of the launch file."""
+
+
+class ParamsText(BaseModel):
+    """What a parameter file holds after its substitutions (`allow_substs: true`)."""
+
+    model_config = ConfigDict(extra="forbid")
+    text: str
+
+
+class LaunchedNode(BaseModel):
+    """One program that a launch file starts, with every substitution done."""
+
+    model_config = ConfigDict(extra="forbid")
+    package: str
+    program: str
+    """`exec:`, the name of the executable."""
+    namespace: str = ""
+    """Absolute; empty when neither the node nor a group gives one."""
+    name: str = ""
+    """Empty when the launch file leaves it to the program."""
+    remappings: list[tuple[str, str]] = []
+    parameters: list[Inline | ForAll | ParamsFile | ParamsText] = []
+    """In the order in which they are given."""
+    arguments: list[str] = []
+    """Words of the program's own."""
+    ros_words: list[str] = []
+    """Words of `ros_args`; they come first after `--ros-args`."""
+    environment: dict[str, str] = {}
+    """Variables that the launch file sets."""
+    warnings: list[str] = []
+    """What `ros2 launch` only warns about: parameter files that do not exist."""
+    folder: Path = Path()
+    """Where its parameter files are."""
+
+    def rules(self) -> list[str]:
+        """The remap rules of the launch file, without those of `ros_args`, in the order in which they are given."""
+        rules = [f"__node:={self.name}"] if self.name else []
+        if self.namespace:
+            rules.append(f"__ns:={self.namespace}")
+        return rules + [f"{old}:={new}" for old, new in self.remappings]
+
+    def ros_arguments(self) -> list[str]:
+        """The words that follow `--ros-args`, in the order of `ros2 launch`.
+
+        Where a parameter file is among them, the parameters of the launch file itself are written into files too, as
+        `ros2 launch` does: then which value wins depends on the keys of the files. The files are named `WRITTEN`.
+        """
+        own = len(self.rules()) - len(self.remappings)
+        words = [word for rule in self.rules()[:own] for word in ("-r", rule)]
+        for parameter in self.parameters:
+            words += self._words(parameter)
+        words += [word for rule in self.rules()[own:] for word in ("-r", rule)]
+        return [*self.ros_words, *(["--ros-args"] if words and self.ros_words else []), *words]
+
+    def _words(self, parameter: Inline | ForAll | ParamsFile | ParamsText) -> list[str]:
+        match parameter:
+            case ForAll():
+                return ["-p", f"{parameter.name}:={parameter.text}"]
+            case ParamsFile():
+                return ["--params-file", parameter.file]
+            case ParamsText():
+                return ["--params-file", self._written(parameter.text)]
+        if self._only_inline() and _ON_A_COMMAND_LINE.fullmatch(parameter.name):
+            return ["-p", f"{parameter.name}:={_on_a_command_line(parameter.value)}"]
+        key = f"{self.namespace.rstrip('/')}/{self.name}" if self.namespace and self.name else "/**"
+        content = {key: {"ros__parameters": {parameter.name: parameter.value}}}
+        return ["--params-file", self._written(yaml.safe_dump(content, default_flow_style=False))]
+
+    def _only_inline(self) -> bool:
+        files = any(isinstance(parameter, (ParamsFile, ParamsText)) for parameter in self.parameters)
+        return not files and "--params-file" not in (*self.ros_words, *self.arguments)
+
+    def _written(self, text: str) -> str:
+        name = WRITTEN.replace("*", hashlib.sha256(text.encode()).hexdigest()[:16])
+        (self.folder / name).write_text(text, encoding="utf-8")
+        return name
+
+
+def remove_written(folder: Path) -> None:
+    """Remove the parameter files that `LaunchedNode.ros_arguments` wrote into a folder."""
+    for path in folder.glob(WRITTEN):
+        path.unlink(missing_ok=True)
+
+
+def _on_a_command_line(value: Any) -> str:
+    """A value as `yaml.dump` would write it into a parameter file, in one word."""
+    text = yaml.safe_dump(value, default_flow_style=True, width=1_000_000)
+    return text.removesuffix("\n...\n").removesuffix("\n")

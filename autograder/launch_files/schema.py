@@ -1,0 +1,293 @@
+"""The schema of a launch file: which keys each action has and what may stand behind them.
+
+A whole file is read and checked before any of it runs, the parts below `if: "false"` too.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from autograder import student_yaml
+from autograder.launch_files import substitutions, values, words
+from autograder.launch_files.errors import LaunchFileError, Place, ValueRefused
+from autograder.launch_files.texts import Text, parse, unescaped
+
+_ELSEWHERE = {
+    "append_env", "composable_node", "emit_event", "executable", "for_each", "for_loop", "keep", "lifecycle_node",
+    "load_composable_node", "log_debug", "log_error", "log_info", "log_warning", "node_container", "pop_environment",
+    "pop_launch_configurations", "push_environment", "push_launch_configurations", "reset", "reset_environment",
+    "set_ros_log_dir", "set_use_sim_time", "shutdown", "test", "timer",
+}  # fmt: skip
+"""Actions that `ros2 launch` has and that are not covered here."""
+_KEYS_ELSEWHERE = {"cwd", "forwarding", "keep", "launch-prefix", "level", "on_exit", "respawn_max_retries"}
+_WHY_NOT = {
+    "executable": "only the lab's own programs can be started in the sandbox.",
+    "timer": "what is started later is not covered here.",
+}
+
+
+@dataclass
+class Action:
+    """One action of a launch file, read and checked."""
+
+    kind: str
+    place: Place
+    given: dict[str, Any] = field(default_factory=dict)
+    """By key; a key that is left out is not there."""
+    children: list[Action] = field(default_factory=list)
+
+
+def read_file(path: Path) -> list[Action]:
+    """Read and check a launch file.
+
+    Raises:
+        LaunchFileError: it is missing, is no launch file, or has what `ros2 launch` refuses or what is not covered.
+    """
+    place = Place(path.name, path.resolve().parent)
+    if not path.is_file():
+        raise place.error("there is no such file.", "Its name is the one after `%%file` in the first line of its cell.")
+    try:
+        content = student_yaml.read(path)
+    except student_yaml.StudentFileError as error:
+        where = f"line {error.line} of the cell" if error.line else ""
+        because = error.because.removeprefix(f"`{path.name}`").lstrip(", ").removeprefix(where).lstrip(" :")
+        because = f"it {because}" if because.startswith("is ") else because
+        hint = "Look at the indentation and the `-` there." if "not YAML" in because else ""
+        raise LaunchFileError(path.name, where, because, hint) from None
+    if not isinstance(content, dict) or list(content) != ["launch"]:
+        raise place.error(
+            "a launch file has one key at the top, `launch:`, with a list below it.",
+            "Begin with `launch:` and `- node:`.",
+        )
+    body = content["launch"]
+    if isinstance(body, dict) and set(body) <= {"children", "deprecated"} and "children" in body:
+        if not isinstance(body.get("deprecated", ""), str):
+            raise place.at("deprecated").error("a text is expected here.")
+        body = body["children"]
+    if isinstance(body, dict):
+        raise place.error("`launch:` has a list below it.", "Each action begins with a `-`: `- node:`.")
+    return _actions(body, place.at("launch"))
+
+
+def _actions(body: Any, place: Place) -> list[Action]:
+    if not isinstance(body, list):
+        raise place.error("a list of actions is expected, each with a `-`.")
+    return [_action(entry, number, place) for number, entry in enumerate(body, start=1)]
+
+
+def _action(entry: Any, number: int, place: Place) -> Action:
+    if not isinstance(entry, dict) or len(entry) != 1:
+        raise place.at(f"entry {number}").error(
+            "each entry of the list is one action, such as `- node:`.",
+            "The keys of the action stand below it, indented further than its name.",
+        )
+    kind, body = next(iter(entry.items()))
+    here = place.at(f"{kind} (entry {number})")
+    schema = _SCHEMAS.get(kind) if isinstance(kind, str) else None
+    if schema is None:
+        known = isinstance(kind, str) and kind in _ELSEWHERE
+        raise here.error(
+            f"`{kind}` is not covered here{': ' + _WHY_NOT[kind] if kind in _WHY_NOT else '.'}"
+            if known
+            else f"there is no action `{kind}`.",
+            f"Covered are {', '.join(sorted(_SCHEMAS))} of ROS 2's YAML schema.",
+        )
+    if kind == "group" and isinstance(body, list):
+        body = {"children": body}
+    given = _keys(body, schema, here)
+    if "if" in given and "unless" in given:
+        raise here.error("only one of `if` and `unless` can be given.")
+    return Action(kind, here, given, given.pop("children", []))
+
+
+@dataclass(frozen=True)
+class Key:
+    """One key: what reads the value behind it, and whether it must be there."""
+
+    read: Callable[[Any, Place], Any]
+    needed: bool = True
+
+
+def _keys(body: Any, schema: dict[str, Key], place: Place, ignored: bool = False) -> dict[str, Any]:
+    """Read the keys below an action.
+
+    Args:
+        body: what stands below it.
+        schema: its keys.
+        place: for errors.
+        ignored: whether further keys are passed over, as `launch` does in one place.
+    """
+    if not isinstance(body, dict):
+        raise place.error("keys with values are expected here, such as `name: …`, indented further than the action.")
+    for key, expected in schema.items():
+        if expected.needed and key not in body:
+            raise place.error(f"the key `{key}` is missing.", f"Write `{key}: …` below it.")
+    unknown = [] if ignored else [str(key) for key in body if key not in schema]
+    if unknown:
+        known = ", ".join(f"`{key}`" for key in sorted(schema))
+        what = "is not covered here" if unknown[0] in _KEYS_ELSEWHERE else "is unknown or not covered here"
+        raise place.error(f"the key `{unknown[0]}` {what}.", f"Known here: {known}.")
+    return {key: schema[key].read(value, place.at(key)) for key, value in body.items() if key in schema}
+
+
+def refusing(place: Place, what: Callable[[], Any]) -> Any:
+    """Do something, and say the place if it is refused."""
+    try:
+        return what()
+    except ValueRefused as error:
+        raise place.error(error.because, error.hint) from None
+
+
+def _string(value: Any, place: Place) -> str:
+    if isinstance(value, str):
+        return value
+    if isinstance(value, (bool, int, float)):
+        written = str(value).lower() if isinstance(value, bool) else str(value)
+        key = place.where.rsplit(" > ", 1)[-1]
+        what = "a truth value" if isinstance(value, bool) else "a number"
+        raise place.error(
+            f"`{written}` is {what}; the launch schema wants a text here.", f'Put it in quotes: `{key}: "{written}"`.'
+        )
+    raise place.error("a text is expected here.", 'Put it in quotes: `"…"`.')
+
+
+def _text(value: Any, place: Place) -> Text:
+    written = _string(value, place)
+
+    def read() -> Text:
+        text = parse(written)
+        substitutions.check(text)
+        return text
+
+    text: Text = refusing(place, read)
+    return text
+
+
+def _escaped(value: Any, place: Place) -> str:
+    return unescaped(_string(value, place))
+
+
+def _command_line(value: Any, place: Place) -> list[Text]:
+    found: list[Text] = refusing(place, lambda: words.split(_text(value, place)))
+    return found
+
+
+def _switch(value: Any, place: Place) -> bool:
+    """`true`, `false`, or any text, which counts as true: so does `launch`, which never reads the text."""
+    if not isinstance(value, (bool, str)):
+        raise place.error("`true` or `false` is expected here.")
+    return bool(value)
+
+
+def _seconds(value: Any, place: Place) -> float:
+    if not isinstance(value, float) or not value >= 0 or math.isinf(value):
+        raise place.error("a number of seconds with a decimal point is expected here.", "Write `1.0`, not `1`.")
+    return value
+
+
+def _no_respawn(value: Any, place: Place) -> None:
+    if not isinstance(value, str) or value.strip().lower() not in ("false", "0"):
+        raise place.error("a program that ends is not started again here.", 'Leave it out, or write `"false"`.')
+
+
+def _false(value: Any, place: Place) -> None:
+    if value is not False:
+        raise place.error("it is not covered here unless it is `false`.")
+
+
+def _entries(schema: dict[str, Key], ignored: bool = False) -> Callable[[Any, Place], list[dict[str, Any]]]:
+    def read(value: Any, place: Place) -> list[dict[str, Any]]:
+        if not isinstance(value, list) or not value or not all(isinstance(entry, dict) for entry in value):
+            raise place.error("a list is expected here, each entry with a `-` and keys of its own.")
+        return [
+            _keys(entry, schema, Place(place.file, place.folder, f"{place.where} (entry {number})"), ignored)
+            for number, entry in enumerate(value, start=1)
+        ]
+
+    return read
+
+
+def _parameters(value: Any, place: Place) -> list[dict[str, Any]]:
+    """`param` entries: `name` with a `value` or with further `param` below it, or a file (`from`)."""
+    if not isinstance(value, list) or not value or not all(isinstance(entry, dict) for entry in value):
+        raise place.error("a list is expected here, each entry with a `-` and keys of its own.")
+    nested = place.where.count("param (entry") > 0
+    found = []
+    for number, entry in enumerate(value, start=1):
+        here = Place(place.file, place.folder, f"{place.where} (entry {number})")
+        if "from" in entry and not nested:
+            found.append(_keys(entry, {"from": Key(_text), "allow_substs": Key(_truth_value, False)}, here))
+        else:
+            found.append(_parameter(entry, here))
+    return found
+
+
+def _parameter(entry: dict[str, Any], place: Place) -> dict[str, Any]:
+    keep = Key(lambda value, _: value, False)
+    schema = {"name": Key(_text), "value": keep, "type": keep, "param": Key(_parameters, False)}
+    given = _keys(entry, schema, place)
+    if "param" in given:
+        if "value" in given or "type" in given:
+            raise place.error("`param` stands in the place of `value` and `type`.", "Leave those two out.")
+        return given
+    if "value" not in given:
+        raise place.error("the key `value` is missing.", "Write `value: …` below it.")
+    value = refusing(place.at("value"), lambda: values.read(given["value"], given.get("type")))
+    return {"name": given["name"], "value": value}
+
+
+def _truth_value(value: Any, place: Place) -> bool:
+    if not isinstance(value, bool):
+        raise place.error("`true` or `false` is expected here, without quotes.")
+    return value
+
+
+def _several(names: Iterable[str], read: Callable[[Any, Place], Any]) -> dict[str, Key]:
+    return {name: Key(read, needed=False) for name in names}
+
+
+_NAME_AND_VALUE = {"name": Key(_text), "value": Key(_text)}
+_RULE = {"from": Key(_text), "to": Key(_text)}
+_CONDITIONS = _several(("if", "unless"), _text)
+_NODE = {
+    "pkg": Key(_text),
+    "exec": Key(_text),
+    **_several(("name", "namespace", "exec_name", "output"), _text),
+    **_several(("args", "ros_args"), _command_line),
+    **_several(("sigterm_timeout", "sigkill_timeout"), _seconds),
+    **_several(("emulate_tty",), _switch),
+    **_several(("shell",), _false),
+    **_several(("respawn",), _no_respawn),
+    **_several(("respawn_delay",), _seconds),
+    **_several(("remap",), _entries(_RULE)),
+    **_several(("env",), _entries(_NAME_AND_VALUE)),
+    **_several(("param",), _parameters),
+}
+_ARGUMENT = {
+    "name": Key(_escaped),
+    **_several(("default",), _text),
+    **_several(("description",), _escaped),
+    **_several(("choice",), _entries({"value": Key(_escaped)}, ignored=True)),
+}
+_SCHEMAS: dict[str, dict[str, Key]] = {
+    kind: {**schema, **_CONDITIONS}
+    for kind, schema in {
+        "arg": _ARGUMENT,
+        "let": _NAME_AND_VALUE,
+        "group": {"children": Key(_actions), **_several(("scoped",), _switch)},
+        "include": {"file": Key(_text), **_several(("arg",), _entries(_NAME_AND_VALUE))},
+        "log": {"message": Key(_text)},
+        "node": _NODE,
+        "push_ros_namespace": {"namespace": Key(_text)},
+        "push-ros-namespace": {"namespace": Key(_text)},
+        "set_env": _NAME_AND_VALUE,
+        "set_parameter": _NAME_AND_VALUE,
+        "set_parameters_from_file": {"filename": Key(_text)},
+        "set_remap": _RULE,
+        "unset_env": {"name": Key(_text)},
+    }.items()
+}

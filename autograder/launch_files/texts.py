@@ -1,0 +1,138 @@
+"""The texts of a launch file: plain words and `$(…)` substitutions, taken apart as the grammar of `launch` does.
+
+A substitution is `$(NAME)` or `$(NAME VALUE VALUE)` with exactly one space before each value. A value is a run of
+characters without spaces, quotes and brackets, or it stands in quotes. Both may hold further substitutions. A backslash
+takes the meaning from the character after it.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from autograder.launch_files.errors import SUBSTITUTION_DEPTH, ValueRefused
+
+_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
+
+
+@dataclass(frozen=True)
+class Call:
+    """One `$(NAME VALUE …)`."""
+
+    name: str
+    values: tuple[Text, ...]
+    written: str
+
+
+Text = tuple[str | Call, ...]
+"""The parts of a text in their order. A text without substitutions has one part, or two if it has both kinds of quotes:
+so has it in `launch`, and what it is counted as depends on it."""
+
+
+def plain(text: Text) -> str | None:
+    """The text itself if `launch` takes it for a literal, None if it counts as a substitution."""
+    return text[0] if len(text) == 1 and isinstance(text[0], str) else None
+
+
+def calls(text: Text) -> Iterator[Call]:
+    """Every substitution in a text, the inner ones too."""
+    for part in text:
+        if isinstance(part, Call):
+            yield part
+            for value in part.values:
+                yield from calls(value)
+
+
+def unescaped(text: str) -> str:
+    """A text without the backslashes that take the meaning from the character after them."""
+    return re.sub(r"\\(.)", r"\1", text)
+
+
+def parse(text: str) -> Text:
+    """Take a text apart.
+
+    Raises:
+        ValueRefused: a substitution in it is not well formed.
+    """
+    if not text:
+        return ("",)
+    parts, end = _Reader(text).quoted(0, None, 0)
+    assert end == len(text)
+    return tuple(parts)
+
+
+class _Reader:
+    def __init__(self, text: str) -> None:
+        self.text = text
+
+    def error(self, because: str, hint: str = "") -> ValueRefused:
+        shown = self.text if len(self.text) <= 80 else f"{self.text[:80]}…"
+        return ValueRefused(f"in `{shown}`, {because}", hint)
+
+    def quoted(self, at: int, quote: str | None, depth: int) -> tuple[list[str | Call], int]:
+        """The parts up to the closing quote; without a quote, up to the end of the text."""
+        text, parts, start = self.text, list[str | Call](), at
+        while at < len(text) and text[at] != quote:
+            if text.startswith("$(", at):
+                parts += self.words(text[start:at], quote)
+                call, at = self.call(at, quote, depth)
+                parts.append(call)
+                start = at
+            elif text.startswith("\\\\$(", at):
+                raise self.error("two backslashes before `$(` are not covered here.", "Leave the backslashes out.")
+            else:
+                at += 2 if text[at] == "\\" and at + 1 < len(text) else 1
+        if quote and at >= len(text):
+            raise self.error(f"a {quote} is never closed.", "Add the quotation mark.")
+        return parts + self.words(text[start:at], quote), at
+
+    def words(self, text: str, quote: str | None) -> list[str | Call]:
+        if not text:
+            return []
+        bare = re.sub(r"\\.", "", text)
+        if quote is None and "'" in bare and '"' in bare:
+            cut = max(text.index("'"), text.index('"'))
+            return [unescaped(text[:cut]), unescaped(text[cut:])]
+        return [unescaped(text)]
+
+    def call(self, at: int, quote: str | None, depth: int) -> tuple[Call, int]:
+        """The substitution that begins here, and where the text goes on."""
+        if depth >= SUBSTITUTION_DEPTH:
+            raise self.error("substitutions are nested too deep.")
+        text, start = self.text, at
+        name = _NAME.match(text, at + 2)
+        if name is None:
+            raise self.error("`$(` is not followed by the name of a substitution.", "Write `$(var NAME)`, no space.")
+        at, values = name.end(), list[Text]()
+        while text[at : at + 1] == " ":
+            value, at = self.value(at + 1, quote, depth + 1)
+            values.append(value)
+        if at >= len(text) or ")" not in text[at:]:
+            raise self.error("`$(` is never closed.", "Add the `)`.")
+        if text[at] != ")":
+            raise self.error(f"`{text[at]}` is not expected in a substitution.", "Put its value in quotes.")
+        return Call(name[0], tuple(values), text[start : at + 1]), at + 1
+
+    def value(self, at: int, quote: str | None, depth: int) -> tuple[Text, int]:
+        text = self.text
+        if quote is None and text[at : at + 1] in ("'", '"'):
+            parts, at = self.quoted(at + 1, text[at], depth)
+            return tuple(parts), at + 1
+        ends, found, start = {" ", "(", ")", *(quote or "'\"")}, list[str | Call](), at
+        while at < len(text) and text[at] not in ends:
+            if text.startswith("$(", at):
+                found += [unescaped(text[start:at])] if at > start else []
+                call, at = self.call(at, quote, depth)
+                found.append(call)
+                start = at
+            else:
+                at += (
+                    2
+                    if text[at] == "\\" and text[at + 1 : at + 2] in ("(", ")", "$", quote or "'", quote or '"')
+                    else 1
+                )
+        found += [unescaped(text[start:at])] if at > start else []
+        if not found:
+            raise self.error("a value is missing after a space.", "Exactly one space stands before each value.")
+        return tuple(found), at

@@ -1,0 +1,142 @@
+"""The types of parameter values: what `launch` and `launch_ros` make of a `value` and a `type`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from autograder import student_yaml
+from autograder.launch_files import substitutions
+from autograder.launch_files.errors import ValueRefused
+from autograder.launch_files.texts import Text, parse, plain
+
+_SIMPLE = (bool, int, float, str)
+_TYPES: dict[str, tuple[type | None, bool]] = {
+    "str": (str, False), "bool": (bool, False), "float": (float, False), "int": (int, False),
+    "list_of_str": (str, True), "list_of_bool": (bool, True), "list_of_float": (float, True),
+    "list_of_int": (int, True), "yaml": (None, False),
+}  # fmt: skip
+"""What the words of `type:` mean: the type of a value or of a list's items, and whether it is a list."""
+_OWN_QUOTES = "For a text, write `type: str` beside the value."
+
+
+@dataclass(frozen=True)
+class Value:
+    """A `value` as it stands in the file: a text with substitutions is a `Text`, everything else is as YAML has it."""
+
+    content: Text | bool | float | str | list[Any]
+    kind: type | None
+    is_list: bool
+
+
+def read(value: Any, kind: Any) -> Value:
+    """Read a `value` and its `type` as `launch` does when it reads a file.
+
+    Args:
+        value: what stands behind `value:`.
+        kind: what stands behind `type:`, None without it.
+
+    Raises:
+        ValueRefused: `launch` refuses it.
+    """
+    if kind is not None and (not isinstance(kind, str) or kind not in _TYPES):
+        raise ValueRefused(f"`{kind}` is no type.", f"Types are {', '.join(_TYPES)}.")
+    wanted, is_list = _TYPES[kind] if kind is not None else (None, False)
+    if isinstance(value, list):
+        if kind not in (None, "yaml") and not is_list:
+            raise ValueRefused(f"a list cannot be of the type `{kind}`.", f"Write `type: list_of_{kind}`.")
+        return Value(_list(value, wanted), wanted, True)
+    if not isinstance(value, _SIMPLE):
+        raise ValueRefused(
+            f"a parameter is a bool, a number, a text or a list of such, not {_shown(value)}.",
+            "A text stands in quotes.",
+        )
+    content = _text(value) if isinstance(value, str) else value
+    if not isinstance(content, tuple) and (is_list or (wanted is not None and not isinstance(content, wanted))):
+        raise ValueRefused(
+            f"{_shown(value)} is not of the type `{kind}`: a value without `$(…)` is not converted.",
+            "Write the value as YAML has it, without `type`.",
+        )
+    return Value(content, wanted, is_list)
+
+
+def _text(value: str) -> Text | str:
+    """A text; a literal one is settled, one with substitutions is read as YAML when they have been done."""
+    parts = parse(value)
+    substitutions.check(parts)
+    literal = plain(parts)
+    return parts if literal is None else literal
+
+
+def _list(value: list[Any], wanted: type | None) -> list[Any]:
+    if not value:
+        raise ValueRefused("a list without items has no type; it is not covered here.")
+    if not all(isinstance(item, _SIMPLE) for item in value):
+        raise ValueRefused("a list of bools, numbers or texts is expected.")
+    items = [_text(item) if isinstance(item, str) else item for item in value]
+    kinds = {type(item) for item in items if not isinstance(item, tuple)}
+    if len(kinds) > 1 or (wanted is not None and kinds not in (set(), {wanted})):
+        raise ValueRefused("a list of values of one type is expected.", "`1` is an integer, `1.0` a double.")
+    return items
+
+
+def settle(value: Value, perform: Callable[[Text], str]) -> Any:
+    """Do the substitutions of a value and convert what comes of them.
+
+    Raises:
+        ValueRefused: it cannot be converted.
+    """
+    content = value.content
+    if isinstance(content, tuple):
+        return _converted(perform(content), value.kind, value.is_list)
+    if not isinstance(content, list):
+        return content
+    items = [_converted(perform(item), value.kind, False) if isinstance(item, tuple) else item for item in content]
+    return _uniform(items)
+
+
+def read_as_yaml(text: str) -> Any:
+    """A parameter's text, read as YAML: a bool, a number, a text or a list of values of one type.
+
+    Raises:
+        ValueRefused: it is something else.
+    """
+    try:
+        value = student_yaml.load(text, "the value")
+    except student_yaml.StudentFileError:
+        raise ValueRefused(f"`{text[:60]}` is read as YAML, and it is not YAML.", _OWN_QUOTES) from None
+    if isinstance(value, list):
+        return _uniform(value)
+    if not isinstance(value, _SIMPLE):
+        raise ValueRefused(
+            f"`{text[:60]}` is read as YAML, which makes {_shown(value)} of it; a parameter is a bool, a number, a "
+            "text or a list of such.",
+            _OWN_QUOTES,
+        )
+    return value
+
+
+def _uniform(items: list[Any]) -> list[Any]:
+    if not items or len({type(item) for item in items}) != 1 or not isinstance(items[0], _SIMPLE):
+        raise ValueRefused(f"a list of values of one type is expected, not {_shown(items)}.")
+    return items
+
+
+def _converted(text: str, kind: type | None, is_list: bool) -> Any:
+    if kind is None:
+        return read_as_yaml(text)
+    if is_list or kind is bool:
+        value = read_as_yaml(text)
+        items = value if is_list else [value]
+        if not isinstance(items, list) or not all(isinstance(item, kind) for item in items):
+            raise ValueRefused(f"`{text[:60]}` is not {'a list' if is_list else 'a value'} of `{kind.__name__}`.")
+        return value
+    try:
+        return kind(text)
+    except ValueError:
+        raise ValueRefused(f"`{text[:60]}` is not of the type `{kind.__name__}`.") from None
+
+
+def _shown(value: Any) -> str:
+    return "nothing" if value is None else f"`{str(value)[:60]}`"
