@@ -191,7 +191,8 @@ def _seconds(value: Any, place: Place) -> float:
 
 def _no_respawn(value: Any, place: Place) -> None:
     if not isinstance(value, str) or value.strip().lower() not in ("false", "0"):
-        raise place.error("a program that ends is not started again here.", 'Leave it out, or write `"false"`.')
+        because = "starting a program again when it ends is not covered here."
+        raise place.error(because, 'Leave it out, or write `"false"`.')
 
 
 def _false(value: Any, place: Place) -> None:

@@ -118,7 +118,7 @@ def _value(call: Call, context: Context, folder: Path) -> str:
         case "equals" | "not-equals":
             if () in call.values:
                 raise ValueRefused(
-                    f"`{call.written}`: the empty text `''` does not mean an empty text there.",
+                    f"`{call.written}`: an empty text `''` means something else there and is not covered here.",
                     "Write `$(eval \"'$(var NAME)' == ''\")`.",
                 )
             return _word(_equal(said(0), said(1)) is (call.name == "equals"))
