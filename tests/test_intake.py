@@ -1,0 +1,190 @@
+"""What comes in from students, tried with attacks: each file in `attacks/intake` says what is tried and must hold."""
+
+from __future__ import annotations
+
+import copy
+import json
+import os
+import socket
+import stat
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import pytest
+import toy
+import yaml
+
+from autograder.grading.collect import collect
+from autograder.grading.job import Cell, Job
+from autograder.grading.worker import run_job
+from autograder.report.terminal import plain
+from autograder.results import Isolation, Status
+from autograder.submission.lab import grade_id_of, load_lab
+from autograder.submission.reader import read_submission
+
+CASES = {path.stem: yaml.safe_load(path.read_text(encoding="utf-8")) for path in
+         sorted((Path(__file__).parent / "attacks" / "intake").glob("*.yaml"))}  # fmt: skip
+
+
+def of_kind(kind: str) -> Any:
+    names = [name for name, case in CASES.items() if case["kind"] == kind]
+    return pytest.mark.parametrize("case", [CASES[name] for name in names], ids=names)
+
+
+def written_out(text: Any) -> str:
+    """A text, or its parts, some of them repeated."""
+    parts = [text] if isinstance(text, str) else text
+    return "".join(part if isinstance(part, str) else part["of"] * part["times"] for part in parts)
+
+
+def test_every_attack_says_what_is_tried_and_what_must_hold() -> None:
+    assert len(CASES) >= 60
+    for name, case in CASES.items():
+        assert {"kind", "tried", "must"} <= case.keys(), name
+        assert case["kind"] in ("folder", "zip", "notebook", "table", "markup") and name.startswith(case["kind"])
+
+
+def hold(case: dict[str, Any], source: Path, course: Path) -> None:
+    """Take a class in; what was taken and said must be as the case wants it, and nothing lies anywhere else."""
+    before = {path for path in course.parent.rglob("*") if not path.is_relative_to(course / "build")}
+    collected = collect(source, toy.LAB, course)
+    taken = {student: path.read_text(encoding="utf-8") for student, path in collected.notebooks.items()}
+    others = [text for student, text in sorted(taken.items()) if student not in case["taken"]]
+    assert {student: text for student, text in taken.items() if student in case["taken"]} == case["taken"]
+    if "most" in case:
+        assert max(map(len, others)) <= case["most"]
+    else:
+        assert others == case.get("others", [])
+    told = "\n".join(collected.refused)
+    for words in case["said"]:
+        assert words in told
+    assert bool(told) == bool(case["said"]) and len(told) < 3000 and plain(told) == told
+    after = {path for path in course.parent.rglob("*") if not path.is_relative_to(course / "build")}
+    assert after == before
+
+
+@of_kind("folder")
+def test_a_folder_of_submissions(case: dict[str, Any], tmp_path: Path) -> None:
+    course = toy.make_course(tmp_path / "course")
+    source = tmp_path / "class"
+
+    def place(name: str) -> Path:
+        path = source / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        return path
+
+    for name, text in case.get("files", {}).items():
+        place(name).write_text(text)
+    for name, target in case.get("links", {}).items():
+        place(name).symlink_to(target.replace("/COURSE", str(course)))
+    for name in case.get("fifos", []):
+        os.mkfifo(place(name))
+    for name in case.get("sockets", []):
+        bind(place(name))
+    for name in case.get("devices", []):
+        try:
+            os.mknod(place(name), stat.S_IFCHR | 0o666, os.makedev(1, 5))
+        except PermissionError:
+            pytest.skip("only root can make a device")
+    hold(case, source, course)
+
+
+def bind(path: Path) -> None:
+    here = Path.cwd()
+    os.chdir(path.parent)  # the address of a socket may only be short
+    try:
+        with socket.socket(socket.AF_UNIX) as bound:
+            bound.bind(path.name)
+    finally:
+        os.chdir(here)
+
+
+@of_kind("zip")
+def test_a_zip_of_submissions(case: dict[str, Any], tmp_path: Path) -> None:
+    source = tmp_path / "class.zip"
+    unmarked = raw = b""
+    with zipfile.ZipFile(source, "w", zipfile.ZIP_DEFLATED) as archive:
+        for member in case["members"]:
+            for _ in range(member.get("times", 1)):
+                info = zipfile.ZipInfo(written_out(member["name"]))
+                info.external_attr = member.get("mode", 0) << 16
+                with pytest.MonkeyPatch.context() as patch:
+                    patch.setattr("warnings.warn", lambda *_, **__: None)  # a name that is there already
+                    archive.writestr(info, written_out(member["content"]), zipfile.ZIP_DEFLATED)
+            unmarked = info.filename.encode() if member.get("unmarked") else unmarked
+            raw = member.get("raw_name", "").encode() or raw
+    content = source.read_bytes()
+    if raw:  # zipfile does not write what it has to read here
+        content = content.replace(b"eve/toy.ipynb", raw)
+    if unmarked:
+        content = without_mark(content, unmarked)
+    source.write_bytes(content)
+    hold(case, source, toy.make_course(tmp_path / "course"))
+
+
+def without_mark(content: bytes, name: bytes) -> bytes:
+    """Take away the mark that a name is in UTF-8, in the member's own header and in the directory's."""
+    made = bytearray(content)
+    for signature, flags, start in ((b"PK\x03\x04", 6, 30), (b"PK\x01\x02", 8, 46)):
+        at = content.index(signature)
+        while content[at + start : at + start + len(name)] != name:
+            at = content.index(signature, at + 1)
+        made[at + flags + 1] &= ~0x08
+    return bytes(made)
+
+
+@of_kind("notebook")
+def test_a_notebook(case: dict[str, Any], tmp_path: Path) -> None:
+    lab = load_lab(toy.make_course(tmp_path / "course"), toy.LAB)
+    if "content" in case:
+        content: Any = written_out(case["content"])
+    else:
+        answers = {answer.grade_id: answer.solution for answer in lab.answers.values()}
+        content = lab.clean_notebook(answers)["cells"]
+        for grade_id, change in copy.deepcopy(case["cells"]).items():
+            if "source" in change:
+                change["source"] = written_out(change["source"])
+            next(cell for cell in content if grade_id_of(cell) == grade_id).update(change)
+    submission = read_submission(toy.hand_in(tmp_path / "class", "ann", content), lab)
+    assert [problem.code for problem in submission.problems] == case["codes"]
+    assert submission.readable == ("content" not in case)
+    assert submission.files["helper.py"] == "print('given')\n"
+    json.dumps(submission.notebook, allow_nan=False)
+
+
+def test_tables_of_answers(tmp_path: Path) -> None:
+    """All in one run of the worker, one check each."""
+    cases = {name: case for name, case in CASES.items() if case["kind"] == "table"}
+    check = 'with answers("{0}.yaml") as table:\n    table.expect_answer("answer", 42)\ntable.score(2)'
+    job = Job(
+        student="ann", lab=toy.LAB, digest="", isolation=Isolation.NONE, seed=1,
+        files={f"{name}.yaml": written_out(case["text"]) for name, case in cases.items()},
+        cells=[
+            Cell(grade_id="setup", source="from autograder.checks import answers"),
+            *(Cell(grade_id=name, points=2, source=check.format(name)) for name in cases),
+        ],
+    )  # fmt: skip
+    results = {result.grade_id: result for result in run_job(job, tmp_path).checks}
+    assert results.keys() == cases.keys()
+    for name, case in cases.items():
+        assert (results[name].status, results[name].points) == (Status.FAILED, 0.0), name
+        failure = results[name].first_failure
+        assert failure is not None and len(failure.because) < 400
+        for words in (f"line {case['line']} of the cell" if "line" in case else "", *case["said"]):
+            assert words in failure.because, name
+
+
+@of_kind("markup")
+def test_markdown(case: dict[str, Any]) -> None:
+    from bs4 import BeautifulSoup
+    from nbconvert.filters import markdown2html
+
+    from autograder.grading.stages import inert
+
+    page = BeautifulSoup(markdown2html(inert(case["text"])), "html.parser")
+    assert {tag.name for tag in page.find_all()} <= {"p", "a", "code", "pre", "br", "em", "strong"}
+    for link in page.find_all("a"):
+        # Whatever is left as a link plainly leads to a web page, and somebody has to click on it.
+        assert link.attrs.keys() <= {"href", "class"} and str(link.get("href", "#"))[:4] in ("http", "#"), link
+    assert page.get_text().strip()
