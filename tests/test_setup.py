@@ -142,6 +142,14 @@ def test_a_second_run_does_nothing_and_takes_less_than_two_seconds(small: Path) 
     assert time.monotonic() - started < 2
 
 
+def test_nbgrader_finds_the_courses_configuration_from_every_folder(small: Path) -> None:
+    link = small / ".venv" / "etc" / "jupyter" / "nbgrader_config.py"
+    assert link.resolve() == small / "nbgrader_config.py"
+    link.unlink()  # as in an environment that was made before there was one
+    assert make(small, "setup").returncode == 0
+    assert link.resolve() == small / "nbgrader_config.py"
+
+
 def test_a_changed_lock_brings_the_environment_up_to_date(small: Path) -> None:
     write_lock(small, "requirements.lock", "uv", "annotated-doc")
     assert not imports(small, "annotated_doc")
