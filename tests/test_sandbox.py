@@ -241,6 +241,45 @@ def test_the_grading_sandbox_sees_the_kit_and_nothing_else_of_the_course() -> No
     assert "SHELL" not in seen
 
 
+@needs_full
+def test_links_to_the_interpreter_open_no_home(tmp_path: Path) -> None:
+    """As version managers lay Python out: the environment's `python` is a link to a link in a home, and so on."""
+    home = tmp_path / "home"
+    secrets = [home, home / "bin", home / ".local", home / ".local" / "share", home / "course" / "solutions"]
+    for folder in [*secrets, home / ".local" / "bin"]:
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / "canary.txt").write_text("hidden tests")
+    real = Path(sys.executable).resolve()
+    (home / ".local" / "bin" / "python3.x").symlink_to(real)
+    (home / "tools").symlink_to(".local")
+    (home / "bin" / "python3").symlink_to("../tools/bin/python3.x")
+    programs = tmp_path / "programs"
+    programs.mkdir()
+    environment = home / "course" / ".venv"
+    subprocess.run([sys.executable, "-m", "venv", "--without-pip", environment], check=True)
+    (environment / "bin" / "python").unlink()
+    (environment / "bin" / "python").symlink_to(home / "bin" / "python3")
+    look = (
+        "import os, sys\n"
+        "seen = [os.path.join(f, n) for f, _, names in os.walk('/') if not f.startswith('/proc') for n in names]\n"
+        "print('PYTHON', sys.executable, os.path.realpath(sys.executable))\n"
+        "print('CANARIES', [name for name in seen if name.endswith('canary.txt')])\n"
+    )
+    show = (
+        "import subprocess, sys\nfrom pathlib import Path\nfrom autograder.sandbox import bubblewrap\n"
+        "from autograder.sandbox.limits import Limits\n"
+        f"options = bubblewrap.inner_options(Path({str(programs)!r}), Limits(), {{}})\n"
+        f"line = [sys.executable, '-I', '-S', '-c', {look!r}]\n"
+        "print(bubblewrap.start_bwrap(options, line, stdout=1, stderr=1).wait())\n"
+    )
+    packages = os.pathsep.join([str(ROOT), *(path for path in sys.path if path.endswith("site-packages"))])
+    done = subprocess.run(
+        [environment / "bin" / "python", "-c", show], env={"PYTHONPATH": packages}, capture_output=True, text=True,
+        check=False,
+    )  # fmt: skip
+    assert done.stdout.splitlines() == [f"PYTHON {environment}/bin/python {real}", "CANARIES []", "0"], done
+
+
 @pytest.fixture(params=[Isolation.NONE, Isolation.REDUCED])
 def local(request: pytest.FixtureRequest, tmp_path: Path) -> NodeSandbox:
     """A node sandbox as in a student's kernel, and the reduced one."""

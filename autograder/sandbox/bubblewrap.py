@@ -8,7 +8,7 @@ import subprocess
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
-from autograder.sandbox.environment import HERE, SYSTEM_FILES, SYSTEM_FOLDERS, python_folders
+from autograder.sandbox.environment import HERE, SYSTEM_FILES, SYSTEM_FOLDERS, python_places
 from autograder.sandbox.limits import Limits
 
 PACKAGE = HERE.parent
@@ -55,21 +55,28 @@ def _read_only(paths: Iterable[Path]) -> list[str]:
     return [part for path in paths for part in ("--ro-bind", str(path), str(path))]
 
 
+def _python() -> list[str]:
+    places = python_places()
+    links = [part for link, target in places.links.items() for part in ("--symlink", target, str(link))]
+    return [*links, *_read_only(places.paths)]
+
+
 def _environment(variables: Mapping[str, str]) -> list[str]:
     return ["--clearenv", *(part for item in variables.items() for part in ("--setenv", *item))]
 
 
 def level_zero_options() -> list[str]:
     """For real root only: a private mount tree in which another user can reach this Python, wherever it lies."""
-    shown = [*python_folders(), PACKAGE]
-    above = {folder for path in [*shown, *map(Path, SYSTEM_FILES)] for folder in path.parents if folder != Path("/")}
+    places = python_places()
+    shown = [*places.paths, *places.links, PACKAGE, *map(Path, SYSTEM_FILES)]
+    above = {folder for path in shown for folder in path.parents if folder != Path("/")}
     # Made here, since bwrap makes the folders above a mount for its own user alone.
     open_folders = [part for folder in sorted(above) for part in ("--perms", "0755", "--dir", str(folder))]
     return [
         # Its own PID namespace ends as a whole. Without it, a bwrap of root's, which has given up its capabilities,
         # would not be allowed to take the other user's process with it.
         "--unshare-pid", "--die-with-parent", "--cap-drop", "ALL", "--cap-add", "CAP_SETUID", "--cap-add", "CAP_SETGID",
-        "--tmpfs", "/tmp", *open_folders, *system_options(), *_read_only(shown),
+        "--tmpfs", "/tmp", *open_folders, *system_options(), *_python(), *_read_only([PACKAGE]),
         # Not `--proc`: it covers parts of /proc, and then the kernel lets no user namespace mount a new one.
         "--bind", "/proc", "/proc", "--dev", "/dev", "--chdir", "/",
     ]  # fmt: skip
@@ -79,7 +86,7 @@ def outer_options(variables: Mapping[str, str]) -> list[str]:
     """The grading sandbox: trusted code, its own network, nothing of the course but this package."""
     return [
         *_NAMESPACES, "--unshare-net", *_LIFE, "--uid", "1000", "--gid", "1000",
-        "--perms", "1777", "--tmpfs", "/tmp", *system_options(), *_read_only([*python_folders(), PACKAGE]),
+        "--perms", "1777", "--tmpfs", "/tmp", *system_options(), *_python(), *_read_only([PACKAGE]),
         "--proc", "/proc", "--dev", "/dev", "--chdir", "/tmp", *_environment(variables),
     ]  # fmt: skip
 
@@ -100,7 +107,7 @@ def inner_options(folder: Path, limits: Limits, variables: Mapping[str, str]) ->
         *_NAMESPACES, "--cap-add", "CAP_SYS_ADMIN", "--cap-add", "CAP_SETPCAP", "--disable-userns",
         "--as-pid-1", *_LIFE,
         "--size", size, "--perms", "1777", "--tmpfs", "/tmp",
-        *system_options(), *_read_only(python_folders()), *kit, "--ro-bind", str(folder), STUDENT_FOLDER,
+        *system_options(), *_python(), *kit, "--ro-bind", str(folder), STUDENT_FOLDER,
         "--proc", "/proc", "--dev", "/dev", "--size", size, "--perms", "1777", "--tmpfs", "/dev/shm",
         "--remount-ro", "/dev", "--remount-ro", "/", "--chdir", STUDENT_FOLDER,
         *_environment(variables),

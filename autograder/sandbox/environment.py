@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import os
 import sys
+import sysconfig
 import tempfile
+from dataclasses import dataclass
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
@@ -53,24 +55,52 @@ def _library_folders() -> list[str]:
     return list(dict.fromkeys([str(path) for path in found] + [path for path in inherited if path]))
 
 
-def python_folders() -> list[Path]:
-    """Return the folders that hold this virtual environment and the Python below it, outermost first.
+@dataclass(frozen=True)
+class PythonPlaces:
+    """What of the disk this virtual environment and the Python below it consist of, and nothing beside them."""
 
-    A virtual environment's interpreter is a chain of links, often through a version manager's folders: each hop is
-    a path of its own that must exist in a sandbox.
+    paths: list[Path]
+    """Folders and files, without links on the way to them; none inside another."""
+    links: dict[Path, str]
+    """The links that lead to them, and what each says; those inside of `paths` left out."""
+
+
+def python_places() -> PythonPlaces:
+    """Return what a sandbox must show for this Python to start as it does here.
+
+    A virtual environment's interpreter is a chain of links, often through a version manager's folders or a home. What
+    lies beside a link is none of a program's business: the links are made anew, and only their ends are shown.
     """
-    folders = {Path(sys.prefix), Path(sys.base_prefix), Path(sys.base_prefix).resolve()}
-    hop = Path(sys.executable)
-    folders.add(hop.parent.parent)
-    while hop.is_symlink():
-        hop = hop.parent / hop.readlink()
-        folders.add(Path(os.path.normpath(hop)).parent.parent)
-    outside = {folder for folder in folders if not _is_system(folder)}
-    return sorted(outside, key=lambda folder: len(folder.parts))
+    prefix, base = Path(sys.prefix), Path(sys.base_prefix)
+    wanted = [prefix / name for name in ("pyvenv.cfg", "bin", "lib", "lib64", "share") if prefix != base]
+    wanted += [Path(sys.executable), Path(sysconfig.get_path("stdlib")), Path(sysconfig.get_path("platstdlib"))]
+    wanted += sorted(library for folder in ("lib", "lib64") for library in (base / folder).glob("*.so*"))
+    links: dict[Path, str] = {}
+    found = {_real(path, links) for path in wanted if path.exists()}
+    paths = [path for path in sorted(found) if not _is_system(path) and not found & set(path.parents)]
+    shown = set(paths)
+    outside = {link: target for link, target in links.items() if not _is_system(link) and not shown & set(link.parents)}
+    return PythonPlaces(paths, outside)
 
 
-def _is_system(folder: Path) -> bool:
-    return folder == Path("/") or folder.is_relative_to("/usr")
+def _real(path: Path, links: dict[Path, str]) -> Path:
+    """Follow a path name by name to where it really is, and note every link on the way."""
+    done, names = Path("/"), list(path.parts[1:])
+    while names:
+        name = names.pop(0)
+        here = done.parent if name == ".." else done / name
+        if not here.is_symlink():
+            done = here
+            continue
+        links[here] = str(here.readlink())
+        target = here.readlink()
+        names = [*target.parts[1 if target.is_absolute() else 0 :], *names]
+        done = Path("/") if target.is_absolute() else done
+    return done
+
+
+def _is_system(path: Path) -> bool:
+    return any(path.is_relative_to(folder) for folder in SYSTEM_FOLDERS)
 
 
 SYSTEM_FOLDERS = ("/usr", "/bin", "/sbin", "/lib", "/lib64", "/lib32")
