@@ -92,7 +92,7 @@ class Course:
 def course(tmp_path_factory: pytest.TempPathFactory) -> Any:
     """One course for the module, for a fresh gradebook takes seconds."""
     patch = pytest.MonkeyPatch()
-    patch.setattr(stage_a, "run_in_worker", lambda job: stage_a.believed(job, toy.judge(job)))
+    patch.setattr(stage_a, "run_in_worker", lambda job, _=None: stage_a.believed(job, toy.judge(job)))
     yield Course(tmp_path_factory.mktemp("nbgrader") / "course")
     patch.undo()
 

@@ -49,7 +49,7 @@ def test_only_a_worker_without_a_result_is_asked_again(
     notebook = toy.hand_in(tmp_path, "ann", lab.clean_notebook({"talker": "%%node talker\ndie\n"})["cells"])
     asked: list[Job] = []
 
-    def worker(job: Job) -> SubmissionResult:
+    def worker(job: Job, _: object) -> SubmissionResult:
         asked.append(job)
         return stage_a.believed(job, toy.judge(job)) if gives_a_result else stage_a.unknown(job, "It hung.", "")
 

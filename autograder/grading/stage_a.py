@@ -6,13 +6,12 @@ is checked against the lab before anyone believes it.
 
 from __future__ import annotations
 
-import multiprocessing
 import os
 import random
-import signal
+import threading
 import time
 from collections.abc import Callable, Mapping
-from concurrent.futures import FIRST_COMPLETED, Future, wait
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -75,7 +74,12 @@ def stored_result(
 
 
 def run_submission(
-    path: Path, student: str, lab: Lab, settings: Settings, keep_in: Path | None = None
+    path: Path,
+    student: str,
+    lab: Lab,
+    settings: Settings,
+    keep_in: Path | None = None,
+    stop: threading.Event | None = None,
 ) -> SubmissionResult:
     """Read one submission, run its checks in the sandbox, and return what came of it.
 
@@ -85,9 +89,11 @@ def run_submission(
         lab: that it answers.
         settings: how to run it.
         keep_in: file to keep the result in, and to take it from if nothing changed; None keeps nothing.
+        stop: when it is set, the run is ended.
 
     Raises:
         KitError: this machine cannot isolate programs as asked.
+        Stopped: by `stop`; nothing is kept.
     """
     began = time.monotonic()
     submission = read_submission(path, lab)
@@ -95,19 +101,21 @@ def run_submission(
         stored = stored_result(keep_in, submission.digest, settings.isolation, settings.seed)
         if stored is not None and not _to_be_repeated(stored):
             return stored
-    result = _run(submission, student, lab, settings)
+    result = _run(submission, student, lab, settings, stop)
     result.seconds["total"] = round(time.monotonic() - began, 3)
     if keep_in is not None:
         result.save(keep_in)
     return result
 
 
-def _run(submission: Submission, student: str, lab: Lab, settings: Settings) -> SubmissionResult:
+def _run(
+    submission: Submission, student: str, lab: Lab, settings: Settings, stop: threading.Event | None
+) -> SubmissionResult:
     job = _job(submission, student, lab, settings)
     if not submission.readable:
         return _all_checks(job, [_refused(submission.problems)] * len(lab.checks), points=0.0)
     for _ in range(ATTEMPTS):
-        result = run_in_worker(job)
+        result = run_in_worker(job, stop)
         if not _to_be_repeated(result):
             break
     return result
@@ -137,13 +145,13 @@ def _refused(problems: list[Outcome]) -> Outcome:
     return problem.model_copy(update={"title": "there is a notebook to check"})
 
 
-def run_in_worker(job: Job) -> SubmissionResult:
+def run_in_worker(job: Job, stop: threading.Event | None = None) -> SubmissionResult:
     """Run a job's checks in the sandbox. A worker that dies, hangs or talks nonsense means: could not find out."""
     from autograder.sandbox.outer import run_in_sandbox
 
     limit = _limit(len(_checks(job)))
     run = run_in_sandbox(
-        ["autograder.grading.worker"], job.model_dump_json().encode("utf-8"), job.isolation, time_limit=limit
+        ["autograder.grading.worker"], job.model_dump_json().encode("utf-8"), job.isolation, limit, stop
     )
     if run.timed_out:
         return unknown(job, f"The grader took longer than {limit:.0f} s.", run.stderr)
@@ -268,19 +276,14 @@ def _run_pool(
     results: dict[str, SubmissionResult],
     on_result: Callable[[SubmissionResult], None],
 ) -> None:
-    from pebble import ProcessPool
-
-    # No run is given up before the worker's own limit had its chance, each time.
-    limit = 60.0 + ATTEMPTS * _limit(len(lab.checks))
-    context = multiprocessing.get_context("forkserver")
-    context.set_forkserver_preload(["autograder.grading.stage_a", "autograder.sandbox.outer"])
-    pool = ProcessPool(
-        max_workers=min(settings.parallel, len(waiting)), context=context, initializer=_ignore_interrupts
-    )
+    # Threads will do: what takes time and may go wrong happens in the sandboxes, each a process tree of its own that
+    # ends with the thread that started it, however this process ends.
+    stop = threading.Event()
+    pool = ThreadPoolExecutor(min(settings.parallel, len(waiting)), thread_name_prefix="submission")
     try:
         futures = {
-            pool.schedule(
-                run_submission, args=[path, student, lab, settings, result_path(root, lab.name, student)], timeout=limit
+            pool.submit(
+                run_submission, path.absolute(), student, lab, settings, result_path(root, lab.name, student), stop
             ): student
             for student, path in waiting.items()
         }
@@ -291,16 +294,9 @@ def _run_pool(
                 student = futures[future]
                 results[student] = _result_of(future, student, waiting[student], root, lab, settings)
                 on_result(results[student])
-        pool.close()
     finally:
-        # Ends what still runs; each sandbox dies with the process that started it.
-        pool.stop()
-        pool.join()
-
-
-def _ignore_interrupts() -> None:
-    # A handler, not SIG_IGN: programs started from here begin with the default again, as a student's node must.
-    signal.signal(signal.SIGINT, lambda *_: None)
+        stop.set()
+        pool.shutdown(cancel_futures=True)
 
 
 def _result_of(

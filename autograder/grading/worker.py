@@ -9,8 +9,9 @@ from __future__ import annotations
 import ast
 import linecache
 import os
+import resource
+import signal
 import sys
-import tempfile
 import time
 import traceback
 from pathlib import Path
@@ -19,7 +20,19 @@ from typing import Any
 from autograder.checks import session
 from autograder.checks.session import Score
 from autograder.grading.job import Cell, Job
-from autograder.results import CheckResult, Outcome, Status, SubmissionResult
+from autograder.results import CheckResult, NodeLog, Outcome, Status, SubmissionResult
+from autograder.sandbox.limits import MIB
+from autograder.sandbox.scratch import Scratch
+
+MEMORY = 2048 * MIB
+"""Bytes that the worker may take for itself: what a student wrote may unfold in it, and then fails its own check."""
+CELL_SECONDS = 120.0
+"""Seconds after which a check cell is ended; all of them together have a limit too (`stage_a.SECONDS_PER_CHECK`)."""
+TEXT_KEPT = 8000
+"""Characters of one text in an outcome."""
+OUTCOMES_KEPT = 400
+LOGS_KEPT = 8 * MIB
+"""Characters of all programs' output together."""
 
 
 def run_job(job: Job, folder: Path) -> SubmissionResult:
@@ -56,6 +69,7 @@ def run_job(job: Job, folder: Path) -> SubmissionResult:
             result.checks.append(check)
             for log in session.current.logs + session.current.scored_logs:
                 result.logs.append(log.model_copy(update={"grade_id": cell.grade_id}))
+        result.logs = _within(result.logs, LOGS_KEPT)
     finally:
         session.current.close()
     result.seconds["checks"] = round(time.monotonic() - started, 3)
@@ -73,7 +87,39 @@ def _check_result(cell: Cell, value: object, error: str) -> CheckResult:
             Outcome(status=Status.UNKNOWN, title="The check itself broke", because=because, code="grader"),
         ]
         check = CheckResult(grade_id="", max_points=cell.points or 0.0, points=None, outcomes=outcomes)
-    return check.model_copy(update={"grade_id": cell.grade_id, "title": cell.title})
+    return _shortened(check.model_copy(update={"grade_id": cell.grade_id, "title": cell.title}))
+
+
+def _shortened(check: CheckResult) -> CheckResult:
+    """The result with texts of bounded length: some of them quote what a student's program sent."""
+    texts = ("title", "expected", "observed", "because", "hint")
+    outcomes = []
+    for outcome in check.outcomes[:OUTCOMES_KEPT]:
+        long = {name: text for name in texts if len(text := getattr(outcome, name)) > TEXT_KEPT}
+        short = {name: f"{text[: TEXT_KEPT // 2]} […] {text[-TEXT_KEPT // 2 :]}" for name, text in long.items()}
+        outcomes.append(outcome.model_copy(update=short))
+    return check.model_copy(update={"outcomes": outcomes})
+
+
+def _within(logs: list[NodeLog], characters: int) -> list[NodeLog]:
+    """The logs, the longest ones cut so that all together keep to a number of characters, each to a fair part of it."""
+    share, left = characters, characters
+    for place, length in enumerate(sorted(len(log.text) for log in logs)):
+        share = left // (len(logs) - place)
+        if length > share:
+            break
+        left -= length
+    half = share // 2
+    return [
+        log.model_copy(update={"text": f"{log.text[:half]}\n[...]\n{log.text[-half:]}", "truncated": True})
+        if len(log.text) > share
+        else log
+        for log in logs
+    ]
+
+
+def _out_of_time(*_: object) -> None:
+    raise TimeoutError(f"the check took longer than {CELL_SECONDS:.0f} s")
 
 
 def _run_cell(cell: Cell, number: int, namespace: dict[str, Any]) -> tuple[str, object]:
@@ -82,6 +128,8 @@ def _run_cell(cell: Cell, number: int, namespace: dict[str, Any]) -> tuple[str, 
     source = "\n".join("" if line.startswith("%") else line for line in cell.source.splitlines()) + "\n"
     filename = f"<check {number} {cell.grade_id}>"
     linecache.cache[filename] = (len(source), None, source.splitlines(keepends=True), filename)
+    signal.signal(signal.SIGALRM, _out_of_time)
+    signal.setitimer(signal.ITIMER_REAL, CELL_SECONDS, 5.0)  # again and again: something may swallow the first
     try:
         tree = ast.parse(source, filename)
         last = tree.body.pop() if tree.body and isinstance(tree.body[-1], ast.Expr) else None
@@ -92,6 +140,8 @@ def _run_cell(cell: Cell, number: int, namespace: dict[str, Any]) -> tuple[str, 
     except Exception as error:
         where = traceback.extract_tb(error.__traceback__)[-1]
         return f"{type(error).__name__}: {error} ({where.name}, line {where.lineno})", None
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
     return "", value
 
 
@@ -101,9 +151,13 @@ def main() -> int:
     out = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(2, 1)
     job = Job.model_validate_json(sys.stdin.buffer.read())
-    with tempfile.TemporaryDirectory(prefix="submission_") as folder:
-        Path(folder).chmod(0o755)
-        result = run_job(job, Path(folder))
+    _, hard = resource.getrlimit(resource.RLIMIT_DATA)
+    resource.setrlimit(resource.RLIMIT_DATA, (MEMORY if hard == resource.RLIM_INFINITY else min(MEMORY, hard), hard))
+    with Scratch() as scratch:
+        scratch.chmod(0o755)
+        folder = scratch / "submission"
+        folder.mkdir(mode=0o755)
+        result = run_job(job, folder)
     out.write(result.model_dump_json())
     out.close()
     return 0

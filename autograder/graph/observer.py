@@ -35,6 +35,11 @@ _LOOK_AFTER = 0.25
 _LONGEST = 3.0
 """How often its own length a wait may take on a busy machine."""
 
+RECORDED = 128 * 1024 * 1024
+"""Bytes of messages that one observer keeps; what comes later is let go by."""
+_EACH = 1024
+"""Bytes that a message takes besides its own, about."""
+
 OBSERVER_NAME = "grading_observer"
 
 
@@ -67,6 +72,7 @@ class Observer:
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self.node)
         self._recordings: dict[tuple[str, str], Recording] = {}
+        self._room = RECORDED
         self._thread = threading.Thread(target=self._spin, name="observer", daemon=True)
         self._thread.start()
 
@@ -91,6 +97,11 @@ class Observer:
         self._thread.join(timeout=5.0)
         self.node.destroy_node()
         self._context.try_shutdown()
+
+    def room_for(self, size: int) -> bool:
+        """Take room for one more message of `size` bytes; False if there is none left."""
+        self._room -= size + _EACH
+        return self._room >= 0
 
     def notify(self) -> None:
         """Wake whoever waits: something happened."""

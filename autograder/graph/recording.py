@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import time
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.qos import QoSDurabilityPolicy, QoSHistoryPolicy, QoSPolicyKind, QoSProfile, QoSReliabilityPolicy
+from rclpy.serialization import deserialize_message
 
 if TYPE_CHECKING:
     from autograder.graph.observer import Observer
@@ -37,7 +39,7 @@ class Received:
 
 
 class Recording:
-    """All messages of a topic since the observer subscribed, in the order of arrival."""
+    """All messages of a topic since the observer subscribed, in the order of arrival, while the observer has room."""
 
     def __init__(self, observer: Observer, topic: str, msg_type: type, qos: QoSProfile) -> None:
         """Subscribe; use `Observer.record`, which shares recordings."""
@@ -53,13 +55,18 @@ class Recording:
             topic,
             self._take,
             qos,
+            raw=True,
             event_callbacks=SubscriptionEventCallbacks(incompatible_qos=self._refused, use_default_callbacks=False),
         )
 
-    def _take(self, msg: Any, info: dict[str, int]) -> None:
-        self._messages.append(
-            Received(msg, time.monotonic(), info["source_timestamp"] * 1e-9, info["publication_sequence_number"])
-        )
+    def _take(self, data: bytes, info: dict[str, int]) -> None:
+        if not self._observer.room_for(len(data)):
+            return
+        with contextlib.suppress(Exception):  # whatever a program sends that is no such message
+            msg = deserialize_message(data, self.msg_type)
+            self._messages.append(
+                Received(msg, time.monotonic(), info["source_timestamp"] * 1e-9, info["publication_sequence_number"])
+            )
         self._observer.notify()
 
     def _refused(self, event: Any) -> None:

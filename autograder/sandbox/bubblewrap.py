@@ -161,6 +161,7 @@ def rlimits(limits: Limits) -> dict[str, int]:
     """Return the limits of one program by the names of the `resource` module."""
     return {
         "RLIMIT_AS": limits.address_space,
+        "RLIMIT_DATA": limits.address_space,  # the worker's own, which its children inherit, is another
         "RLIMIT_NPROC": limits.processes,
         "RLIMIT_NOFILE": limits.open_files,
         "RLIMIT_FSIZE": limits.file_size,

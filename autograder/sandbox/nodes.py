@@ -7,10 +7,8 @@ which is never forked: it has threads.
 from __future__ import annotations
 
 import contextlib
-import fcntl
 import json
 import os
-import shutil
 import socket
 import subprocess
 import sys
@@ -26,12 +24,12 @@ from autograder.sandbox.group import GroupLost, ProgramGroup
 from autograder.sandbox.limits import Limits
 from autograder.sandbox.loop import Loop
 from autograder.sandbox.program import Program
+from autograder.sandbox.scratch import Scratch
 
 __all__ = ["Limits", "NodeSandbox", "Program", "ProgramGroup"]
 
 _READY = 30.0
 """Seconds that a launcher may take to load rclpy on a machine that is busy."""
-_PREFIX = "autograder-nodes-"
 _END = 2.0
 """Seconds that a launcher may take to end what is below it, where no PID namespace does."""
 
@@ -60,7 +58,7 @@ class NodeSandbox:
         self._said = -1
         """What the launcher writes on its standard error."""
         self._closed = False
-        self._scratch = None if isolation is Isolation.FULL else _Scratch()
+        self._scratch = None if isolation is Isolation.FULL else Scratch()
         # bwrap ends with the thread that started it, so this one thread starts it, and lives as long as the sandbox.
         self._loop = Loop(self._busy, self._look)
         try:
@@ -206,33 +204,3 @@ class NodeSandbox:
     def _look(self) -> None:
         for group in self._groups:
             group.watch()
-
-
-class _Scratch:
-    """A folder of this process's own for programs that have no /tmp of their own; gone with the process at the latest.
-
-    A lock shows that its process lives: whoever makes one removes those of processes that were killed.
-    """
-
-    def __init__(self) -> None:
-        for old in Path(tempfile.gettempdir()).glob(f"{_PREFIX}*"):
-            with contextlib.suppress(OSError):
-                held = os.open(old, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW | os.O_CLOEXEC)
-                try:
-                    fcntl.flock(held, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                    shutil.rmtree(old, ignore_errors=True)
-                finally:
-                    os.close(held)
-        self.folder = Path()
-        while not self.folder.name:  # another process may have taken it for an abandoned one, before it was locked
-            made = Path(tempfile.mkdtemp(prefix=_PREFIX))
-            self._held = os.open(made, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
-            fcntl.flock(self._held, fcntl.LOCK_EX)
-            if made.is_dir():
-                self.folder = made
-            else:
-                os.close(self._held)
-
-    def remove(self) -> None:
-        shutil.rmtree(self.folder, ignore_errors=True)
-        os.close(self._held)

@@ -9,6 +9,7 @@ import os
 import selectors
 import subprocess
 import sys
+import threading
 import time
 from dataclasses import dataclass
 
@@ -20,6 +21,8 @@ from autograder.sandbox.limits import MIB
 OUTPUT_LIMIT = 64 * MIB
 """Bytes of stdout after which the run is ended."""
 STDERR_KEPT = MIB
+_STOP_POLL = 0.2
+"""Seconds between two looks at whether a run is to be stopped."""
 
 DROPPED_ID = 61771
 """The user and group that root becomes for grading: one that owns nothing."""
@@ -47,7 +50,17 @@ class OuterRun:
     timed_out: bool
 
 
-def run_in_sandbox(module_args: list[str], stdin: bytes, isolation: Isolation, time_limit: float) -> OuterRun:
+class Stopped(Exception):
+    """A run was ended because nobody wants its result any more."""
+
+
+def run_in_sandbox(
+    module_args: list[str],
+    stdin: bytes,
+    isolation: Isolation,
+    time_limit: float,
+    stop: threading.Event | None = None,
+) -> OuterRun:
     """Run `python -m <module_args…>` in the grading sandbox and wait for it.
 
     The module sees this virtual environment, the `autograder` package and an empty /tmp; no labs, no submissions, no
@@ -58,13 +71,17 @@ def run_in_sandbox(module_args: list[str], stdin: bytes, isolation: Isolation, t
         stdin: what it reads.
         isolation: as `isolation.choose` returned it.
         time_limit: seconds after which everything in the sandbox is ended.
+        stop: everything in it is ended soon after this is set.
 
     Raises:
         OSError: the sandbox cannot be started at all.
+        Stopped: by `stop`.
     """
+    if stop is not None and stop.is_set():
+        raise Stopped
     process = start_in_sandbox(module_args, isolation)
     try:
-        return _exchange(process, stdin, time_limit)
+        return _exchange(process, stdin, time_limit, stop or threading.Event())
     finally:
         with contextlib.suppress(ProcessLookupError):
             process.kill()
@@ -101,13 +118,21 @@ def start_in_sandbox(module_args: list[str], isolation: Isolation) -> subprocess
     )
 
 
-@functools.cache
 def _compile_package() -> None:
+    with _compiling:  # the threads of a class come here all at once
+        _compile_package_once()
+
+
+_compiling = threading.Lock()
+
+
+@functools.cache
+def _compile_package_once() -> None:
     """Keep the package's bytecode up to date: a sandbox cannot write it, and would compile everything each time."""
     compileall.compile_dir(bubblewrap.PACKAGE, quiet=2)  # where it may not write either, it goes on
 
 
-def _exchange(process: subprocess.Popen[bytes], stdin: bytes, time_limit: float) -> OuterRun:
+def _exchange(process: subprocess.Popen[bytes], stdin: bytes, time_limit: float, stop: threading.Event) -> OuterRun:
     assert process.stdin is not None and process.stdout is not None and process.stderr is not None
     deadline = time.monotonic() + time_limit
     taken: dict[str, bytearray] = {"stdout": bytearray(), "stderr": bytearray()}
@@ -125,7 +150,9 @@ def _exchange(process: subprocess.Popen[bytes], stdin: bytes, time_limit: float)
                 timed_out = left <= 0
                 process.kill()
                 break
-            for key, _ in selector.select(left):
+            if stop.is_set():
+                raise Stopped
+            for key, _ in selector.select(min(left, _STOP_POLL)):
                 name, stream = key.data
                 if name == "stdin":
                     try:
