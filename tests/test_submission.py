@@ -22,7 +22,7 @@ from autograder.errors import KitError
 from autograder.grading.collect import collect
 from autograder.submission.lab import Lab, grade_id_of, load_lab
 from autograder.submission.magics import BadNameError, parse
-from autograder.submission.reader import NOTEBOOK_BYTES, Submission, read_submission
+from autograder.submission.reader import NOTEBOOK_BYTES, OWN_FILES, Submission, read_submission
 
 ROOT = Path(__file__).resolve().parent.parent
 ORDINARY_USER = 12345
@@ -94,7 +94,7 @@ def test_the_lab_knows_its_cells(lab: Lab) -> None:
         ("check_talker", "The talker", 3),
         ("check_answers", "The table", 2),
     ]
-    assert lab.given == {"helper.py": "print('given')\n"}
+    assert lab.given == {"helper.py": "# %%node helper\nprint('given')\n"}
     assert list(lab.answers) == ["talker", "answers", "why"]
     assert (lab.max_points, lab.max_manual_points) == (5, 4)
     assert "secret" in lab.checks[0].source
@@ -118,9 +118,71 @@ def test_without_solutions_the_released_lab_serves(lab: Lab, tmp_path: Path) -> 
 def test_answers_become_files(lab: Lab, tmp_path: Path) -> None:
     submission = read(lab, tmp_path, solved(lab, talker="%%node talker\r\nprint(1)\r\n"))
     assert codes(submission) == []
-    assert submission.files["talker.py"] == "print(1)\n"
+    assert submission.files["talker.py"] == "# %%node talker\nprint(1)\n"
     assert submission.files["answers.yaml"] == "answer: 42\n"
-    assert submission.files["helper.py"] == "print('given')\n"
+    assert submission.files["helper.py"] == "# %%node helper\nprint('given')\n"
+
+
+def plain_cell(source: str) -> dict[str, Any]:
+    return toy.cell("code", source, 99)
+
+
+def test_a_programs_lines_have_the_numbers_of_its_cell() -> None:
+    source = "\n%%node talker\nimport time\nraise ValueError\n"
+    file = parse(source)
+    assert file is not None
+    assert file.text.splitlines()[2:] == source.splitlines()[2:]
+    assert file.text.splitlines()[1] == "# %%node talker"
+
+
+def test_modules_and_files_of_the_students_own_are_taken_along(lab: Lab, tmp_path: Path) -> None:
+    cells = solved(lab, talker="%%node talker\nimport my_base")
+    cells += [plain_cell("%%node my_base\nNAME = 1"), plain_cell("%%file mine.yaml\na: 1"), plain_cell("x = 1")]
+    submission = read(lab, tmp_path, cells)
+    assert codes(submission) == []
+    assert submission.files["my_base.py"] == "# %%node my_base\nNAME = 1\n"
+    assert submission.files["mine.yaml"] == "a: 1\n"
+    cells[-3]["source"] = "%%node my_base\nNAME = 2"
+    assert read(lab, tmp_path, cells).digest != submission.digest
+
+
+def test_a_copied_answer_cell_with_another_name_is_a_file_of_the_students_own(lab: Lab, tmp_path: Path) -> None:
+    cells = solved(lab)
+    answer = by_id(cells, "talker")
+    copied = copy.deepcopy(answer) | {"source": "%%node my_base\nNAME = 1", "id": "copied"}
+    submission = read(lab, tmp_path, [*cells, copied])
+    assert codes(submission) == []
+    assert submission.sources["talker"] == answer["source"]
+    assert "my_base.py" in submission.files
+
+
+@pytest.mark.parametrize(
+    ("source", "code", "said"),
+    [
+        ("%%node talker\nprint('better')", "ignored-cell", "what counts is the cell for this answer, `talker`"),
+        ("%%node helper\nprint('mine')", "ignored-cell", "helper.py belongs to the lab"),
+        ("%%node rclpy\nx = 1", "bad-file-name", "the name of an installed module"),
+        ("%%node json\nx = 1", "bad-file-name", "the name of an installed module"),
+    ],
+)
+def test_a_cell_that_grading_ignores_is_named(lab: Lab, tmp_path: Path, source: str, code: str, said: str) -> None:
+    plain = read(lab, tmp_path, solved(lab))
+    submission = read(lab, tmp_path, [*solved(lab), plain_cell(source)])
+    assert codes(submission) == [code]
+    assert said in submission.problems[0].because
+    assert submission.files == plain.files
+
+
+def test_a_cell_that_says_the_same_again_is_no_problem(lab: Lab, tmp_path: Path) -> None:
+    cells = solved(lab)
+    assert codes(read(lab, tmp_path, [*cells, plain_cell(by_id(cells, "talker")["source"])])) == []
+
+
+def test_files_of_the_students_own_have_a_limit(lab: Lab, tmp_path: Path) -> None:
+    cells = [*solved(lab), *(plain_cell(f"%%node mine{number}\n") for number in range(OWN_FILES + 1))]
+    submission = read(lab, tmp_path, cells)
+    assert codes(submission) == ["too-many-files"]
+    assert len(submission.files) == 3 + OWN_FILES
 
 
 def test_sources_may_be_lists_of_lines(lab: Lab, tmp_path: Path) -> None:
@@ -187,7 +249,7 @@ def test_the_labs_own_source_is_a_notebook_without_defects(lab: Lab, tmp_path: P
 
 def test_a_given_program_cannot_be_replaced(lab: Lab, tmp_path: Path) -> None:
     submission = read(lab, tmp_path, solved(lab, talker="%%node helper\nprint('mine')"))
-    assert submission.files["helper.py"] == "print('given')\n"
+    assert submission.files["helper.py"] == "# %%node helper\nprint('given')\n"
 
 
 @pytest.mark.parametrize(
@@ -223,7 +285,7 @@ def test_a_link_or_a_fifo_is_not_read(lab: Lab, tmp_path: Path) -> None:
 def test_half_characters_are_replaced(lab: Lab, tmp_path: Path) -> None:
     text = json.dumps(toy.notebook(solved(lab, talker="%%node talker\nprint('X')"))).replace("'X'", "'\\ud800'")
     submission = read(lab, tmp_path, text)
-    assert submission.files["talker.py"] == "print('?')\n"
+    assert submission.files["talker.py"] == "# %%node talker\nprint('?')\n"
 
 
 def test_the_digest_follows_the_answers_and_the_lab(lab: Lab, tmp_path: Path) -> None:

@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import re
+import sys
+import sysconfig
 from dataclasses import dataclass
+from functools import cache
+from importlib.machinery import PathFinder
 
 CELL_BYTES = 64 * 1024
 """The largest answer cell that is read, in bytes of UTF-8."""
@@ -28,7 +32,8 @@ class CellFile:
     name: str
     """The name as it stands in the cell."""
     text: str
-    """The file's text: everything below the first line."""
+    """The file's text. A program begins with the cell's first line as a comment, so that its lines have the numbers
+    that JupyterLab shows; of another file, which may have no comments, that line is left out."""
 
     @property
     def file_name(self) -> str:
@@ -59,6 +64,27 @@ def check_name(magic: str, name: str) -> None:
         )
 
 
+@cache
+def names_installed_module(name: str) -> bool:
+    """Whether a program of this name would stand before a module of Python's or of an installed package."""
+    folders = {sysconfig.get_path(kind) for kind in ("stdlib", "platstdlib", "purelib", "platlib")}
+    spec = PathFinder.find_spec(name, sorted(folders))
+    return name in sys.stdlib_module_names or (spec is not None and spec.origin is not None)
+
+
+def check_free(file: CellFile) -> None:
+    """Refuse a program that would hide a module which it, or another program, may want to import.
+
+    Raises:
+        BadNameError: with the reason.
+    """
+    if file.magic == "node" and names_installed_module(file.name):
+        raise BadNameError(
+            f"`{file.name}` is the name of an installed module: a program of this name would hide it from every"
+            f" `import {file.name}`. Choose another name."
+        )
+
+
 def parse(source: str) -> CellFile | None:
     """Read a cell's first line; None if the cell names no file.
 
@@ -66,12 +92,12 @@ def parse(source: str) -> CellFile | None:
         BadNameError: it wants to name a file, but not with a name that is allowed.
     """
     lines = source.replace("\r\n", "\n").split("\n")
-    while lines and not lines[0].strip():
-        lines.pop(0)
-    match = re.fullmatch(r"%%(node|file)(?:\s+(.*?))?\s*", lines[0]) if lines else None
+    above = next((number for number, line in enumerate(lines) if line.strip()), len(lines))
+    match = re.fullmatch(r"%%(node|file)(?:\s+(.*?))?\s*", lines[above]) if above < len(lines) else None
     if match is None:
         return None
     magic, name = match.group(1), match.group(2) or ""
     check_name(magic, name)
-    text = "\n".join(lines[1:])
+    first = [f"# %%node {name}"] if magic == "node" else []
+    text = "\n".join([""] * above + first + lines[above + 1 :])
     return CellFile(magic, name, text if text.endswith("\n") or not text else text + "\n")

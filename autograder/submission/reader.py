@@ -1,7 +1,8 @@
 """Reads what a student handed in, as text: nothing of it is executed, imported or unpickled here.
 
-Only the source of the answer cells counts, found by grade_id. Whatever else is wrong with the notebook becomes a named
-outcome, so that one broken submission never stops a class.
+The source of the answer cells counts, found by grade_id, and what a student's own `%%node` and `%%file` cells hold: the
+modules and files that the answers use. Whatever is wrong with the notebook becomes a named outcome, so that one broken
+submission never stops a class.
 """
 
 from __future__ import annotations
@@ -16,11 +17,13 @@ from typing import Any
 from autograder.errors import KitError
 from autograder.files import read_plain
 from autograder.results import Outcome, Status
-from autograder.submission.lab import Lab, grade_id_of, lab_names, load_lab, nbgrader_of, source_of
-from autograder.submission.magics import CELL_BYTES, BadNameError, parse
+from autograder.submission.lab import Answer, Lab, grade_id_of, lab_names, load_lab, nbgrader_of, source_of
+from autograder.submission.magics import CELL_BYTES, BadNameError, CellFile, check_free, parse
 
 NOTEBOOK_BYTES = 8 * 1024 * 1024
 """The largest notebook that is read, in bytes."""
+OWN_FILES = 50
+"""As many files of cells that a student added are taken along; a program and its modules need a few."""
 
 
 @dataclass
@@ -30,7 +33,7 @@ class Submission:
     sources: dict[str, str] = field(default_factory=dict)
     """The source of every answer cell by grade_id; what students receive where there was no usable answer."""
     files: dict[str, str] = field(default_factory=dict)
-    """File name to text: the programs and files that cells name, the lab's own included."""
+    """File name to text: the programs and files that cells name, the lab's own and the student's own included."""
     problems: list[Outcome] = field(default_factory=list)
     digest: str = ""
     """SHA-256 over the answers, the lab and the kit: it changes when any of them does."""
@@ -49,14 +52,17 @@ class _UnreadableError(Exception):
 def read_submission(path: Path, lab: Lab) -> Submission:
     """Read a submitted notebook; every defect of it ends up in `problems`, none is raised."""
     submission = Submission(sources={answer.grade_id: answer.blank for answer in lab.answers.values()})
+    cells: list[dict[str, Any]] = []
     try:
-        _take_answers(_cells(_bytes(path)), lab, submission)
+        cells = _cells(_bytes(path))
+        _take_answers(cells, lab, submission)
     except _UnreadableError as error:
         submission.problems.append(error.problem)
         submission.readable = False
     _take_files(lab, submission)
+    own = _take_own_files(cells, lab, submission) if submission.readable else {}
     problems = [[problem.code, problem.because] for problem in submission.problems]
-    parts = [lab.digest, problems, list(submission.sources.items())]
+    parts = [lab.digest, problems, list(submission.sources.items()), sorted(own.items())]
     submission.digest = hashlib.sha256(json.dumps(parts).encode()).hexdigest()
     submission.notebook = lab.clean_notebook(submission.sources)
     return submission
@@ -150,6 +156,9 @@ def _take_cell(
     grade_id: str, original: dict[str, Any], copies: list[dict[str, Any]], lab: Lab, submission: Submission
 ) -> None:
     answer = lab.answers.get(grade_id)
+    if answer is not None:
+        # A copy that was given another name is a file of the student's own.
+        copies = [cell for cell in copies if _names(cell, answer)] or copies
     if len(copies) > 1:
         which = "the last one counts" if answer else "none of them is run; the lab's own cell is"
         submission.problems.append(
@@ -245,6 +254,12 @@ def _take_files(lab: Lab, submission: Submission) -> None:
             because = f"`{file.file_name}` belongs to the lab and cannot be replaced."
             submission.problems.append(_problem("given-file", title, because, f"Begin the cell with `{wanted}`."))
             continue
+        try:
+            if file.file_name != answer.file.file_name:
+                check_free(file)
+        except BadNameError as error:
+            submission.problems.append(_problem("bad-file-name", title, str(error), f"Begin the cell with `{wanted}`."))
+            continue
         if file.file_name != answer.file.file_name:
             because = f"The cell `{grade_id}` names {file.file_name}; the lab asks for {answer.file.file_name}."
             submission.problems.append(_problem("renamed-file", title, because, f"Begin the cell with `{wanted}`."))
@@ -256,6 +271,70 @@ def _take_files(lab: Lab, submission: Submission) -> None:
         owners[file.file_name] = grade_id
         submission.files[file.file_name] = file.text
     submission.files.update(lab.given)
+
+
+def _named(cell: dict[str, Any]) -> CellFile | None:
+    """Return the file that a code cell names, if it does so in a way that the notebook's magics accept."""
+    if cell.get("cell_type") != "code":
+        return None
+    try:
+        source = source_of(cell)
+        return None if len(source.encode("utf-8")) > CELL_BYTES else parse(source)
+    except ValueError:  # BadNameError is one: in the notebook, too, such a cell wrote nothing
+        return None
+
+
+def _names(cell: dict[str, Any], answer: Answer) -> bool:
+    """Whether a copy of an answer cell still names the answer's file."""
+    file = _named(cell)
+    return answer.file is None or (file is not None and file.file_name == answer.file.file_name)
+
+
+def _take_own_files(cells: list[dict[str, Any]], lab: Lab, submission: Submission) -> dict[str, str]:
+    """Take along what cells of the student's own hold, as in the notebook; an answer's name belongs to its own cell."""
+    answers = {answer.file.file_name: answer.grade_id for answer in lab.answers.values() if answer.file is not None}
+    taken = dict(submission.files)
+    own: dict[str, str] = {}
+    for cell in cells:
+        file = _named(cell)
+        if file is None or taken.get(file.file_name) == file.text:
+            continue
+        if file.file_name in taken or file.file_name in answers:
+            # Cells with a grading mark have been looked at: as copies, as forged ones, as answers.
+            if not grade_id_of(cell):
+                submission.problems.append(_ignored(file, answers.get(file.file_name, ""), lab, submission))
+            continue
+        try:
+            check_free(file)
+        except BadNameError as error:
+            submission.problems.append(
+                _problem(
+                    "bad-file-name", f"`%%{file.magic} {file.name}` can be a file", f"{error} The cell is ignored."
+                )
+            )
+            continue
+        own[file.file_name] = file.text
+    if len(own) > OWN_FILES:
+        because = f"There are {len(own)} cells of your own that name files; the first {OWN_FILES} are taken along."
+        submission.problems.append(_problem("too-many-files", "the notebook's files are few", because))
+        own = dict(list(own.items())[:OWN_FILES])
+    submission.files.update(own)
+    return own
+
+
+def _ignored(file: CellFile, answer: str, lab: Lab, submission: Submission) -> Outcome:
+    """What to say of a cell of the student's own with a name that belongs to an answer or to the lab."""
+    first, title = f"%%{file.magic} {file.name}", f"one cell names {file.file_name}"
+    hint = "Delete the other cell, or give its file another name."
+    if not answer:
+        because = f"Another cell also begins with `{first}`. It is ignored: {file.file_name} belongs to the lab."
+        return _problem("ignored-cell", title, because, hint)
+    blank = ", still as you received it" if submission.sources[answer] == lab.answers[answer].blank else ""
+    because = (
+        f"Another cell also begins with `{first}`. It is ignored: what counts is the cell for this answer, `{answer}`,"
+        f" as it stands{blank}."
+    )
+    return _problem("ignored-cell", title, because, f"Move what is to be graded into the cell `{answer}`. {hint}")
 
 
 def grade_ids_in(path: Path) -> set[str]:
