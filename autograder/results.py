@@ -87,6 +87,9 @@ class CheckResult(_Model):
     more_at_grading: bool = False
     """Hidden tests were taken out of this copy of the check: what is passed here is not yet earned."""
 
+    not_attempted: list[str] = Field(default_factory=list)
+    """Files of answer cells that are still as students receive them; for this the check did not pass."""
+
     @property
     def sure_points(self) -> float | None:
         """Points that grading will give as well, whatever its hidden tests find; None: nobody could find out."""
@@ -107,7 +110,7 @@ class CheckResult(_Model):
         statuses = {outcome.status for outcome in self.outcomes}
         if self.points is None or Status.UNKNOWN in statuses:
             return Status.UNKNOWN
-        return Status.FAILED if statuses - {Status.PASSED} else Status.PASSED
+        return Status.FAILED if self.not_attempted or statuses - {Status.PASSED} else Status.PASSED
 
     @property
     def first_failure(self) -> Outcome | None:

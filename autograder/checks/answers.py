@@ -32,9 +32,7 @@ class Answers:
         return self
 
     def __exit__(self, kind: object, error: BaseException | None, trace: object) -> bool:
-        if error is not None and not isinstance(error, outcomes.CheckEnded) and isinstance(error, Exception):
-            outcomes.unknown("The check itself broke", f"{type(error).__name__}: {error}")
-        return error is None or isinstance(error, Exception)
+        return outcomes.ends_block(error)
 
     def _read(self) -> None:
         """The file exists and is a table; fails the check if not."""
@@ -42,7 +40,7 @@ class Answers:
             return
         title = f"`{self.file}` is a table of answers"
         try:
-            table = student_yaml.read(session.current.folder / self.file)
+            table = student_yaml.read(session.current.use(self.file))
         except student_yaml.StudentFileError as error:
             hint = error.hint or "Write one line for each question: `question: answer`."
             outcomes.failed(title, because=error.because, hint=hint, code=error.code)

@@ -60,7 +60,7 @@ class CommandLine:
 
     def _text(self) -> str:
         try:
-            table = student_yaml.read(session.current.folder / self.file)
+            table = student_yaml.read(session.current.use(self.file))
         except student_yaml.StudentFileError as error:
             raise CommandLineError(error.because, error.code, error.hint or "Write `entry: words`.") from None
         text = table.get(self.entry) if isinstance(table, dict) else None

@@ -24,6 +24,7 @@ from autograder.checks.expect_services import ServiceExpectations
 from autograder.checks.parts import part
 from autograder.checks.scoring import score
 from autograder.checks.session import Score
+from autograder.checks.watch import MissingProgramError, Watch, watched
 from autograder.graph import remap_rules
 from autograder.graph.diagnosis import Diagnosis
 from autograder.graph.observer import Observer
@@ -94,6 +95,7 @@ def _yaml_value(value: Any) -> str:
     return yaml.safe_dump(value, default_flow_style=True, width=10_000).splitlines()[0]
 
 
+@watched
 class Launch(MessageExpectations, ServiceExpectations, LifecycleExpectations, ProgramExpectations):
     """A running launch: `ros` in a check cell."""
 
@@ -115,13 +117,19 @@ class Launch(MessageExpectations, ServiceExpectations, LifecycleExpectations, Pr
         self._missing: list[str] = []
         self._trouble: list[Diagnosis] = []
         self._group: ProgramGroup | None = None
+        self.watch: Watch | None = None
 
     def __enter__(self) -> Launch:
+        here = session.current.kernel
+        if here is not None:
+            here.ready()
         self.domain_id = session.current.next_domain()
         # The middleware reads its profile once, before the first participant of the process.
         os.environ.update(profile_environment())
         os.environ.pop("ROS_AUTOMATIC_DISCOVERY_RANGE", None)
         self.observer = Observer(self.domain_id)
+        if here is not None:
+            self.watch = Watch(here, self.observer, lambda: [program for _, program in self.programs])
         self.prepare()
         try:
             self._group = session.current.sandbox.group()
@@ -150,6 +158,7 @@ class Launch(MessageExpectations, ServiceExpectations, LifecycleExpectations, Pr
             return folder
 
         folder = session.current.folder.resolve()
+        session.current.use(name)
         try:
             found = read_launch_file(folder / name, arguments, find)
         except LaunchFileError as error:
@@ -183,8 +192,11 @@ class Launch(MessageExpectations, ServiceExpectations, LifecycleExpectations, Pr
             node: a program's name, or a `Node` with arguments.
         """
         launched = Node(node) if isinstance(node, str) else node
-        if not (session.current.folder / f"{launched.program}.py").is_file():
-            self._missing.append(launched.program)
+        session.current.use(f"{launched.program}.py")
+        if launched.params_file:
+            session.current.use(launched.params_file)
+        if not session.current.has(f"{launched.program}.py"):
+            self._miss(launched.program)
             return
         environment = {**launched.environment, **profile_environment(), "ROS_DOMAIN_ID": str(self.domain_id)}
         try:
@@ -196,14 +208,24 @@ class Launch(MessageExpectations, ServiceExpectations, LifecycleExpectations, Pr
         program = self._group.start(launched.program, words, environment, cores=launched.cores)
         self.programs.append((launched, program))
 
+    def _miss(self, program: str) -> None:
+        """No cell has written this program."""
+        here = session.current.kernel
+        if here is None:
+            self._missing.append(program)
+            return
+        because, hint = here.why_missing("node", program)
+        if not here.scored:  # a cell that only listens would never say so
+            raise MissingProgramError(because, hint)
+        self._trouble.append(Diagnosis(because, "program-missing", hint))
+
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> bool:
-        if error is not None and not isinstance(error, outcomes.CheckEnded) and isinstance(error, Exception):
-            # A check that breaks says nothing about the student: the instructor decides.
-            outcomes.unknown("The check itself broke", f"{type(error).__name__}: {error}")
-        self._end()
-        return error is None or isinstance(error, Exception)
+        try:
+            return outcomes.ends_block(error)
+        finally:
+            self._end()
 
     def part(self, title: str) -> AbstractContextManager[None]:
         """A block whose expectations give points of their own; see `autograder.checks.parts`."""
@@ -217,6 +239,8 @@ class Launch(MessageExpectations, ServiceExpectations, LifecycleExpectations, Pr
         try:
             if self._group is not None:
                 self._group.end()
+            if self.watch is not None:
+                self.watch.close()
         finally:
             self.observer.close()
             remove_written(session.current.folder)

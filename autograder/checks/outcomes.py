@@ -26,6 +26,20 @@ class LaunchEnded(CheckEnded):
     """The launch, or the table, failed as a whole: none of its parts is worth anything."""
 
 
+def ends_block(error: BaseException | None) -> bool:
+    """What becomes of an exception that leaves a launch or a table: whether Python is to forget it.
+
+    A check that breaks at grading says nothing about the student: the instructor decides. In a notebook the error is
+    the student's to see.
+    """
+    if error is None or isinstance(error, CheckEnded):
+        return True
+    if session.current.kernel is not None or not isinstance(error, Exception):
+        return False
+    unknown("The check itself broke", f"{type(error).__name__}: {error}")
+    return True
+
+
 def passed(title: str, *, expected: str = "", observed: str = "") -> None:
     """Record that an expectation holds."""
     _record(Outcome(status=Status.PASSED, title=title, expected=expected, observed=observed))

@@ -20,6 +20,8 @@ def score(points: float | Mapping[str, float]) -> Score:
         ValueError: an expectation names a part that has no points here.
     """
     more = outcomes.parts_with_more_at_grading()
+    blank = session.current.blank_answers()
+    used = set(session.current.used)
     found, lost, seconds = session.current.take()
     parts = [_part(title, worth, found, lost, more) for title, worth in _by_part(points, found).items()]
     full = round(sum(points.values()), 6) if isinstance(points, Mapping) else points
@@ -31,17 +33,36 @@ def score(points: float | Mapping[str, float]) -> Score:
         earned = round(sum(part.points for part in parts), 2)
     else:
         earned = full if statuses == {Status.PASSED} else 0.0
-    return Score(
-        CheckResult(
-            grade_id="",
-            max_points=full,
-            points=earned,
-            seconds=seconds,
-            outcomes=found,
-            parts=parts,
-            more_at_grading=bool(earned and (more if not parts else any(part.more_at_grading for part in parts))),
-        )
+    if blank and all(blank.values()) and earned is not None:
+        earned = 0.0  # whatever a check makes of it: nobody earns anything with what everybody receives
+        parts = [part.model_copy(update={"points": 0.0, "more_at_grading": False}) for part in parts]
+    result = CheckResult(
+        grade_id="",
+        max_points=full,
+        points=earned,
+        seconds=seconds,
+        outcomes=found,
+        parts=parts,
+        more_at_grading=bool(earned and (more if not parts else any(part.more_at_grading for part in parts))),
     )
+    if statuses != {Status.PASSED} or (blank and all(blank.values())):
+        result.not_attempted = sorted(name for name, still in blank.items() if still)
+    return _in_notebook(result, used)
+
+
+def unscored() -> Score | None:
+    """What a cell expected and found that asks for no score; None if that was nothing."""
+    used = set(session.current.used)
+    found, _, seconds = session.current.take()
+    return _in_notebook(CheckResult(grade_id="", max_points=0, points=0, seconds=seconds, outcomes=found), used)
+
+
+def _in_notebook(result: CheckResult, used: set[str]) -> Score:
+    """The score, in a notebook with what is known of the cells that the programs came from."""
+    here = session.current.kernel
+    if here is None:
+        return Score(result)
+    return Score(result, session.current.scored_logs, here.remarks(used), here.origin(used))
 
 
 def _by_part(points: float | Mapping[str, float], found: list[Outcome]) -> Mapping[str, float]:

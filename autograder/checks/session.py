@@ -8,16 +8,16 @@ from __future__ import annotations
 
 import atexit
 import itertools
+import os
 import random
 import socket
 import time
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from autograder import kernel
 from autograder.results import CheckResult, Isolation, NodeLog, Outcome
 from autograder.sandbox.nodes import NodeSandbox
-
-NOTEBOOK_FOLDER = Path("nodes")
-"""Where a student's notebook keeps the files that its `%%node` and `%%file` cells write."""
 
 _DDS_PORT = 7400
 _DDS_PORTS_PER_DOMAIN = 250
@@ -28,23 +28,55 @@ class Session:
 
     def __init__(self) -> None:
         """Start as a student's notebook does: programs beside the notebook, no isolation from oneself."""
-        self.folder = NOTEBOOK_FOLDER
+        self._folder: Path | None = None
+        self._answers: Mapping[str, bool] = {}
         self.isolation = Isolation.NONE
         self.random = random.Random()
         self._sandbox: NodeSandbox | None = None
         self._domains = itertools.cycle(random.sample(range(1, 100), 99))
         self.reset()
 
-    def configure(self, folder: Path, isolation: Isolation, seed: int) -> None:
+    def configure(
+        self, folder: Path, isolation: Isolation, seed: int, answers: Mapping[str, bool] | None = None
+    ) -> None:
         """Say where the programs are and how they are kept apart; the grading worker does so once.
 
         Args:
             folder: holds the programs and files of the submission.
             isolation: for the programs.
             seed: of all values that vary from run to run.
+            answers: the files that are answers, and of each whether its cell is still as students receive it.
         """
         self.close()
-        self.folder, self.isolation, self.random = folder, isolation, random.Random(seed)
+        self._folder, self.isolation, self.random = folder, isolation, random.Random(seed)
+        self._answers = answers or {}
+
+    @property
+    def kernel(self) -> kernel.Kernel | None:
+        """The kernel of a student's notebook; None where a submission is graded."""
+        return kernel.active if self._folder is None else None
+
+    @property
+    def folder(self) -> Path:
+        """Where the programs and files are."""
+        if self._folder is not None:
+            return self._folder
+        return kernel.active.folder.path if kernel.active is not None else Path("nodes")
+
+    def use(self, file_name: str) -> Path:
+        """Return where a file of the student's is, and note that the check uses it."""
+        self.used.add(file_name)
+        return self.folder / file_name
+
+    def has(self, file_name: str) -> bool:
+        """Whether there is such a file; in a notebook, whether a cell wrote it since the kernel began."""
+        return self.kernel.has(file_name) if self.kernel is not None else (self.folder / file_name).is_file()
+
+    def blank_answers(self) -> dict[str, bool]:
+        """Of the answers that the check uses, whether each is still as students receive it."""
+        if self.kernel is not None:
+            return self.kernel.blank(self.used)
+        return {name: blank for name, blank in self._answers.items() if name in self.used}
 
     def reset(self) -> None:
         """Forget the findings so far: a new cell begins."""
@@ -55,6 +87,8 @@ class Session:
         """Parts of launches that failed as a whole, or outside of any part."""
         self.block_began = 0
         """Number of the first outcome of the current launch or table."""
+        self.used: set[str] = set()
+        """Names of the student's files that the check uses."""
         self.logs: list[NodeLog] = []
         self.scored_logs: list[NodeLog] = []
         """Logs of what has been scored since the cell began."""
@@ -94,20 +128,36 @@ class Session:
 
 
 class Score:
-    """A check's result as the last expression of its cell: the `repr` is the points, the HTML is the report."""
+    """A check's result as the last expression of its cell: a front end shows the report, `repr` is the points.
 
-    def __init__(self, result: CheckResult) -> None:
+    Args:
+        result: of the check.
+        logs: what its programs printed.
+        remarks: what the student should know about the cells that the programs came from.
+        origin: those cells, in words.
+    """
+
+    def __init__(
+        self, result: CheckResult, logs: Sequence[NodeLog] = (), remarks: Sequence[str] = (), origin: str = ""
+    ) -> None:
         """Wrap a result for display."""
         self.result = result
+        self._logs, self._remarks, self._origin = list(logs), list(remarks), origin
 
     def __repr__(self) -> str:
         """The points as a number, as nbgrader reads them, or None when nobody could find out."""
         return "None" if self.result.points is None else f"{self.result.points:g}"
 
-    def _repr_html_(self) -> str:
+    def _repr_mimebundle_(self, **_: object) -> dict[str, str]:
         from autograder.report.html import check_html
+        from autograder.report.terminal import check_text
 
-        return check_html(self.result, audience="student")
+        # nbgrader takes the points from the plain text, and all of them where that is no number.
+        graded = "NBGRADER_EXECUTION" in os.environ
+        return {
+            "text/plain": repr(self) if graded else check_text(self.result, self._logs, self._remarks, self._origin),
+            "text/html": check_html(self.result, "student", self._logs, self._remarks, self._origin),
+        }
 
 
 current = Session()

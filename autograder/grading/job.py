@@ -34,5 +34,7 @@ class Job(BaseModel):
     """Seed of the values that differ from run to run."""
     files: dict[str, str]
     """File name to text, such as `talker.py`: what the `%%node` and `%%file` cells hold."""
+    answers: dict[str, bool] = Field(default_factory=dict)
+    """Of the files that are answers: whether the cell is still as students receive it."""
     cells: list[Cell]
     problems: list[Outcome] = Field(default_factory=list)

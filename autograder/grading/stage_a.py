@@ -134,6 +134,11 @@ def _job(submission: Submission, student: str, lab: Lab, settings: Settings) -> 
         isolation=settings.isolation,
         seed=random.SystemRandom().getrandbits(32) if settings.seed is None else settings.seed,
         files=submission.files,
+        answers={
+            answer.file.file_name: submission.sources[answer.grade_id] == answer.blank
+            for answer in lab.answers.values()
+            if answer.file is not None
+        },
         cells=list(lab.cells),
         problems=submission.problems,
     )

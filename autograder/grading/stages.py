@@ -46,7 +46,7 @@ from autograder.grading.stage_a import Settings, result_path, run_submission, st
 from autograder.grading.stage_b import before_autograde
 from autograder.report.html import check_html, render
 from autograder.results import CheckResult, SubmissionResult
-from autograder.submission.lab import CODE_STUB, TEXT_STUB, Lab, load_lab
+from autograder.submission.lab import CODE_STUB, TEXT_STUB, Lab, blank_mark, load_lab
 from autograder.submission.markers import without_hidden_tests
 from autograder.submission.reader import Submission, read_submission
 
@@ -245,6 +245,8 @@ class StableNotebook(NbGraderPreprocessor):  # type: ignore[misc]
                 cell.metadata.pop(key, None)
             if cell.cell_type == "code":
                 cell.outputs, cell.execution_count = [], None
+                if utils.is_solution(cell):
+                    cell.metadata["autograder"] = blank_mark(cell.source)
         kernel = {"display_name": "Python 3 (ipykernel)", "language": "python", "name": "python3"}
         nb.metadata = nbformat.from_dict({"kernelspec": kernel, "language_info": {"name": "python"}})
         nb.nbformat, nb.nbformat_minor = 4, 5

@@ -45,7 +45,7 @@ def run_job(job: Job, folder: Path) -> SubmissionResult:
     started = time.monotonic()
     for name, text in job.files.items():
         (folder / name).write_text(text, encoding="utf-8")
-    session.current.configure(folder, job.isolation, job.seed)
+    session.current.configure(folder, job.isolation, job.seed, job.answers)
     if job.files:
         _ = session.current.sandbox  # it warms up while the set-up cells import their messages
     result = SubmissionResult(

@@ -73,6 +73,8 @@ class Observer:
         self._executor.add_node(self.node)
         self._recordings: dict[tuple[str, str], Recording] = {}
         self._room = RECORDED
+        self.meanwhile: Callable[[], None] | None = None
+        """Called now and then in the thread of whoever waits."""
         self._thread = threading.Thread(target=self._spin, name="observer", daemon=True)
         self._thread.start()
 
@@ -128,15 +130,19 @@ class Observer:
                 return True
             if late:
                 return False
+            if self.meanwhile is not None:
+                self.meanwhile()
             with self.changed:
                 self.changed.wait(min(POLL, max(0.0, deadline - time.monotonic())))
 
     def pause(self, seconds: float) -> None:
         """Let time go by, exactly as much as is said: for experiments in which its length matters."""
         deadline = time.monotonic() + seconds
-        with self.changed:
-            while (left := deadline - time.monotonic()) > 0:
-                self.changed.wait(left)
+        while (left := deadline - time.monotonic()) > 0:
+            if self.meanwhile is not None:
+                self.meanwhile()
+            with self.changed:
+                self.changed.wait(left if self.meanwhile is None else min(left, 5 * POLL))
 
     def nodes(self) -> list[str]:
         """Full names of all nodes but the observer, one entry per node: two nodes of one name are listed twice."""

@@ -123,6 +123,24 @@ def grade_id_of(cell: dict[str, Any]) -> str:
     return encodable(grade_id) if isinstance(grade_id, str) else ""
 
 
+def cell_digest(source: str) -> str:
+    """Return what tells one text of a cell from another; blanks at the ends of lines and of the cell do not count."""
+    lines = [line.rstrip() for line in source.replace("\r\n", "\n").strip().split("\n")]
+    return hashlib.sha256("\n".join(lines).encode("utf-8", "replace")).hexdigest()[:16]
+
+
+def blank_mark(source: str) -> dict[str, str]:
+    """Return metadata for an answer cell, below `autograder`, by which a notebook knows that it is still untouched."""
+    return {"blank": cell_digest(source)}
+
+
+def blank_mark_of(cell: dict[str, Any]) -> str:
+    """Return the digest in a cell's `blank_mark`; empty if it has none."""
+    metadata = cell.get("metadata")
+    mark = metadata.get("autograder") if isinstance(metadata, dict) else None
+    return str(mark.get("blank", "")) if isinstance(mark, dict) else ""
+
+
 def encodable(text: str) -> str:
     """Replace what JSON can spell but UTF-8 cannot: halves of surrogate pairs."""
     return text.encode("utf-8", "replace").decode("utf-8")
@@ -202,6 +220,8 @@ def _read(name: str, notebook: Path, raw: dict[str, Any], released_only: bool) -
                 given[file.file_name] = file.text
             elif not source.lstrip().startswith("%%"):
                 cells.append(Cell(grade_id=grade_id, title=title, points=points, source=source))
+        if grade_id in answers and answers[grade_id].file is not None:
+            cell["metadata"]["autograder"] = blank_mark(blank)
         cell["source"] = blank
         if cell["cell_type"] == "code":
             cell.update(outputs=[], execution_count=None)

@@ -43,8 +43,11 @@ class Submission:
     """The released notebook with the answers' sources in it."""
 
 
-class _UnreadableError(Exception):
+class UnreadableError(Exception):
+    """There is no notebook to read; `problem` says why."""
+
     def __init__(self, problem: Outcome) -> None:
+        """Keep what to say of it."""
         super().__init__(problem.title)
         self.problem = problem
 
@@ -56,7 +59,7 @@ def read_submission(path: Path, lab: Lab) -> Submission:
     try:
         cells = _cells(_bytes(path))
         _take_answers(cells, lab, submission)
-    except _UnreadableError as error:
+    except UnreadableError as error:
         submission.problems.append(error.problem)
         submission.readable = False
     _take_files(lab, submission)
@@ -90,13 +93,13 @@ def _bytes(path: Path) -> bytes:
         content = read_plain(*_way(path), NOTEBOOK_BYTES + 1)
     except OSError as error:
         because = f"There is no file {path.name} to read ({error.strerror or error})."
-        raise _UnreadableError(_problem("no-notebook", title, because, f"Submit {path.name}.")) from error
+        raise UnreadableError(_problem("no-notebook", title, because, f"Submit {path.name}.")) from error
     if not content.strip():
-        raise _UnreadableError(
+        raise UnreadableError(
             _problem("no-notebook", title, f"No {path.name} was handed in.", f"Submit the file {path.name} itself.")
         )
     if len(content) > NOTEBOOK_BYTES:
-        raise _UnreadableError(
+        raise UnreadableError(
             _problem(
                 "oversized-notebook",
                 title,
@@ -114,11 +117,11 @@ def _cells(content: bytes) -> list[dict[str, Any]]:
         notebook = json.loads(content.decode("utf-8-sig"))
     except (ValueError, RecursionError) as error:
         because = "The file is not a notebook: it is not valid JSON."
-        raise _UnreadableError(_problem("not-json", title, because, hint)) from error
+        raise UnreadableError(_problem("not-json", title, because, hint)) from error
     cells = notebook.get("cells") if isinstance(notebook, dict) else None
     if not isinstance(cells, list) or notebook.get("nbformat") != 4 or not all(isinstance(c, dict) for c in cells):
         because = "The file is JSON, but not a notebook of format 4: it has no list of cells."
-        raise _UnreadableError(_problem("not-a-notebook", title, because, hint))
+        raise UnreadableError(_problem("not-a-notebook", title, because, hint))
     return cells
 
 
@@ -129,7 +132,7 @@ def _take_answers(cells: list[dict[str, Any]], lab: Lab, submission: Submission)
         if grade_id_of(cell):
             found[grade_id_of(cell)].append(cell)
     if not found.keys() & released.keys():
-        raise _UnreadableError(
+        raise UnreadableError(
             _problem(
                 "wrong-notebook",
                 f"the notebook is {lab.name}",
@@ -337,11 +340,20 @@ def _ignored(file: CellFile, answer: str, lab: Lab, submission: Submission) -> O
     return _problem("ignored-cell", title, because, f"Move what is to be graded into the cell `{answer}`. {hint}")
 
 
+def cells_of(path: Path) -> list[dict[str, Any]]:
+    """Return a notebook's cells.
+
+    Raises:
+        UnreadableError: it is no notebook.
+    """
+    return _cells(_bytes(path))
+
+
 def grade_ids_in(path: Path) -> set[str]:
     """Return the grade_ids in a notebook; none if it cannot be read."""
     try:
         return {grade_id_of(cell) for cell in _cells(_bytes(path))} - {""}
-    except _UnreadableError:
+    except UnreadableError:
         return set()
 
 
