@@ -137,7 +137,8 @@ class Kernel:
         """Name the cells that these files came from: `heartbeat from cell [7], run at 14:03:12`."""
         saved = self.saved()
         return "; ".join(
-            f"`{written.file.name}` from {written.origin}" + (", not saved yet" if saved and saved.lacks(written) else "")
+            f"`{written.file.name}` from {written.origin}"
+            + (", not saved yet" if saved and saved.lacks(written) else "")
             for written in self.used(file_names)
         )
 
@@ -154,7 +155,9 @@ class Kernel:
             if any(_imports(written, name) for written in used):
                 path = shown(self.folder.path / name)
                 first = f"%%node {name.removesuffix('.py')}"
-                told.append(f"{path} was written by no cell, so grading does not have it. Put it into a cell `{first}`.")
+                told.append(
+                    f"{path} was written by no cell, so grading does not have it. Put it into a cell `{first}`."
+                )
         return told
 
 

@@ -1,7 +1,7 @@
 """The folder beside a notebook in which the programs and files of its cells lie, and what the kit wrote there.
 
-Each notebook has a folder of its own below `nodes`, and a manifest in it. What stands in the manifest and is still as it
-was written is the kit's to replace and to remove; everything else is the student's, and is kept.
+Each notebook has a folder of its own below `nodes`, and a manifest in it. What stands in the manifest and is still as
+it was written is the kit's to replace and to remove; everything else is the student's, and is kept.
 """
 
 from __future__ import annotations

@@ -126,4 +126,3 @@ def _defect(file: CellFile) -> str:
         except (ValueError, RecursionError) as error:
             return f"it is not JSON: {error}"
     return ""
-

@@ -77,8 +77,8 @@ class SavedNotebook:
         known = written.cell_id and graded.cell_id
         if known and graded.cell_id != written.cell_id and graded.grade_id:
             return (
-                f"This `{written.file.name}` comes from a cell of your own, cell [{written.number}]. Grading ignores that"
-                f" cell: it takes the lab's cell that begins with `{first}`. Move your text there."
+                f"This `{written.file.name}` comes from a cell of your own, cell [{written.number}]. Grading ignores"
+                f" that cell: it takes the lab's cell that begins with `{first}`. Move your text there."
             )
         if self.saved_at > written.at:
             return (

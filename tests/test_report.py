@@ -6,6 +6,7 @@ import io
 import json
 import re
 from html.parser import HTMLParser
+from typing import Any
 
 import pytest
 from junitparser import JUnitXml
@@ -15,7 +16,7 @@ from autograder.report.audience import Audience, result_for
 from autograder.report.export import to_csv, to_gradescope
 from autograder.report.html import check_html, submission_html
 from autograder.report.junit import junit_xml
-from autograder.report.terminal import class_view, submission_view, undecided_view
+from autograder.report.terminal import check_text, check_view, class_view, submission_view, undecided_view
 from autograder.results import CheckResult, Isolation, NodeLog, Outcome, Status, SubmissionResult
 
 NASTY = "<img src=x onerror=alert(1)>\x1b[31m\x00 `code` & [link](javascript:alert(2))"
@@ -93,12 +94,74 @@ def test_html_lets_nothing_of_a_students_act() -> None:
     assert "onerror=alert(1)" in page.text and "last line" in page.text
 
 
-def test_html_tells_a_status_by_word_symbol_and_border() -> None:
-    outcomes = [outcome(status) for status in Status]
-    page = check_html(check(None, *outcomes))
-    for word, symbol in (("passed", "✓"), ("failed", "✗"), ("not checked", "-"), ("could not find out", "?")):
-        assert f'aria-label="{word}">{symbol}</span> {word}' in page
-    assert len(set(re.findall(r"border-left:([^;\"]+)", page))) == 4
+VERDICTS = {
+    "passed": check(3, outcome(Status.PASSED)),
+    "holds so far": check(3, outcome(Status.PASSED)).model_copy(update={"more_at_grading": True}),
+    "partly passed": check(1, FAILED),
+    "failed": check(0, FAILED),
+    "not attempted yet": check(0, FAILED).model_copy(update={"not_attempted": ["talker.py", "table.yaml"]}),
+    "could not find out": check(None, outcome(Status.UNKNOWN)),
+}
+
+
+@pytest.mark.parametrize("word", VERDICTS)
+def test_a_verdict_is_told_by_word_symbol_and_border(word: str) -> None:
+    page = check_html(VERDICTS[word])
+    assert Page(page).text.split("·")[0].split(maxsplit=1)[1].strip() == word
+    assert word in text_of(check_view(VERDICTS[word])).splitlines()[0]
+    looks = {re.search(r"border-left:([^;]+)", check_html(shown))[1] for shown in VERDICTS.values()}  # type: ignore[index]
+    symbols = {Page(check_html(shown)).text.split()[0] for shown in VERDICTS.values()}
+    assert len(looks) == 5 and len(symbols) == 6  # failed and partly passed have one border
+
+
+def test_points_that_are_decided_at_grading_are_not_claimed() -> None:
+    shown = VERDICTS["holds so far"]
+    for view in (Page(check_html(shown)).text, text_of(check_view(shown))):
+        assert "up to 3 points, decided at grading" in view and "3 of 3" not in view
+
+
+def test_what_was_not_looked_at_is_a_count_and_never_source() -> None:
+    left = [outcome(Status.NOT_CHECKED, title="expect_node('/talker')") for _ in range(4)]
+    for view in (Page(check_html(check(0, FAILED, *left))).text, text_of(check_view(check(0, FAILED, *left)))):
+        assert "expect_node" not in view
+        assert "4 more expectations were not looked at because of that." in view
+
+
+def test_the_finding_comes_first_and_what_holds_is_folded() -> None:
+    shown = check(0, outcome(Status.PASSED, title="it holds"), outcome(Status.FAILED, title="it fails"))
+    page = check_html(shown)
+    assert page.index("it fails") < page.index("<details") < page.index("it holds")
+
+
+def test_an_untouched_answer_is_named_and_is_no_failure() -> None:
+    text = text_of(check_view(VERDICTS["not attempted yet"]))
+    assert "The cells `%%node talker`, `%%file table.yaml` are still as you received them." in text
+    assert "✗" not in text and "0 of 3 points" in text
+
+
+def test_the_cells_that_programs_came_from_are_named() -> None:
+    told: dict[str, Any] = {"remarks": ["`talker` was <changed>"], "origin": "`talker` from cell [7]"}
+    assert "<changed>" in Page(check_html(VERDICTS["failed"], **told)).text
+    text = check_text(VERDICTS["failed"], [], **told)
+    assert "<changed>" in text and text.splitlines()[-1].strip() == "`talker` from cell [7]"
+
+
+def test_output_is_shown_without_escapes_and_only_its_end() -> None:
+    lines = "".join(f"\x1b[32m[INFO]\x1b[0m line {number}\r\n" for number in range(500)) + "10 %\r100 %\x1b]0;title\x07"
+    log = NodeLog(program="talker", text=lines, exit_status=None)
+    for view in (check_html(VERDICTS["failed"], logs=[log]), check_text(VERDICTS["failed"], [log], [], "")):
+        assert "[INFO] line 499" in view and "line 400" not in view and "lines above]" in view
+        assert (
+            "\x1b" not in view and "title" not in view and "100 %" in view and "10 %" not in view.replace("100 %", "")
+        )
+    assert "talker" not in check_html(VERDICTS["passed"], logs=[log])
+
+
+def test_the_report_has_the_colours_of_the_page_it_is_in() -> None:
+    page = check_html(VERDICTS["failed"])
+    assert "background:#ffffff" not in page
+    for colour in re.findall(r"[; \"](?:color|background):([^;\"]+)", page):
+        assert colour.startswith("var(--jp-") or colour in ("#d55e00", "inherit"), colour
 
 
 def test_html_says_that_an_instructor_decides() -> None:
@@ -109,7 +172,7 @@ def test_html_says_that_an_instructor_decides() -> None:
 def test_the_terminal_takes_no_orders_from_a_student() -> None:
     text = text_of(submission_view(result(check(0, FAILED)), "student"))
     assert "\x1b" not in text and "\x00" not in text
-    assert "0/3" in text and "because" in text and "last line" in text
+    assert "0 of 3 points" in text and "because" in text and "last line" in text
 
 
 def test_thirty_students_are_readable_at_120_columns() -> None:

@@ -24,6 +24,7 @@ from autograder.checks.expect_services import ServiceExpectations
 from autograder.checks.parts import part
 from autograder.checks.scoring import score
 from autograder.checks.session import Score
+from autograder.checks.trial import Log, log_of, try_out
 from autograder.checks.watch import MissingProgramError, Watch, watched
 from autograder.graph import remap_rules
 from autograder.graph.diagnosis import Diagnosis
@@ -227,6 +228,21 @@ class Launch(MessageExpectations, ServiceExpectations, LifecycleExpectations, Pr
         finally:
             self._end()
 
+    def log(self, program: str = "") -> Log:
+        """Return what the programs, or one of them, have printed so far; also after the block."""
+        return log_of(self, program)
+
+    def pause(self, seconds: float) -> None:
+        """Let the programs run for so many seconds, and show what they print: for experiments, not for checks."""
+        self.observer.pause(seconds)
+
+    def _ipython_display_(self) -> None:
+        """As the last line of a cell: run for a moment and show what happens."""
+        if self.programs or session.current.kernel is None:
+            print(repr(self))
+        else:
+            try_out(self)
+
     def part(self, title: str) -> AbstractContextManager[None]:
         """A block whose expectations give points of their own; see `autograder.checks.parts`."""
         return part(title)
@@ -236,6 +252,8 @@ class Launch(MessageExpectations, ServiceExpectations, LifecycleExpectations, Pr
         return score(points)
 
     def _end(self) -> None:
+        # What still runs is ended here: how is no fact about the program.
+        ended = {id(program): program.exit_status() for _, program in self.programs}
         try:
             if self._group is not None:
                 self._group.end()
@@ -250,7 +268,7 @@ class Launch(MessageExpectations, ServiceExpectations, LifecycleExpectations, Pr
                     program=launched.program,
                     text=program.output(),
                     truncated=program.truncated(),
-                    exit_status=program.exit_status(),
+                    exit_status=ended[id(program)],
                     stopped_by=program.stopped_by(),
                 )
             )

@@ -54,7 +54,8 @@ def unscored() -> Score | None:
     """What a cell expected and found that asks for no score; None if that was nothing."""
     used = set(session.current.used)
     found, _, seconds = session.current.take()
-    return _in_notebook(CheckResult(grade_id="", max_points=0, points=0, seconds=seconds, outcomes=found), used)
+    score = _in_notebook(CheckResult(grade_id="", max_points=0, points=0, seconds=seconds, outcomes=found), used)
+    return score.without_logs()  # they have been shown while the programs ran
 
 
 def _in_notebook(result: CheckResult, used: set[str]) -> Score:

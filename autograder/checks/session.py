@@ -144,6 +144,10 @@ class Score:
         self.result = result
         self._logs, self._remarks, self._origin = list(logs), list(remarks), origin
 
+    def without_logs(self) -> Score:
+        """The same without what the programs printed."""
+        return Score(self.result, (), self._remarks, self._origin)
+
     def __repr__(self) -> str:
         """The points as a number, as nbgrader reads them, or None when nobody could find out."""
         return "None" if self.result.points is None else f"{self.result.points:g}"

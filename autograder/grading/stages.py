@@ -326,6 +326,7 @@ _REPORT_STYLES = [
     "margin-left",
     "margin-top",
     "max-height",
+    "overflow-wrap",
     "overflow",
     "padding",
     "padding-left",

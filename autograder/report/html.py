@@ -1,26 +1,42 @@
 """The HTML view, for the notebook and the feedback: inline styles only, everything of a student's escaped.
 
-Each status is a word, a symbol and a colour at once, so that it can be read in print and with any colour vision. The
-colours are Okabe and Ito's, darkened until they can be read as text on white.
+Each verdict is a word, a symbol and a colour at once, so that it can be read in print, on a dark page and with any
+colour vision. Only symbols and borders are coloured, with Okabe and Ito's colours; text has the colour of the page.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cache
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
+from autograder.report import words
 from autograder.report.audience import Audience, check_for, result_for
+from autograder.report.output import last_lines
+from autograder.report.words import Verdict
 from autograder.results import CheckResult, NodeLog, Status, SubmissionResult
 
 _LOOK = {
-    Status.PASSED: {"symbol": "✓", "word": "passed", "colour": "#00553d", "border": "2px solid #009e73"},
-    Status.FAILED: {"symbol": "✗", "word": "failed", "colour": "#8f3a00", "border": "4px double #d55e00"},
-    Status.NOT_CHECKED: {"symbol": "-", "word": "not checked", "colour": "#555555", "border": "2px dotted #767676"},
-    Status.UNKNOWN: {"symbol": "?", "word": "could not find out", "colour": "#7a3f63", "border": "2px dashed #cc79a7"},
+    Verdict.PASSED: {"colour": "#009e73", "border": "3px solid"},
+    Verdict.HOLDS: {"colour": "#0072b2", "border": "3px solid"},
+    Verdict.PARTLY: {"colour": "#d55e00", "border": "5px double"},
+    Verdict.FAILED: {"colour": "#d55e00", "border": "5px double"},
+    Verdict.NOT_ATTEMPTED: {"colour": "#767676", "border": "3px dotted"},
+    Verdict.UNKNOWN: {"colour": "#b3588c", "border": "3px dashed"},
 }
+_VERDICT = {Status.FAILED: Verdict.FAILED, Status.UNKNOWN: Verdict.UNKNOWN, Status.PASSED: Verdict.PASSED}
+
+# JupyterLab's own colours, so that a dark theme stays dark; the second of each is for pages without a theme.
+_INK = "var(--jp-content-font-color1, #1a1a1a)"
+_FAINT = "var(--jp-content-font-color2, #555555)"
+_LINE = "var(--jp-border-color1, #bdbdbd)"
+_CODE_STYLE = "white-space:pre-wrap; color:inherit; background:var(--jp-layout-color2, #eeeeee); padding:0 3px"
+
+LOG_LINES = 40
+"""Lines of a program's output that stand under a failed check."""
 
 
 def _code(text: str) -> Markup:
@@ -29,7 +45,7 @@ def _code(text: str) -> Markup:
     if len(pieces) % 2 == 0:
         return escape(text)
     marked = [
-        Markup('<code style="white-space:pre-wrap">{}</code>').format(piece) if number % 2 else escape(piece)
+        Markup('<code style="{}">{}</code>').format(_CODE_STYLE, piece) if number % 2 else escape(piece)
         for number, piece in enumerate(pieces)
     ]
     return Markup("").join(marked)
@@ -45,7 +61,8 @@ def _environment() -> Environment:
         lstrip_blocks=True,
     )
     environment.filters["code"] = _code
-    environment.globals["look"] = lambda status: _LOOK[status]
+    environment.globals |= {"looks": _LOOK, "symbols": words.SYMBOL, "words": _VERDICT, "code_style": _CODE_STYLE}
+    environment.globals |= {"ink": _INK, "faint": _FAINT, "line": _LINE}
     return environment
 
 
@@ -54,16 +71,43 @@ def render(template: str, **values: Any) -> str:
     return _environment().get_template(template).render(**values)
 
 
-def check_html(check: CheckResult, audience: Audience = "student", logs: list[NodeLog] | None = None) -> str:
-    """Return one check's report as an HTML fragment.
+def check_html(
+    check: CheckResult,
+    audience: Audience = "student",
+    logs: Sequence[NodeLog] = (),
+    remarks: Sequence[str] = (),
+    origin: str = "",
+) -> str:
+    """Return one check's report as an HTML fragment: what was found first, then what holds, folded.
 
     Args:
         check: to show.
         audience: a student does not see what hidden tests look at.
         logs: output of the check's programs, shown if the check did not pass.
+        remarks: what the student should know about the cells that the programs came from.
+        origin: those cells, in words.
     """
     shown = check_for(check, audience)
-    return render("check.html", check=shown, logs=logs if logs and check.status is not Status.PASSED else [])
+    verdict, found = words.verdict(shown), words.findings(shown)
+    printed = [log.model_copy(update={"text": last_lines(log.text, LOG_LINES)}) for log in logs if log.text.strip()]
+    return render(
+        "check.html",
+        check=shown,
+        verdict=verdict,
+        points=words.points(shown),
+        not_attempted=words.not_attempted(shown),
+        remarks=remarks,
+        bad=Markup(render("findings.html", bad=found.bad, not_looked_at=found.not_looked_at)),
+        folded=verdict is Verdict.NOT_ATTEMPTED and bool(found.bad),
+        parts=[
+            {"verdict": words.part_verdict(part), "title": part.title, "points": words.part_points(part)}
+            for part in shown.parts
+        ],
+        passed=found.passed,
+        holding=words.holding(len(found.passed)),
+        logs=printed if shown.status is not Status.PASSED else [],
+        origin=origin,
+    )
 
 
 def submission_html(result: SubmissionResult, audience: Audience = "student") -> str:

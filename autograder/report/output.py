@@ -5,18 +5,15 @@ from __future__ import annotations
 import re
 
 _ESCAPES = re.compile(r"\x1b(?:\[[0-?]*[ -/]*[@-~]|\][^\x07\x1b]*(?:\x07|\x1b\\)?|[@-Z\\-_])")
+
+
 _CONTROL = dict.fromkeys((*range(9), *range(11, 32), *range(127, 160)), "�")
 
 
-def plain(text: str) -> str:
-    """Take out the control characters: a student's output must not drive the terminal."""
-    return text.replace("\t", "    ").translate(_CONTROL)
-
-
 def tidy(output: str) -> str:
-    """Take out colours and other escapes of a terminal as well; of a line that was written over, the last stays."""
+    """Take out colours and other escapes of a terminal; of a line that was written over, the last text stays."""
     lines = _ESCAPES.sub("", output.replace("\r\n", "\n")).split("\n")
-    return plain("\n".join(line.rstrip("\r").rpartition("\r")[2] for line in lines))
+    return "\n".join(line.rstrip("\r").rpartition("\r")[2] for line in lines).translate(_CONTROL)
 
 
 def last_lines(output: str, count: int) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import unicodedata
 from collections.abc import Sequence
 
@@ -10,8 +11,11 @@ from rich.panel import Panel
 from rich.table import Table
 from rich.text import Text
 
-from autograder.report.audience import Audience, reason, result_for
-from autograder.results import CheckResult, Outcome, Status, SubmissionResult
+from autograder.report import words
+from autograder.report.audience import Audience, check_for, reason, result_for
+from autograder.report.output import last_lines
+from autograder.report.words import Verdict
+from autograder.results import CheckResult, NodeLog, Outcome, Status, SubmissionResult
 
 SYMBOL = {Status.PASSED: "✓", Status.FAILED: "✗", Status.NOT_CHECKED: "-", Status.UNKNOWN: "?"}
 STYLE = {Status.PASSED: "blue", Status.FAILED: "bold red", Status.NOT_CHECKED: "dim", Status.UNKNOWN: "bold magenta"}
@@ -39,11 +43,6 @@ def plain(text: str) -> str:
     return text.replace("\t", "    ").translate(_SHOWN)
 
 
-def points_text(check: CheckResult) -> str:
-    """A check's points as `2/3`, or `?/3` when nobody could find out."""
-    return f"{'?' if check.points is None else f'{check.points:g}'}/{check.max_points:g}"
-
-
 def submission_view(result: SubmissionResult, audience: Audience = "student") -> RenderableType:
     """Return everything that this audience may know of one submission."""
     result = result_for(result, audience)
@@ -53,27 +52,9 @@ def submission_view(result: SubmissionResult, audience: Audience = "student") ->
         parts.extend(_details(problem))
     if result.problems:
         parts.append(Text())
-    failed_cells = set()
     for check in result.checks:
-        head = Text.assemble(
-            (f"{SYMBOL[check.status]} ", STYLE[check.status]),
-            (plain(check.title or check.grade_id), "bold"),
-            f"  {points_text(check)}  ",
-            (check.status.value, STYLE[check.status]),
-        )
-        parts.append(head)
-        if check.status is not Status.PASSED:
-            failed_cells.add(check.grade_id)
-            for outcome in check.outcomes:
-                parts.append(Text("  ") + _outcome_line(outcome))
-                if outcome.status is not Status.PASSED:
-                    parts.extend(_details(outcome))
-    for log in result.logs:
-        if log.grade_id in failed_cells and log.text.strip():
-            lines = plain(log.text).rstrip().split("\n")
-            shown = "\n".join(lines[-_LOG_LINES:])
-            title = f"output of {plain(log.program)} in {plain(log.grade_id)}"
-            parts.append(Panel(Text(shown), title=Text(title), title_align="left", border_style="dim"))
+        logs = [log for log in result.logs if log.grade_id == check.grade_id]
+        parts.append(check_view(check, logs, title=check.title or check.grade_id))
     parts.append(Text())
     total = f"{result.points:g} of {result.max_points:g} points"
     undecided = sum(check.status is Status.UNKNOWN for check in result.checks)
@@ -85,6 +66,62 @@ def submission_view(result: SubmissionResult, audience: Audience = "student") ->
     return Group(*parts)
 
 
+def check_view(
+    check: CheckResult, logs: Sequence[NodeLog] = (), remarks: Sequence[str] = (), origin: str = "", title: str = ""
+) -> RenderableType:
+    """Return one check's report: what was found first, then what holds. Of a check that passed, a line."""
+    verdict, found = words.verdict(check), words.findings(check)
+    style = _VERDICT_STYLE[verdict]
+    head = Text.assemble((f"{words.SYMBOL[verdict]} ", style), (verdict.value, style))
+    if title:
+        head.append("  ").append(plain(title), "bold")
+    if check.max_points:
+        head.append(f"  {words.points(check)}")
+    lines: list[RenderableType] = [head]
+    lines += [Text(f"  {plain(text)}") for text in (words.not_attempted(check),) if text]
+    lines += [Text(f"  ! {plain(remark)}", "bold") for remark in remarks]
+    if verdict is not Verdict.NOT_ATTEMPTED:
+        for outcome in found.bad:
+            lines.append(Text("  ") + _outcome_line(outcome))
+            lines.extend(_details(outcome))
+        lines += [Text(f"  {text}", "dim") for text in (found.not_looked_at,) if text]
+    for part in check.parts:
+        mark = words.part_verdict(part)
+        words_of = f"{plain(part.title)}: {words.part_points(part)}"
+        lines.append(Text.assemble("  ", (f"{words.SYMBOL[mark]} ", _VERDICT_STYLE[mark]), words_of))
+    if verdict in (Verdict.FAILED, Verdict.PARTLY, Verdict.UNKNOWN):
+        lines += [Text(f"  {words.holding(len(found.passed))}", "dim")] if found.passed else []
+        lines += [_output(log) for log in logs if log.text.strip()]
+    lines += [Text(f"  {plain(origin)}", "dim")] if origin else []
+    return Group(*lines)
+
+
+def check_text(check: CheckResult, logs: Sequence[NodeLog], remarks: Sequence[str], origin: str) -> str:
+    """Return a student's view of one check as plain text, for a notebook in a terminal."""
+    screen = Console(file=io.StringIO(), width=100, highlight=False, color_system=None, force_jupyter=False)
+    screen.print(check_view(check_for(check, "student"), logs, remarks, origin))
+    assert isinstance(screen.file, io.StringIO)
+    return "\n".join(line.rstrip() for line in screen.file.getvalue().splitlines())
+
+
+def _output(log: NodeLog) -> RenderableType:
+    ended = f", stopped by the {log.stopped_by}" if log.stopped_by else ""
+    if not ended and log.exit_status is not None:
+        ended = f", exit status {log.exit_status}"
+    shown = Text(plain(last_lines(log.text, _LOG_LINES)))
+    return Panel(shown, title=Text(f"output of {plain(log.program)}{ended}"), title_align="left", border_style="dim")
+
+
+_VERDICT_STYLE = {
+    Verdict.PASSED: "blue",
+    Verdict.HOLDS: "blue",
+    Verdict.PARTLY: "bold red",
+    Verdict.FAILED: "bold red",
+    Verdict.NOT_ATTEMPTED: "bold",
+    Verdict.UNKNOWN: "bold magenta",
+}
+
+
 def _outcome_line(outcome: Outcome) -> Text:
     mark = (f"{SYMBOL[outcome.status]} ", STYLE[outcome.status])
     words = "" if outcome.status in (Status.PASSED, Status.FAILED) else f" ({outcome.status.value})"
@@ -93,9 +130,9 @@ def _outcome_line(outcome: Outcome) -> Text:
 
 def _details(outcome: Outcome) -> list[RenderableType]:
     pairs = [
+        ("because", outcome.because),
         ("expected", outcome.expected),
         ("observed", outcome.observed),
-        ("because", outcome.because),
         ("try", outcome.hint),
     ]
     table = Table.grid(padding=(0, 1))

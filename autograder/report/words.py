@@ -1,0 +1,104 @@
+"""What a check's result says, in words that every view uses."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+from autograder.results import CheckResult, Outcome, Part, Status
+
+
+class Verdict(StrEnum):
+    """What became of a check, as its heading says it."""
+
+    PASSED = "passed"
+    HOLDS = "holds so far"
+    """What is visible holds; the points are decided at grading."""
+    PARTLY = "partly passed"
+    FAILED = "failed"
+    NOT_ATTEMPTED = "not attempted yet"
+    UNKNOWN = "could not find out"
+
+
+SYMBOL = {
+    Verdict.PASSED: "✓",
+    Verdict.HOLDS: "◐",
+    Verdict.PARTLY: "◑",
+    Verdict.FAILED: "✗",
+    Verdict.NOT_ATTEMPTED: "○",
+    Verdict.UNKNOWN: "?",
+}
+
+
+def verdict(check: CheckResult) -> Verdict:
+    """Return what became of a check."""
+    if check.status is Status.UNKNOWN:
+        return Verdict.UNKNOWN
+    if check.not_attempted and not check.points:
+        return Verdict.NOT_ATTEMPTED
+    if check.status is Status.PASSED:
+        return Verdict.HOLDS if check.more_at_grading else Verdict.PASSED
+    return Verdict.PARTLY if check.points else Verdict.FAILED
+
+
+def points(check: CheckResult) -> str:
+    """Return a check's points in words, and never more than grading gives."""
+    full = f"{check.max_points:g} point{'' if check.max_points == 1 else 's'}"
+    if check.points is None:
+        return f"points: your instructor decides (of {check.max_points:g})"
+    if not check.more_at_grading:
+        return f"{check.points:g} of {full}"
+    sure, possible = check.sure_points or 0.0, check.possible_points
+    upto = "" if possible == check.max_points else f"{possible:g} of "
+    return f"{f'{sure:g} sure, ' if sure else ''}up to {upto}{full}, decided at grading"
+
+
+def part_points(part: Part) -> str:
+    """Return a part's points in words."""
+    full = f"{part.max_points:g} point{'' if part.max_points == 1 else 's'}"
+    return f"up to {full}, decided at grading" if part.more_at_grading else f"{part.points:g} of {full}"
+
+
+def part_verdict(part: Part) -> Verdict:
+    """Return what became of a part."""
+    if part.more_at_grading:
+        return Verdict.HOLDS
+    return Verdict.PASSED if part.points == part.max_points else Verdict.FAILED
+
+
+def not_attempted(check: CheckResult) -> str:
+    """Say which answers are still untouched; empty if none is, or if it did not matter."""
+    files = [f"`%%node {name[:-3]}`" if name.endswith(".py") else f"`%%file {name}`" for name in check.not_attempted]
+    if not files:
+        return ""
+    one = len(files) == 1
+    return f"The cell{'' if one else 's'} {', '.join(files)} {'is' if one else 'are'} still as you received " + (
+        "it." if one else "them."
+    )
+
+
+@dataclass(frozen=True)
+class Findings:
+    """A check's outcomes in the order in which they matter."""
+
+    bad: list[Outcome]
+    """What failed or could not be found out, with what follows from it."""
+    passed: list[Outcome]
+    not_looked_at: str
+    """How many were not looked at, as a sentence; empty if none."""
+
+
+def findings(check: CheckResult) -> Findings:
+    """Sort a check's outcomes."""
+    by_status = {status: [o for o in check.outcomes if o.status is status] for status in Status}
+    left = len(by_status[Status.NOT_CHECKED])
+    sentence = (
+        f"{left} more expectation{' was' if left == 1 else 's were'} not looked at because of that." if left else ""
+    )
+    bad = [o for o in check.outcomes if o.status in (Status.FAILED, Status.UNKNOWN)]
+    return Findings(bad, by_status[Status.PASSED], sentence)
+
+
+def holding(count: int) -> str:
+    """Say how many expectations hold."""
+    return f"{count} expectation{' holds' if count == 1 else 's hold'}"
