@@ -25,7 +25,7 @@ from autograder.checks.parts import part
 from autograder.checks.scoring import score
 from autograder.checks.session import Score
 from autograder.checks.trial import Log, log_of, try_out
-from autograder.checks.watch import MissingProgramError, Watch, watched
+from autograder.checks.watch import NotLaunchedError, Watch, watched
 from autograder.graph import remap_rules
 from autograder.graph.diagnosis import Diagnosis
 from autograder.graph.observer import Observer
@@ -142,6 +142,8 @@ class Launch(MessageExpectations, ServiceExpectations, LifecycleExpectations, Pr
                 self.watch_transitions(node)
             for launched in self.nodes or self._from_file():
                 self.start(launched)
+            if here is not None and self._trouble and not here.scored:  # what only listens would never say so
+                raise NotLaunchedError(self._trouble[0])
         except BaseException:
             self._end()
             raise
@@ -216,8 +218,6 @@ class Launch(MessageExpectations, ServiceExpectations, LifecycleExpectations, Pr
             self._missing.append(program)
             return
         because, hint = here.why_missing("node", program)
-        if not here.scored:  # a cell that only listens would never say so
-            raise MissingProgramError(because, hint)
         self._trouble.append(Diagnosis(because, "program-missing", hint))
 
     def __exit__(

@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from html import escape
 from typing import Any
 
+from autograder.graph.diagnosis import Diagnosis
 from autograder.graph.observer import Observer
 from autograder.kernel import Kernel
 from autograder.report.output import tidy
@@ -60,12 +61,12 @@ _WAITS_FOR = {
 }
 
 
-class MissingProgramError(Exception):
-    """A cell launches a program that no cell has written. In a notebook it reads as a sentence."""
+class NotLaunchedError(Exception):
+    """What a cell launches is not there, or cannot be used. In a notebook it reads as a sentence."""
 
-    def __init__(self, because: str, hint: str) -> None:
+    def __init__(self, reason: Diagnosis) -> None:
         """Keep what to say."""
-        super().__init__(f"{because} {hint}")
+        super().__init__(f"{reason.because} {reason.hint}")
 
     def _render_traceback_(self) -> list[str]:
         """What IPython shows in place of a traceback: the student's line is not the mistake."""

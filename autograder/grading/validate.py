@@ -18,8 +18,9 @@ from nbgrader.validator import Validator
 from autograder.bootstrap import SetUpError, refuse_foreign_ros
 from autograder.errors import KitError
 from autograder.grading.stage_a import Settings, run_submission
+from autograder.report import words
 from autograder.report.audience import result_for
-from autograder.report.terminal import plain, points_text
+from autograder.report.terminal import plain
 from autograder.results import Isolation, Outcome, Status
 from autograder.sandbox.isolation import choose
 from autograder.submission.reader import lab_of
@@ -77,9 +78,10 @@ def verdicts(root: Path, notebook: Path, invert: bool) -> dict[str, list[dict[st
     failed = [_entry(problem.title, _lines(problem)) for problem in result.problems]
     for check in result.checks:
         if check.status is not Status.PASSED:
+            untouched = [text for text in (words.not_attempted(check),) if text]
             said = [found for found in check.outcomes if found.status in (Status.FAILED, Status.UNKNOWN)]
-            lines = [line for found in said or check.outcomes for line in _lines(found)]
-            failed.append(_entry(f"{check.title or check.grade_id}: {points_text(check)} points", lines))
+            lines = untouched or [line for found in said or check.outcomes for line in _lines(found)]
+            failed.append(_entry(f"{check.title or check.grade_id}: {words.points(check)}", lines))
     return {"failed": failed} if failed else {}
 
 
