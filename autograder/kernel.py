@@ -56,14 +56,14 @@ class Kernel:
         """Note the cell that begins, and forget what the last one found."""
         self.cell = str(info.raw_cell or "")
         self.cell_id = str(getattr(info, "cell_id", "") or "")
-        session = sys.modules.get("autograder.checks.session")
-        if session is not None:
-            session.reset()
+        current = _session()
+        if current is not None:
+            current.reset()
 
     def end_cell(self, _result: object) -> None:
         """Show what was expected in a cell that asked for no score."""
-        session = sys.modules.get("autograder.checks.session")
-        if session is not None and session.current.outcomes:
+        current = _session()
+        if current is not None and current.outcomes:
             from autograder.checks.scoring import unscored
 
             report = unscored()
@@ -166,6 +166,11 @@ def _imports(written: Written, file_name: str) -> bool:
         return False
     module = re.escape(file_name.removesuffix(".py"))
     return bool(re.search(rf"^\s*(?:from|import)\b.*\b{module}\b", written.file.text, re.MULTILINE))
+
+
+def _session() -> Any:
+    """The checks' session; None before somebody has imported them, and while that is under way."""
+    return getattr(sys.modules.get("autograder.checks.session"), "current", None)
 
 
 def now() -> float:

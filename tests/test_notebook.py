@@ -1,46 +1,90 @@
-"""The cell magics in a real IPython shell."""
+"""A student's notebook: the cell magics, the files they write, and what a cell shows, in real kernels."""
 
 from __future__ import annotations
 
+import json
+import os
+import subprocess
+import sys
+import time
 from collections.abc import Iterator
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import pytest
 from IPython.core.interactiveshell import InteractiveShell
+from jupyter_client.manager import KernelManager
+
+from autograder import kernel
+from autograder.kernel_folder import MANIFEST
+from autograder.submission.lab import blank_mark
+
+START = 60
+"""Far beyond what a kernel, or a cell, takes on a busy machine, in seconds."""
+
+TALKER = """%%node talker
+import rclpy
+from rclpy.node import Node
+from std_msgs.msg import String
+
+
+class Talker(Node):
+    def __init__(self):
+        super().__init__("talker")
+        self.publisher = self.create_publisher(String, "chatter", 10)
+        self.create_timer(0.05, self.tick)
+
+    def tick(self):
+        print("\\x1b[32mtick\\x1b[0m <b>")
+        self.publisher.publish(String(data="hello"))
+
+
+rclpy.init()
+rclpy.spin(Talker())
+"""
+SET_UP = "%load_ext autograder\nfrom autograder.checks import launch\nfrom std_msgs.msg import String"
+CHECK = 'with launch("talker") as ros:\n    ros.expect_messages("/chatter", String, at_least=2)\nros.score(2)'
+
+
+# The magics, in a shell of this process.
 
 
 @pytest.fixture
 def shell(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[InteractiveShell]:
     monkeypatch.chdir(tmp_path)
+    (tmp_path / "lab.ipynb").write_text("{}")
+    monkeypatch.setenv("JPY_SESSION_NAME", str(tmp_path / "lab.ipynb"))
     InteractiveShell.clear_instance()
     shell = InteractiveShell.instance()
     shell.run_line_magic("load_ext", "autograder")
     yield shell
+    assert kernel.active is not None
+    kernel.active.ready()
+    kernel.active = None
     InteractiveShell.clear_instance()
 
 
 def say(shell: InteractiveShell, cell: str, capsys: pytest.CaptureFixture[str]) -> str:
-    assert shell.run_cell(cell).success
+    assert shell.run_cell(cell, store_history=True).success
     return capsys.readouterr().out.strip()
 
 
+def folder() -> Path:
+    return Path("nodes/lab")
+
+
 def test_a_node_cell_becomes_a_program(shell: InteractiveShell, capsys: pytest.CaptureFixture[str]) -> None:
-    assert say(shell, "%%node talker\nprint('hello')\n", capsys) == "node program talker written"
-    assert Path("nodes/talker.py").read_text() == "print('hello')\n"
+    said = say(shell, "\n%%node talker\nprint('hello')\n", capsys)
+    assert said == "node program talker written (nodes/lab/talker.py)"
+    # The lines have the numbers that they have in the cell.
+    assert (folder() / "talker.py").read_text() == "\n# %%node talker\nprint('hello')\n"
     assert "talker" not in shell.user_ns
-    assert [path.name for path in Path("nodes").iterdir()] == ["talker.py"]
-
-
-def test_a_new_kernel_knows_no_program_of_the_last_one(shell: InteractiveShell) -> None:
-    shell.run_cell("%%node talker\nprint('hello')\n")
-    Path("nodes/README").touch()
-    shell.run_line_magic("reload_ext", "autograder")
-    assert [path.name for path in Path("nodes").iterdir()] == ["README"]
 
 
 def test_a_file_cell_becomes_a_file(shell: InteractiveShell, capsys: pytest.CaptureFixture[str]) -> None:
-    assert say(shell, "%%file camera.yaml\na: 1\n", capsys) == "file camera.yaml written"
-    assert Path("nodes/camera.yaml").read_text() == "a: 1\n"
+    assert say(shell, "%%file camera.yaml\na: 1\n", capsys) == "file camera.yaml written (nodes/lab/camera.yaml)"
+    assert (folder() / "camera.yaml").read_text() == "a: 1\n"
 
 
 @pytest.mark.parametrize(
@@ -48,7 +92,7 @@ def test_a_file_cell_becomes_a_file(shell: InteractiveShell, capsys: pytest.Capt
     [
         ("%%node talker\nx = 1\ndef f(:\n    pass\n", "line 3 of the cell is not Python"),
         ("%%file a.yaml\na: 1\nb: [\n", "line 4 of the cell is not YAML"),
-        ("%%file a.json\n{\n", "is not JSON"),
+        ('%%file a.json\n{"a": 1,\n"b" 2}\n', "line 3 of the cell is not JSON"),
     ],
 )
 def test_a_defect_is_told_at_once_with_its_line(
@@ -56,13 +100,32 @@ def test_a_defect_is_told_at_once_with_its_line(
 ) -> None:
     assert line in say(shell, cell, capsys)
     # Written all the same: running it shows the same error that grading shows.
-    assert len(list(Path("nodes").iterdir())) == 1
+    assert len([path for path in folder().iterdir() if path.name != MANIFEST]) == 1
 
 
-@pytest.mark.parametrize("cell", ["%%node ../x\n1\n", "%%node\n1\n", "%%file a.py\n1\n", "%%node X\n1\n"])
-def test_a_bad_name_writes_nothing(shell: InteractiveShell, capsys: pytest.CaptureFixture[str], cell: str) -> None:
-    assert "not written" in say(shell, cell, capsys)
+@pytest.mark.parametrize(
+    ("cell", "why"),
+    [
+        ("%%node ../x\n1\n", "cannot name a program"),
+        ("%%node\n1\n", "needs a name"),
+        ("%%file a.py\n1\n", "cannot name a file"),
+        ("%%node X\n1\n", "cannot name a program"),
+        ("%%node rclpy\n1\n", "the name of an installed module"),
+        ("%%node json\n1\n", "the name of an installed module"),
+    ],
+)
+def test_a_bad_name_writes_nothing_and_is_explained(
+    shell: InteractiveShell, capsys: pytest.CaptureFixture[str], cell: str, why: str
+) -> None:
+    said = say(shell, cell, capsys)
+    assert "not written" in said and why in said
     assert not Path("nodes").exists()
+
+
+def test_the_magics_explain_themselves(shell: InteractiveShell) -> None:
+    for magic, example in (("node", "%%node talker"), ("file", "%%file camera.yaml")):
+        text = shell.find_cell_magic(magic).__doc__
+        assert example in text and "nodes" in text
 
 
 def test_each_cell_begins_with_no_findings(shell: InteractiveShell) -> None:
@@ -72,3 +135,369 @@ def test_each_cell_begins_with_no_findings(shell: InteractiveShell) -> None:
     session.current.outcomes.append(Outcome(status=Status.PASSED, title="left over"))
     shell.run_cell("1")
     assert session.current.outcomes == []
+
+
+def new_kernel(shell: InteractiveShell, manifest: Path | None) -> kernel.Kernel:
+    """What a new kernel finds: the manifest is of one that has ended."""
+    if manifest is not None:
+        content = json.loads(manifest.read_text())
+        manifest.write_text(json.dumps(content | {"kernel": {"pid": 1, "start": "0"}}))
+    return kernel.Kernel(shell)
+
+
+def test_a_new_kernel_knows_no_program_of_the_last_one(shell: InteractiveShell) -> None:
+    shell.run_cell("%%node talker\nprint('hello')\n")
+    found = new_kernel(shell, folder() / MANIFEST)
+    assert not (folder() / "talker.py").exists() and not found.has("talker.py")
+
+
+def test_the_programs_stay_when_the_extension_is_loaded_again(shell: InteractiveShell) -> None:
+    shell.run_cell("%%node talker\nprint('hello')\n")
+    shell.run_line_magic("reload_ext", "autograder")
+    assert kernel.active is not None and kernel.active.has("talker.py")
+    assert shell.events.callbacks["pre_run_cell"].count(kernel.active.begin_cell) == 1
+
+
+def test_nothing_is_deleted_that_no_cell_wrote(shell: InteractiveShell) -> None:
+    own = [Path("nodes") / name for name in ("my_robot.py", "params.yaml", "data.csv")]
+    own += [folder() / name for name in ("helper.py", "notes.txt", "mine.yaml")]
+    shell.run_cell("%%node talker\nprint('hello')\n")
+    for path in own:
+        path.write_text("my own\n")
+    new_kernel(shell, folder() / MANIFEST)
+    assert [path.read_text() for path in own] == ["my own\n"] * len(own)
+
+
+def test_a_file_that_was_changed_by_hand_is_kept_and_does_not_count(shell: InteractiveShell) -> None:
+    shell.run_cell("%%node talker\nprint('hello')\n")
+    (folder() / "talker.py").write_text("print('changed by hand')\n")
+    found = new_kernel(shell, folder() / MANIFEST)
+    assert not found.has("talker.py") and not (folder() / "talker.py").exists()
+    assert (folder() / "talker.py.mine").read_text() == "print('changed by hand')\n"
+    assert found.folder.kept == [
+        "nodes/lab/talker.py was not what a cell had written: your file is kept as nodes/lab/talker.py.mine"
+    ]
+
+
+def test_a_students_own_file_is_never_overwritten(shell: InteractiveShell, capsys: pytest.CaptureFixture[str]) -> None:
+    folder().mkdir(parents=True)
+    for number in (1, 2):
+        (folder() / "talker.py").write_text(f"print('my own {number}')\n")
+        said = say(shell, f"%%node talker\nprint('from the cell {number}')\n", capsys)
+        kept = f"talker.py.mine{'' if number == 1 else 2}"
+        assert f"your file is kept as nodes/lab/{kept}" in said
+        assert (folder() / kept).read_text() == f"print('my own {number}')\n"
+    assert "from the cell 2" in (folder() / "talker.py").read_text()
+
+
+def test_two_notebooks_of_one_folder_do_not_meet(shell: InteractiveShell, monkeypatch: pytest.MonkeyPatch) -> None:
+    shell.run_cell("%%node talker\nprint('hello')\n")
+    Path("other.ipynb").write_text("{}")
+    monkeypatch.setenv("JPY_SESSION_NAME", str(Path("other.ipynb").resolve()))
+    other = kernel.Kernel(shell)
+    assert other.folder.path.name == "other" and not other.has("talker.py")
+    assert (folder() / "talker.py").is_file()
+
+
+def test_visual_studio_code_says_which_notebook_it_is(shell: InteractiveShell, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("JPY_SESSION_NAME")
+    shell.user_ns["__vsc_ipynb_file__"] = str(Path("lab.ipynb").resolve())
+    assert kernel.Kernel(shell).folder.path.name == "lab"
+
+
+def test_a_second_kernel_of_a_notebook_does_not_touch_the_first(shell: InteractiveShell) -> None:
+    shell.run_cell("%%node talker\nprint('hello')\n")
+    manifest = folder() / MANIFEST
+    with subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE) as other:
+        start = Path(f"/proc/{other.pid}/stat").read_text().rpartition(")")[2].split()[19]
+        owner = {"kernel": {"pid": other.pid, "start": start}}
+        manifest.write_text(json.dumps(json.loads(manifest.read_text()) | owner))
+        assert kernel.Kernel(shell).folder.path.name == "lab-2"
+        assert (folder() / "talker.py").is_file()
+        other.kill()
+
+
+def test_without_a_notebook_the_kernel_leaves_nothing_behind(
+    shell: InteractiveShell, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.delenv("JPY_SESSION_NAME")
+    kernel.active = kernel.Kernel(shell)
+    assert say(shell, "%%node talker\nprint('hello')\n", capsys) == "node program talker written"
+    kernel.active.folder.close()
+    assert not Path("nodes").exists()
+    kernel.active.start()
+
+
+# Kernels as a front end drives them.
+
+
+@dataclass
+class Shown:
+    """What a cell showed."""
+
+    text: str = ""
+    """Streams and plain text, in order."""
+    html: str = ""
+    error: str = ""
+    types: list[str] = field(default_factory=list)
+    seconds: float = 0.0
+
+
+class Notebook:
+    """A notebook on disk and its kernel, started as a Jupyter server starts one."""
+
+    def __init__(self, place: Path, name: str = "lab", **environment: str) -> None:
+        self.path = place / f"{name}.ipynb"
+        self.save()
+        self._manager = KernelManager(kernel_name="python3")
+        self._manager.start_kernel(
+            cwd=str(place), env={**os.environ, "JPY_SESSION_NAME": str(self.path), **environment}
+        )
+        self._client = self._manager.client()
+        self._client.start_channels()
+        self._client.wait_for_ready(timeout=START)
+
+    def save(self, *cells: tuple[str, str, dict[str, Any]]) -> None:
+        """Save cells: id, source, metadata."""
+        made = [
+            {"cell_type": "code", "id": i, "source": s, "metadata": m, "outputs": [], "execution_count": None}
+            for i, s, m in cells
+        ]
+        self.path.write_text(json.dumps({"cells": made, "metadata": {}, "nbformat": 4, "nbformat_minor": 5}))
+
+    def run(self, source: str, cell_id: str = "") -> Shown:
+        began = time.monotonic()
+        content = {"code": source, "silent": False, "store_history": True, "user_expressions": {}}
+        request = self._client.session.msg("execute_request", content | {"allow_stdin": False, "stop_on_error": False})
+        request["metadata"] = {"cellId": cell_id} if cell_id else {}
+        self._client.shell_channel.send(request)
+        shown = Shown()
+        while True:
+            message = self._client.get_iopub_msg(timeout=START)
+            if message["parent_header"].get("msg_id") != request["header"]["msg_id"]:
+                continue
+            content, kind = message["content"], message["msg_type"]
+            if kind == "status" and content["execution_state"] == "idle":
+                shown.seconds = time.monotonic() - began
+                return shown
+            shown.types.append(kind)
+            if kind == "stream":
+                shown.text += content["text"]
+            elif kind == "error":
+                shown.error = "\n".join(content["traceback"])
+            elif "data" in content:
+                shown.text += content["data"].get("text/plain", "") + "\n"
+                shown.html += content["data"].get("text/html", "")
+
+    def restart(self) -> None:
+        self._client.stop_channels()
+        self._manager.restart_kernel(now=True)
+        self._client = self._manager.client()
+        self._client.start_channels()
+        self._client.wait_for_ready(timeout=START)
+
+    def close(self) -> None:
+        self._client.stop_channels()
+        self._manager.shutdown_kernel()
+
+
+@pytest.fixture(scope="module")
+def notebook(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Notebook]:
+    """A notebook whose set-up cell and talker have been run, and saved."""
+    made = Notebook(tmp_path_factory.mktemp("notebook"))
+    made.run(SET_UP)
+    yield made
+    made.close()
+
+
+def answer(source: str, grade_id: str = "talker", blank: str = "") -> tuple[str, str, dict[str, Any]]:
+    marks = {
+        "grade_id": grade_id,
+        "solution": True,
+        "grade": False,
+        "locked": False,
+        "task": False,
+        "schema_version": 3,
+    }
+    return grade_id, source, {"nbgrader": marks, "autograder": blank_mark(blank)}
+
+
+def write(notebook: Notebook, source: str = TALKER) -> None:
+    notebook.save(answer(source))
+    assert "written" in notebook.run(source, "talker").text
+
+
+def test_a_score_reads_as_a_report_in_every_front_end(notebook: Notebook) -> None:
+    write(notebook)
+    shown = notebook.run(CHECK, "check")
+    assert shown.text.startswith("✓ passed  2 of 2 points\n") and "<div" in shown.html
+    assert shown.types.count("execute_result") == 1
+
+
+def test_nbgrader_still_reads_the_points(tmp_path: Path) -> None:
+    from nbformat.v4 import new_code_cell, new_output
+    from nbgrader.utils import determine_grade
+
+    made = Notebook(tmp_path, NBGRADER_EXECUTION="autograde")
+    try:
+        made.run(SET_UP)
+        made.run("%%node talker\nprint('no node')")
+        plain = made.run(CHECK).text.strip()
+    finally:
+        made.close()
+    cell = new_code_cell(outputs=[new_output("execute_result", {"text/plain": plain}, execution_count=1)])
+    cell.metadata["nbgrader"] = {"grade": True, "solution": False, "points": 2, "grade_id": "check"}
+    assert determine_grade(cell) == (0, 2)
+
+
+def test_a_report_names_the_cell_and_the_time(notebook: Notebook) -> None:
+    write(notebook)
+    shown = notebook.run(CHECK)
+    assert "`talker` from cell [" in shown.text and ", run at " in shown.text
+    assert "not saved" not in shown.text and "!" not in shown.text
+
+
+def test_a_cell_that_was_changed_after_its_run_is_named(notebook: Notebook) -> None:
+    write(notebook)
+    notebook.save(answer(TALKER.replace("0.05", "0.06")))
+    assert "The cell `%%node talker` has been changed since it was run" in notebook.run(CHECK).text
+
+
+def test_a_cell_that_is_not_saved_yet_is_marked(notebook: Notebook) -> None:
+    write(notebook)
+    notebook.run(TALKER.replace("0.05", "0.06"), "talker")
+    shown = notebook.run(CHECK).text
+    assert ", not saved yet" in shown and "has been changed" not in shown
+
+
+def test_a_program_from_a_cell_that_grading_ignores_is_named(notebook: Notebook) -> None:
+    notebook.save(answer("%%node talker\n# YOUR CODE HERE"))
+    notebook.run(TALKER, "a-new-cell")
+    shown = notebook.run(CHECK).text
+    assert "comes from a cell of your own" in shown and "Grading ignores that cell" in shown
+
+
+def test_an_untouched_answer_earns_nothing_and_is_no_failure(notebook: Notebook) -> None:
+    blank = "%%node talker\nprint('# YOUR CODE HERE')"
+    notebook.save(answer(blank, blank=blank))
+    notebook.run(blank, "talker")
+    shown = notebook.run('with launch("talker") as ros:\n    ros.expect_exit("talker")\nros.score(2)').text
+    assert shown.startswith("○ not attempted yet  0 of 2 points\n")
+    assert "The cell `%%node talker` is still as you received it." in shown
+
+
+def test_a_missing_program_is_said_at_once(notebook: Notebook) -> None:
+    notebook.save(answer(TALKER.replace("talker", "sleeper"), "sleeper"))
+    check = notebook.run(CHECK.replace('"talker"', '"sleeper"')).text
+    assert "The cell `%%node sleeper` has not been run since the kernel started" in check
+    assert "Run the cell `%%node sleeper` first" in check
+    listening = 'with launch("sleeper") as ros:\n    print(ros.listen("/chatter", String))'
+    assert "Run the cell `%%node sleeper` first" in notebook.run(listening).error
+    unknown = notebook.run(listening.replace("sleeper", "sleper"))
+    assert "no cell of the saved notebook begins with `%%node sleper`" in unknown.error
+    assert "Traceback" not in unknown.error and not unknown.text
+
+
+@pytest.mark.parametrize(
+    ("line", "error"),
+    [("1 / 0", "ZeroDivisionError"), ('ros.lisen("/chatter", String)', "AttributeError"), ("Int32", "NameError")],
+)
+def test_an_exception_reaches_the_student_as_python_shows_it(notebook: Notebook, line: str, error: str) -> None:
+    write(notebook)
+    shown = notebook.run(f'with launch("talker") as ros:\n    {line}\nprint("after")')
+    assert error in shown.error and "Traceback" in shown.error and "after" not in shown.text
+    scored = notebook.run(f'with launch("talker") as ros:\n    {line}\nros.score(2)')
+    assert error in scored.error and "points" not in scored.text
+
+
+def test_what_a_cell_without_a_score_expected_is_shown(notebook: Notebook) -> None:
+    write(notebook)
+    shown = notebook.run('with launch("talker") as ros:\n    ros.expect_publisher("/chatter", String)')
+    assert "✓ passed" in shown.text and "points" not in shown.text
+    shown = notebook.run('with launch("talker") as ros:\n    ros.expect_publisher("/chater", String, within=1)')
+    assert "✗ failed" in shown.text and "/chatter" in shown.text
+    assert not notebook.run("1 + 1").html
+
+
+def test_a_nodes_output_streams_while_a_cell_explores(notebook: Notebook) -> None:
+    write(notebook)
+    shown = notebook.run(
+        'with launch("talker") as ros:\n    heard = ros.listen("/chatter", String)\n'
+        "    ros.wait(lambda: heard.count >= 3)"
+    )
+    assert shown.text.count("talker | tick <b>\n") >= 3 and "\x1b" not in shown.text
+    assert "tick <b>" in notebook.run('ros.log("talker")').text
+    many = notebook.run("%%node many\nfor number in range(1000):\n    print(number)\n")
+    assert "written" in many.text
+    flood = notebook.run('with launch("many") as ros:\n    ros.wait(lambda: False, within=1)').text
+    assert "many | 99\n" in flood and "many | 100\n" not in flood and "[more is in ros.log()]" in flood
+
+
+def test_a_nodes_output_stands_under_a_failed_check_only(notebook: Notebook) -> None:
+    write(notebook)
+    failed = CHECK.replace("/chatter", "/chater").replace("at_least=2", "at_least=2, within=1")
+    shown = notebook.run(failed)
+    assert "output of talker" in shown.text and "<details" in shown.html and "tick &lt;b&gt;" in shown.html
+    assert "tick" not in notebook.run(CHECK).text
+
+
+def test_one_line_number_everywhere(notebook: Notebook) -> None:
+    source = "\n%%node talker\nimport time\ntime.sleep(0)\nraise ValueError('here')\n"
+    write(notebook, source)
+    shown = notebook.run(CHECK).text
+    assert "line 5" in shown and 'talker.py", line 5' in shown
+
+
+def test_a_launch_as_last_line_runs_and_says_what_happens(notebook: Notebook) -> None:
+    write(notebook)
+    shown = notebook.run('launch("talker")').text
+    assert "talker | tick" in shown and "/talker publishes /chatter (std_msgs/msg/String)" in shown
+    assert 'with launch("talker") as ros:' in shown
+
+
+def test_a_wait_says_what_it_waits_for_and_cleans_up(notebook: Notebook) -> None:
+    write(notebook)
+    shown = notebook.run(CHECK.replace("at_least=2", "at_least=40"))
+    assert "Waiting for messages on `/chatter`" in shown.text
+    assert shown.types.count("display_data") == 1
+    # The last update of the line takes it away.
+    assert shown.types[-2:] == ["update_display_data", "execute_result"]
+    assert "\n\n✓ passed" in shown.text
+
+
+def test_a_module_of_the_students_own_is_imported(notebook: Notebook) -> None:
+    base = "%%node my_base\nTOPIC = 'chatter'"
+    user = TALKER.replace("import rclpy\n", "import rclpy\nimport my_base\n").replace('"chatter"', "my_base.TOPIC")
+    notebook.save(answer(user), ("own", base, {}))
+    notebook.run(base, "own")
+    notebook.run(user, "talker")
+    shown = notebook.run(CHECK).text
+    assert "✓ passed" in shown and "`my_base` from cell [" in shown
+    (notebook.path.parent / "nodes" / "lab" / "by_hand.py").write_text("TOPIC = 'chatter'\n")
+    by_hand = user.replace("my_base", "by_hand")
+    notebook.save(answer(by_hand))
+    notebook.run(by_hand, "talker")
+    assert "by_hand.py was written by no cell: grading does not have it" in notebook.run(CHECK).text
+
+
+def test_after_a_restart_a_program_counts_only_once_its_cell_was_run(tmp_path: Path) -> None:
+    made = Notebook(tmp_path)
+    try:
+        made.run(SET_UP)
+        write(made)
+        assert "✓ passed" in made.run(CHECK).text
+        made.restart()
+        made.run(SET_UP)
+        assert "has not been run since the kernel started" in made.run(CHECK).text
+    finally:
+        made.close()
+
+
+def test_an_unused_extension_does_no_harm(tmp_path: Path) -> None:
+    code = (
+        "import sys\nfrom IPython.core.interactiveshell import InteractiveShell\nshell = InteractiveShell.instance()\n"
+    )
+    code += "shell.run_line_magic('load_ext', 'autograder')"
+    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, timeout=START)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+    assert not (tmp_path / "nodes").exists()
