@@ -156,7 +156,7 @@ class Kernel:
                 path = shown(self.folder.path / name)
                 first = f"%%node {name.removesuffix('.py')}"
                 told.append(
-                    f"{path} was written by no cell, so grading does not have it. Put it into a cell `{first}`."
+                    f"{path} was written by no cell: grading does not have it. Put it into a cell `{first}`."
                 )
         return told
 
