@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import copy
 import json
 import os
@@ -14,7 +15,12 @@ from typing import Any
 import pytest
 import toy
 import yaml
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
+from autograder.checks import answers, session
+from autograder.checks.command_line import CommandLineError, command_line
+from autograder.checks.forms import NAME_OR_NONE
 from autograder.grading.collect import collect
 from autograder.grading.job import Cell, Job
 from autograder.grading.worker import run_job
@@ -188,3 +194,37 @@ def test_markdown(case: dict[str, Any]) -> None:
         # Whatever is left as a link plainly leads to a web page, and somebody has to click on it.
         assert link.attrs.keys() <= {"href", "class"} and str(link.get("href", "#"))[:4] in ("http", "#"), link
     assert page.get_text().strip()
+
+
+values = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=8) | st.dates(),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=3) | st.integers(), inner, max_size=3),
+    max_leaves=6,
+)
+tables = st.dictionaries(st.sampled_from(["number", "word", "name", "words", 7]), values, max_size=5).map(
+    lambda table: yaml.safe_dump(table, allow_unicode=True)
+)
+FORMS = {"number": range(1, 9), "word": ["yes", "no"], "name": NAME_OR_NONE, "words": [["a", "b"], ["b", "a"]]}
+
+
+@settings(max_examples=50, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+@given(text=tables | st.text(max_size=40).map(lambda text: f"number: {text}\nword: {text}"))
+def test_no_table_leaves_a_check_undecided(text: str, tmp_path: Path) -> None:
+    before = session.current.folder
+    session.current.configure(tmp_path, Isolation.NONE, seed=1)
+    (tmp_path / "table.yaml").write_bytes(text.encode("utf-8", "replace"))
+    session.reset()
+    try:
+        with answers("table.yaml") as table:
+            table.expect_filled(FORMS)
+            table.expect_answer("number", 4)
+            table.expect_answer("word", "yes")
+            table.expect_answer("name", "/a/b")
+            table.expect_answer("words", ["a", "b"])
+        result = table.score(2).result
+        assert result.status in (Status.FAILED, Status.PASSED), result.outcomes
+        with contextlib.suppress(CommandLineError):
+            command_line("table.yaml", "word").words()
+    finally:
+        session.current.configure(before, Isolation.NONE, seed=1)
+        session.reset()

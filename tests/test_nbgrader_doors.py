@@ -18,6 +18,7 @@ import pytest
 import toy
 
 from autograder.grading.collect import collect
+from autograder.grading.stage_b import prepare_nbgrader
 from autograder.submission.lab import load_lab
 
 KIT = Path(__file__).resolve().parent.parent
@@ -129,18 +130,41 @@ def jupyter(folder: Path) -> Iterator[str]:
         process.wait(30)
 
 
-def post(address: str, **content: str) -> Any:
-    request = urllib.request.Request(
-        f"{address}assignments/validate", json.dumps(content).encode(), {"Authorization": "token x"}
-    )
+def post(address: str, where: str, **content: str) -> Any:
+    request = urllib.request.Request(f"{address}{where}", json.dumps(content).encode(), {"Authorization": "token x"})
     with urllib.request.urlopen(request, timeout=240) as answer:
         return json.load(answer)
 
 
-def test_the_validate_button_takes_the_same_way(root: Path, mark: Path) -> None:
+def test_buttons_in_jupyterlab_take_the_same_way(root: Path, mark: Path) -> None:
     with jupyter(root) as address:
-        assert post(address, path="build/submitted/ann/toy/toy.ipynb") == {"success": True, "value": {}}
-        answer = post(address, path="build/submitted/bob/toy/toy.ipynb")
+        fine = post(address, "assignments/validate", path="build/submitted/ann/toy/toy.ipynb")
+        assert fine == {"success": True, "value": {}}
+        answer = post(address, "assignments/validate", path="build/submitted/bob/toy/toy.ipynb")
+        graded = post(address, "formgrader/api/submission/toy/ann/autograde")
     assert answer["success"] and [entry["source"] for entry in answer["value"]["failed"]] == ["The talker: 0/3 points"]
     assert "A hidden check failed" in answer["value"]["failed"][0]["error"]
+    assert graded["success"], graded
+    assert points(root) == {"ann": 5.0}
+    assert not mark.exists()
+
+
+def points(root: Path) -> dict[str, float]:
+    """What the checks gave, by student."""
+    prepare_nbgrader()
+    from nbgrader.api import Gradebook
+
+    with Gradebook(f"sqlite:///{root / 'build' / 'gradebook.db'}") as gradebook:
+        found = gradebook.assignment_submissions(toy.LAB)
+        return {one.student_id: sum(grade.auto_score or 0 for grade in one.notebooks[0].grades) for one in found}
+
+
+def test_links_among_the_submissions_lead_nowhere(root: Path, mark: Path) -> None:
+    submitted = root / "build" / "submitted"
+    (submitted / "eve").symlink_to("ann")
+    (submitted / "mal").mkdir()
+    (submitted / "mal" / "toy").symlink_to("../ann/toy")
+    status, told = nbgrader(root, "autograde", toy.LAB)
+    assert status == 0, told
+    assert points(root) == {"ann": 5.0, "bob": 2.0, "eve": 0.0, "mal": 0.0}
     assert not mark.exists()
