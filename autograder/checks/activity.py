@@ -7,6 +7,7 @@ when one's begin lies between the other's begin and end.
 
 from __future__ import annotations
 
+import itertools
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -84,6 +85,14 @@ class Activity:
     def runs(self, name: str) -> int:
         """Complete runs of one callback."""
         return sum(1 for span in self.spans() if span.name == name)
+
+    def gaps(self, name: str) -> list[float]:
+        """Seconds from each begin of a callback to its next one."""
+        gaps = []
+        for _, events in self._stretches:
+            begins = [event.stamp for event in events if event.begins and event.name == name]
+            gaps += [later - earlier for earlier, later in itertools.pairwise(begins)]
+        return gaps
 
     def spans(self) -> list[Span]:
         """All complete runs."""

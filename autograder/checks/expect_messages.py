@@ -269,6 +269,56 @@ class MessageExpectations(GraphExpectations):
         self._wait_for_runs(topic, names, runs, title, within, hint)
         outcomes.passed(title)
 
+    def expect_period(
+        self,
+        topic: str,
+        names: Sequence[str],
+        period: float,
+        *,
+        tolerance: float = 0.2,
+        runs: int = 4,
+        within: float = WITHIN,
+        hint: str = "",
+    ) -> None:
+        """Each of the named callbacks begins every `period` seconds, judged by the median of at least `runs` gaps.
+
+        Args:
+            topic: where they publish `NAME begin` and `NAME end` (`std_msgs/String`).
+            names: the callbacks.
+            period: seconds.
+            tolerance: allowed deviation, as a share.
+            runs: gaps between two begins of each; twice as many decide against it.
+            within: seconds to wait for them.
+            hint: a pointer for the student.
+        """
+        title = f"{', '.join(names)} run{'s' if len(names) == 1 else ', each'} every {period:g} s"
+
+        def wrong(least: int) -> dict[str, list[float]]:
+            gaps = {name: self.activity(topic).gaps(name) for name in names}
+            return {
+                name: found
+                for name, found in gaps.items()
+                if len(found) < least or abs(statistics.median(found) - period) > tolerance * period
+            }
+
+        def decided() -> bool:
+            off = wrong(runs)
+            return not off or any(len(gaps) >= 2 * runs for gaps in off.values())
+
+        self.wait(decided, within)
+        late = wrong(runs)
+        if all(len(found) < runs for found in late.values()):
+            self._wait_for_runs(topic, names, runs, title, 0.0, hint)
+        told = ", ".join(f"{name} every {statistics.median(found):.2f} s" for name, found in late.items() if found)
+        self.expect_that(
+            not late,
+            title,
+            lambda: Diagnosis(f"From begin to begin it was: {told}.", "period"),
+            expected=f"{period:g} s within {tolerance:.0%}",
+            observed=told,
+            hint=hint,
+        )
+
     def expect_overlap(
         self,
         topic: str,

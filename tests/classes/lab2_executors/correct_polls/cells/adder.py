@@ -28,9 +28,7 @@ class Adder(Node):
             self.publisher.publish(Int64(data=self.total))
 
     def get_total(self, request, response):
-        with self.lock:
-            response.success = True
-            response.message = str(self.total)
+        response.success, response.message = True, f"{self.total}"
         return response
 
 

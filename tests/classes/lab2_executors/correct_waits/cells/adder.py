@@ -17,7 +17,7 @@ class Adder(Node):
         self.publisher = self.create_publisher(Int64, "total", 10)
         self.lock = threading.Lock()
         group = ReentrantCallbackGroup()
-        self.create_subscription(Int64, "add", self.add, 10, callback_group=group)
+        self.create_subscription(Int64, "add", self.add, 10)
         self.create_service(Trigger, "get_total", self.get_total, callback_group=group)
 
     def add(self, msg):
@@ -34,7 +34,9 @@ class Adder(Node):
 
 def spin(node):
     """Run the node's callbacks until the program is told to end."""
-    rclpy.spin(node)
+    executor = MultiThreadedExecutor(num_threads=2)
+    executor.add_node(node)
+    executor.spin()
 
 
 def main():
