@@ -49,6 +49,15 @@ def names(rules: list[str]) -> tuple[str, list[str]]:
         ("__node:=front-demo", "name-characters"),
         ("*/a:=b", "wildcard"),
         ("a=b", "rule-form"),
+        ("~status:=/diag", "name-form"),
+        ("image-color:=image", "name-characters"),
+        ("__NS:=/front", "rule-special"),
+        ("a__b:=c", "double-underscore"),
+        ("a:=b/", "name-slash"),
+        ("a:=", "name-empty"),
+        ("a: =b", "rule-form"),
+        ("/front/camera_demo:a:=b", "rule-colon"),
+        ("a:=rostopic://b", "rule-scheme"),
     ],
 )
 def test_a_rule_that_rcl_refuses_is_explained(rule: str, code: str) -> None:
@@ -94,6 +103,31 @@ def test_an_absolute_name_in_the_code_is_told_from_a_wrong_rule() -> None:
     reason = remap_rules.without_effect(["camera:=image"], "/x/image", ["/x/demo"], ["/camera"])
     assert reason is not None
     assert reason[1] == "absolute-name"
+
+
+def test_a_rule_of_another_node_is_not_blamed_for_the_order() -> None:
+    rules = ["front:camera:=a", "rear:camera:=image"]
+    assert remap_rules.without_effect(rules, "/image", ["/rear"], {"/a": ["/front"], "/stop": ["/rear"]}) == (
+        "The rule `rear:camera:=image` changed nothing: nothing is called `/camera`, the name on its left side.",
+        "rule-without-match",
+        "Compare the left side with the name in the code, letter by letter. ROS 2 does not warn about such a rule.",
+    )
+
+
+@pytest.mark.parametrize(
+    ("rules", "nodes", "used"),
+    [
+        (["~/status:=image"], ["/x/demo"], ["/status"]),
+        (["camera_demo:__ns:=/left"], ["/x/demo"], ["/camera"]),
+        (["~/camera:=image"], ["/demo"], ["/camera"]),
+    ],
+)
+def test_a_private_name_or_an_idle_namespace_is_not_called_absolute(
+    rules: list[str], nodes: list[str], used: list[str]
+) -> None:
+    wanted = "/x/image" if nodes == ["/x/demo"] else "/image"
+    reason = remap_rules.without_effect(rules, wanted, nodes, used)
+    assert reason is None or reason[1] == "rule-without-match"
 
 
 def test_rules_that_have_nothing_to_do_with_the_wanted_name_are_not_blamed() -> None:

@@ -9,10 +9,10 @@ from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 from rclpy.node import Node
 
-from autograder.graph.remap_rules import Reason, parse, refused, why_parameter_refused, without_effect
+from autograder.graph.remap_rules import Reason, parse, refused, refused_parameter, without_effect
 from autograder.graph.rule_effect import full_name
 
-QUICK = settings(max_examples=150, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.filter_too_much])
+QUICK = settings(max_examples=100, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.filter_too_much])
 PIECES = (
     "a", "b", "camera", "image_color", "~", "~/", "/", "//", ":", ":=", "__", "_", "__ns", "__node", "__name", "__NS",
     "*", "**", "1", "2b", "rostopic://", "rosservice://", "-", ".", " ", "é", "\\1", "status", "n:", "=", "ros",
@@ -72,7 +72,7 @@ def test_a_remap_rule_is_explained_if_and_only_if_rcl_refuses_it(rule: str) -> N
 )
 def test_a_parameter_rule_is_explained_if_and_only_if_rcl_refuses_it(name: str, value: str) -> None:
     rule = f"{name}:={value}"
-    reason = why_parameter_refused(rule)
+    reason = refused_parameter(["--ros-args", "-p", rule])
     assert (reason is not None) == rcl_refuses("-p", rule)
     assert reason is None or all(reason)
 
@@ -143,7 +143,7 @@ def followed(reason: Reason, rules: list[str], code: list[str], node: str) -> tu
     return [], []
 
 
-@settings(QUICK, max_examples=400)
+@settings(QUICK, max_examples=200)
 @given(rules=RULES, own=OWN, code=st.lists(st.sampled_from(IN_CODE), min_size=1, max_size=4, unique=True))
 def test_following_a_reasons_advice_makes_the_name_that_was_wanted(
     rules: list[str], own: list[str], code: list[str]

@@ -65,6 +65,7 @@ class ExpectationBase:
             session.current.folder,
             [rule for node, _ in self.programs for rule in node.all_rules()],
             self._trouble,
+            [node.all_rules() for node, _ in self.programs],
         )
 
     def served(self, name: str) -> list[tuple[float, float]]:

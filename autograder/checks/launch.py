@@ -207,6 +207,10 @@ class Launch(MessageExpectations, ServiceExpectations, LifecycleExpectations, Pr
         except CommandLineError as error:
             self._trouble.append(Diagnosis(error.because, error.code, error.hint))
             return
+        refused = remap_rules.refused_parameter(words)
+        if refused:
+            self._trouble.append(Diagnosis(*refused))
+            return
         assert self._group is not None  # begun on entering
         program = self._group.start(launched.program, words, environment, cores=launched.cores)
         self.programs.append((launched, program))

@@ -69,6 +69,8 @@ class Scene:
     """The remap rules given, as on the command line."""
     trouble: Sequence[Diagnosis] = ()
     """What kept programs from being started at all."""
+    rules_by_program: Sequence[Sequence[str]] = ()
+    """The same rules, those of each program by themselves: a program's rules reach its own nodes only."""
 
 
 _IN_CALLBACK = {
@@ -459,6 +461,21 @@ def why_doubled(scene: Scene, name: str) -> Diagnosis:
     )
 
 
+def _idle_rule(scene: Scene, topic: str) -> Diagnosis | None:
+    """A remap rule that was meant to make the topic's name and did not."""
+    observer = scene.observer
+    users = {
+        name: {full_name(end.node_namespace, end.node_name) for end in ends}
+        for name in observer.topics()
+        for ends in [[*observer.publishers(name), *observer.subscriptions(name)]]
+    }
+    for rules in scene.rules_by_program or [scene.rules]:
+        idle = remap_rules.without_effect(rules, topic, observer.nodes(), users)
+        if idle:
+            return Diagnosis(*idle)
+    return None
+
+
 def why_no_endpoint(scene: Scene, topic: str, msg_type: type | None, kind: str, node: str = "") -> Diagnosis:
     """Why no `kind` ("publisher" or "subscription") of this type (None: of any) is on the topic."""
     trouble = program_trouble(scene)
@@ -475,9 +492,9 @@ def why_no_endpoint(scene: Scene, topic: str, msg_type: type | None, kind: str, 
         return Diagnosis(f"The {kind} on `{topic}` belongs to {', '.join(owners)}, not to `{node}`.", "wrong-node")
     if not observer.nodes():
         return inside_reason(scene) or Diagnosis("The program runs, but it has not made any node.", "no-node")
-    idle = remap_rules.without_effect(scene.rules, topic, observer.nodes(), list(observer.topics()))
+    idle = _idle_rule(scene, topic)
     if idle:
-        return Diagnosis(*idle)
+        return idle
     opposite = observer.subscriptions(topic) if kind == "publisher" else observer.publishers(topic)
     names = [name for name in observer.topics() if name not in ("/rosout", "/parameter_events")]
     names = [name for name in names if not name.endswith("/transition_event")]
