@@ -155,9 +155,7 @@ class Kernel:
             if any(_imports(written, name) for written in used):
                 path = shown(self.folder.path / name)
                 first = f"%%node {name.removesuffix('.py')}"
-                told.append(
-                    f"{path} was written by no cell: grading does not have it. Put it into a cell `{first}`."
-                )
+                told.append(f"{path} was written by no cell: grading does not have it. Put it into a cell `{first}`.")
         return told
 
 

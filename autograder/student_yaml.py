@@ -52,7 +52,11 @@ class StudentFileError(Exception):
     """A student's file cannot be used; the message is a sentence for the student, with the line where it is known."""
 
     def __init__(self, because: str, code: str = "not-yaml", line: int | None = None, hint: str = "") -> None:
-        """Keep the sentence, a short code, the line as the notebook counts it in the cell, and what to do."""
+        """Keep the sentence, a short code, the line as the notebook counts it in the cell, and what to do.
+
+        The codes: `not-yaml`, which no other program reads either; `yaml-refused`, which others may read;
+        `file-missing` and `file-too-large`.
+        """
         super().__init__(because)
         self.because, self.code, self.line, self.hint = because, code, line, hint
 
@@ -81,7 +85,7 @@ def load(text: str, name: str = "the file") -> Any:
         finally:
             loader.dispose()
     except _RefusedError as refused:
-        raise _error(text, name, refused.index, f": {refused}") from None
+        raise _error(text, name, refused.index, f": {refused}", "yaml-refused") from None
     except yaml.MarkedYAMLError as error:
         problem = error.problem or error.context or ""
         # Of what is never closed the beginning helps, not the end of the file.
@@ -113,9 +117,10 @@ def read(path: Path) -> Any:
         raise StudentFileError(f"{name} is not text in UTF-8.") from None
 
 
-def _error(text: str, name: str, index: int | None, what: str) -> StudentFileError:
+def _error(text: str, name: str, index: int | None, what: str, code: str = "not-yaml") -> StudentFileError:
     line = None if index is None else cell_line(index, text)
-    return StudentFileError(f"{name}{what}." if line is None else f"{name}, line {line} of the cell{what}.", line=line)
+    where = name if line is None else f"{name}, line {line} of the cell"
+    return StudentFileError(f"{where}{what}.", code, line)
 
 
 def _in_plain_words(problem: str) -> str:

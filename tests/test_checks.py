@@ -515,3 +515,16 @@ def test_an_argument_without_a_default_is_needed(grade: Grade, default: str, poi
     result = grade(check, robot__py=TALKER, a__launch__yaml=LAUNCHED % default)
     assert result.points == points
     assert (result.first_failure.code if result.first_failure else "") == code
+
+
+def test_a_parameter_file_that_is_no_yaml_is_named_with_its_line(grade: Grade) -> None:
+    check = """\
+        with launch("talker", params_file="p.yaml") as ros:
+            ros.expect_parameter("/talker", "word", "hi", within=2)
+        ros.score(2)
+        """
+    found = failure(grade(check, talker__py=TALKER, p__yaml="talker:\n  ros__parameters:\n    word: [hi\n"))
+    assert found.code == "params-file" and "line 5 of the cell is not YAML" in found.because
+    # What rcl reads is not refused for being more than a loader of answers takes.
+    found = failure(grade(check, talker__py=TALKER, p__yaml="talker:\n  ros__parameters:\n    word: 2026-13-45\n"))
+    assert found.code == "parameter-value" and "2026-13-45" in found.because

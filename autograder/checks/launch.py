@@ -26,7 +26,7 @@ from autograder.checks.scoring import score
 from autograder.checks.session import Score
 from autograder.checks.trial import Log, log_of, try_out
 from autograder.checks.watch import NotLaunchedError, Watch, watched
-from autograder.graph import remap_rules
+from autograder.graph import params_file, remap_rules
 from autograder.graph.diagnosis import Diagnosis
 from autograder.graph.observer import Observer
 from autograder.launch_files import LaunchFileError, read_launch_file, remove_written
@@ -210,6 +210,11 @@ class Launch(MessageExpectations, ServiceExpectations, LifecycleExpectations, Pr
         refused = remap_rules.refused_parameter(words)
         if refused:
             self._trouble.append(Diagnosis(*refused))
+            return
+        unreadable = params_file.unreadable(words, session.current.folder)
+        if unreadable is not None:
+            hint = "Look at the indentation there, and at brackets and quotation marks."
+            self._trouble.append(Diagnosis(unreadable.because, "params-file", hint))
             return
         assert self._group is not None  # begun on entering
         program = self._group.start(launched.program, words, environment, cores=launched.cores)

@@ -2,9 +2,27 @@
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
-from autograder.student_yaml import StudentFileError, load
+from autograder.student_yaml import StudentFileError, load, read
+
+
+def unreadable(words: Sequence[str], folder: Path) -> StudentFileError | None:
+    """Why a program cannot start with these words: the first of its parameter files that is no YAML at all.
+
+    The program itself would only end with the parser's own words. What it might read after all is not decided here.
+    """
+    for option, file in itertools.pairwise(words):
+        if option == "--params-file" and (folder / file).is_file():
+            try:
+                read(folder / file)
+            except StudentFileError as error:
+                if error.code == "not-yaml":
+                    return error
+    return None
 
 
 def node_keys(text: str) -> list[str]:
