@@ -24,6 +24,7 @@ from autograder.checks.forms import NAME_OR_NONE
 from autograder.grading.collect import collect
 from autograder.grading.job import Cell, Job
 from autograder.grading.worker import run_job
+from autograder.launch_files import LaunchFileError, read_launch_file
 from autograder.report.terminal import plain
 from autograder.results import Isolation, Status
 from autograder.submission.lab import grade_id_of, load_lab
@@ -31,6 +32,9 @@ from autograder.submission.reader import read_submission
 
 CASES = {path.stem: yaml.safe_load(path.read_text(encoding="utf-8")) for path in
          sorted((Path(__file__).parent / "attacks" / "intake").glob("*.yaml"))}  # fmt: skip
+
+
+KINDS = ("folder", "zip", "notebook", "table", "launch", "markup")
 
 
 def of_kind(kind: str) -> Any:
@@ -48,7 +52,7 @@ def test_every_attack_says_what_is_tried_and_what_must_hold() -> None:
     assert len(CASES) >= 60
     for name, case in CASES.items():
         assert {"kind", "tried", "must"} <= case.keys(), name
-        assert case["kind"] in ("folder", "zip", "notebook", "table", "markup") and name.startswith(case["kind"])
+        assert case["kind"] in KINDS and name.startswith(case["kind"])
 
 
 def hold(case: dict[str, Any], source: Path, course: Path) -> None:
@@ -179,6 +183,18 @@ def test_tables_of_answers(tmp_path: Path) -> None:
         assert failure is not None and len(failure.because) < 400
         for words in (f"line {case['line']} of the cell" if "line" in case else "", *case["said"]):
             assert words in failure.because, name
+
+
+@of_kind("launch")
+def test_a_launch_file(case: dict[str, Any], tmp_path: Path) -> None:
+    path = tmp_path / "attack.launch.yaml"
+    path.write_text(written_out(case["text"]), encoding="utf-8")
+    with pytest.raises(LaunchFileError) as refused:
+        read_launch_file(path, {})
+    told = str(refused.value)
+    assert len(told) < 600 and "root:" not in told
+    for words in case["said"]:
+        assert words in told
 
 
 @of_kind("markup")
