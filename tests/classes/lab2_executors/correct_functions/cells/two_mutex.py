@@ -1,0 +1,48 @@
+import threading
+import time
+
+import rclpy
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from std_msgs.msg import String
+
+
+def main():
+    # The joint b is done by a thread of its own; one publisher for both keeps the order of what is published.
+    rclpy.init()
+    node = rclpy.create_node("two_mutex")
+    node.declare_parameter("period", 0.4)
+    node.declare_parameter("work", 0.15)
+    period, work = node.get_parameter("period").value, node.get_parameter("work").value
+    activity = node.create_publisher(String, "activity", 10)
+
+    def run(name):
+        activity.publish(String(data=f"{name} begin"))
+        time.sleep(work)
+        activity.publish(String(data=f"{name} end"))
+
+    wake = threading.Semaphore(0)
+
+    def other_joint():
+        while wake.acquire():
+            run("b1")
+            run("b2")
+
+    threading.Thread(target=other_joint, daemon=True).start()
+    node.create_timer(period, lambda: run("a1"))
+    node.create_timer(period, lambda: run("a2"))
+    helper = rclpy.create_node("helper")
+    helper.create_timer(period, wake.release)
+    executor = SingleThreadedExecutor()
+    executor.add_node(node)
+    second = SingleThreadedExecutor()
+    second.add_node(helper)
+    threading.Thread(target=second.spin, daemon=True).start()
+    try:
+        executor.spin()
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    finally:
+        rclpy.try_shutdown()
+
+
+main()

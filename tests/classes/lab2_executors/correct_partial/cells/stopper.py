@@ -1,0 +1,39 @@
+import os
+import signal
+
+import rclpy
+from rclpy.executors import ExternalShutdownException
+from rclpy.node import Node
+from std_msgs.msg import Empty, Int64
+
+
+class Stopper(Node):
+    def __init__(self):
+        super().__init__("stopper")
+        self.declare_parameter("tick_period", 0.1)
+        self.count = 0
+        self.ticks = self.create_publisher(Int64, "ticks", 10)
+        self.create_timer(self.get_parameter("tick_period").value, self.tick)
+        self.create_subscription(Empty, "stop", self.on_stop, 10)
+
+    def tick(self):
+        self.count += 1
+        self.ticks.publish(Int64(data=self.count))
+
+    def on_stop(self, _):
+        """As Ctrl-C does it: a signal to itself."""
+        os.kill(os.getpid(), signal.SIGINT)
+
+
+def main():
+    rclpy.init()
+    node = Stopper()
+    try:
+        rclpy.spin(node)
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    finally:
+        rclpy.try_shutdown()
+
+
+main()
