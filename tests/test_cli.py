@@ -91,6 +91,16 @@ def test_what_lies_around_a_notebook_is_never_the_course(root: Path, tmp_path: P
     assert status == 2 and "lies in the submissions" in err
 
 
+def test_check_follows_no_link_out_of_a_submission(root: Path, tmp_path: Path) -> None:
+    (tmp_path / "eve").mkdir()
+    (tmp_path / "eve" / "toy").symlink_to(root / "class" / "ann")
+    (tmp_path / "mal").symlink_to(root / "class" / "ann")
+    for notebook, link in (("eve/toy/toy.ipynb", "'toy'"), ("mal/toy.ipynb", "'mal'")):
+        for path in (notebook, str(tmp_path / notebook)):
+            status, out, _ = run(tmp_path, "check", "--course", str(root), path)
+            assert status == 1 and f"{link} is a link" in out and "0 of 5" in out
+
+
 def test_who_checks_the_courses_own_copy_is_told(root: Path, tmp_path: Path) -> None:
     course = tmp_path / "course"
     shutil.copytree(root / "solutions", course / "labs")

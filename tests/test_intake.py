@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import copy
+import io
 import json
 import os
 import socket
@@ -21,6 +22,7 @@ from hypothesis import strategies as st
 from autograder.checks import answers, session
 from autograder.checks.command_line import CommandLineError, command_line
 from autograder.checks.forms import NAME_OR_NONE
+from autograder.errors import KitError
 from autograder.grading.collect import collect
 from autograder.grading.job import Cell, Job
 from autograder.grading.worker import run_job
@@ -244,3 +246,47 @@ def test_no_table_leaves_a_check_undecided(text: str, tmp_path: Path) -> None:
     finally:
         session.current.configure(before, Isolation.NONE, seed=1)
         session.reset()
+
+
+WHOLE = io.BytesIO()
+with zipfile.ZipFile(WHOLE, "w", zipfile.ZIP_DEFLATED) as whole:
+    for who in ("ann", "José", "cem/toy"):
+        whole.writestr(f"{who}/toy.ipynb", f"the work of {who}")
+
+
+def taken_from(content: bytes, tmp_path: Path) -> dict[str, Path]:
+    """Take a zip in that may be anything; nothing but a sentence may come of it."""
+    (tmp_path / "class.zip").write_bytes(content)
+    try:
+        collected = collect(tmp_path / "class.zip", toy.LAB, tmp_path / "course")
+    except KitError:
+        return {}
+    for student, path in collected.notebooks.items():
+        assert path.parent.parent.parent == tmp_path / "course" / "build" / "submitted" and path.is_file()
+        assert plain(student) == student
+    return collected.notebooks
+
+
+@settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+@given(
+    changes=st.lists(st.tuples(st.integers(0, len(WHOLE.getvalue()) - 1), st.integers(0, 255)), min_size=1, max_size=6)
+)
+def test_no_damaged_zip_stops_a_class(changes: list[tuple[int, int]], tmp_path: Path) -> None:
+    content = bytearray(WHOLE.getvalue())
+    for at, value in changes:
+        content[at] = value
+    taken_from(bytes(content), tmp_path)
+
+
+@settings(max_examples=100, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+@given(names=st.lists(st.text(min_size=1, max_size=90).filter(lambda name: "\0" not in name), max_size=4, unique=True))
+def test_no_name_in_a_zip_stops_a_class(names: list[str], tmp_path: Path) -> None:
+    content = io.BytesIO()
+    with zipfile.ZipFile(content, "w") as archive:
+        archive.writestr("bob/toy.ipynb", "bob's work")
+        for name in names:
+            with contextlib.suppress(UnicodeEncodeError):  # half characters, which a zip cannot hold
+                archive.writestr(zipfile.ZipInfo(f"{name}/toy.ipynb"), name.encode("utf-8", "replace"))
+    taken = taken_from(content.getvalue(), tmp_path)
+    if not any(name.startswith("bob") for name in names):
+        assert taken["bob"].read_text() == "bob's work"
