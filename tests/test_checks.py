@@ -528,3 +528,50 @@ def test_a_parameter_file_that_is_no_yaml_is_named_with_its_line(grade: Grade) -
     # What rcl reads is not refused for being more than a loader of answers takes.
     found = failure(grade(check, talker__py=TALKER, p__yaml="talker:\n  ros__parameters:\n    word: 2026-13-45\n"))
     assert found.code == "parameter-value" and "2026-13-45" in found.because
+
+
+def test_a_launch_files_own_value_wins_over_the_file_before_it_and_its_variables_arrive(grade: Grade) -> None:
+    check = """\
+        from autograder.checks import launch_file
+        with launch_file("a.launch.yaml", package="lab") as ros:
+            ros.expect_parameter("/veh/robot", "word", "inline")
+            ros.expect_parameter("/veh/robot", "mode", "fast")
+        ros.score(2)
+        """
+    program = TALKER.replace(
+        '"period", 0.05)', '"period", 0.05)\n        self.declare_parameter("mode", os.environ["MODE"])'
+    )
+    launched = """\
+launch:
+- set_env: {name: MODE, value: fast}
+- push_ros_namespace: {namespace: veh}
+- node: {pkg: lab, exec: robot, name: robot, param: [{from: $(dirname)/p.yaml}, {name: word, value: inline}]}
+"""
+    params = "/veh/robot:\n  ros__parameters: {word: from the file}\n"
+    result = grade(check, robot__py=f"import os\n{program}", a__launch__yaml=launched, p__yaml=params)
+    assert result.points == 2.0, result
+    assert not list(session.current.folder.glob(".launch_params_*"))
+
+
+def test_a_parameter_file_that_ros2_launch_would_not_find_is_the_reason(grade: Grade) -> None:
+    check = """\
+        from autograder.checks import launch_file
+        with launch_file("a.launch.yaml", package="lab") as ros:
+            ros.expect_parameter("/talker", "word", "hi", within=2)
+        ros.score(2)
+        """
+    launched = "launch:\n- node: {pkg: lab, exec: robot, param: [{from: p.yaml}]}\n"
+    params = "/**:\n  ros__parameters: {word: hi}\n"
+    found = failure(grade(check, robot__py=TALKER, a__launch__yaml=launched, p__yaml=params))
+    assert found.code == "params-file-missing"
+    assert "in the folder that it is called from" in found.because
+
+
+def test_a_parameter_rule_that_rcl_refuses_is_explained(grade: Grade) -> None:
+    check = """\
+        with launch("talker", ros_arguments=["-p", "my-word:=hi"]) as ros:
+            ros.expect_node("/talker")
+        ros.score(2)
+        """
+    found = failure(grade(check, talker__py=TALKER))
+    assert found.code == "name-characters" and "`-` cannot stand in the name" in found.because

@@ -163,7 +163,7 @@ class Launch(MessageExpectations, ServiceExpectations, LifecycleExpectations, Pr
         folder = session.current.folder.resolve()
         session.current.use(name)
         try:
-            found = read_launch_file(folder / name, arguments, find)
+            found = read_launch_file(folder / name, arguments, find, list(self._stand_ins))
         except LaunchFileError as error:
             self._trouble.append(Diagnosis(str(error), "launch-file", error.hint))
             return []

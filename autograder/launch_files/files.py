@@ -7,15 +7,16 @@ folder. `$(dirname)` is that folder, and `$(find-pkg-share PACKAGE)/launch` lead
 from __future__ import annotations
 
 import os.path
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from pathlib import Path
 
 
 class Packages:
     """The packages that a launch file may name."""
 
-    def __init__(self, find: Callable[[str], Path]) -> None:
-        """Ask `find` for the folder of a package; it raises KeyError for one that does not exist."""
+    def __init__(self, find: Callable[[str], Path], programs: Collection[str] = ()) -> None:
+        """Ask `find` for the folder of a package, KeyError if there is none; `programs` every package has."""
+        self._programs = set(programs)
         self._find = find
         self._folders: dict[str, Path] = {}
 
@@ -39,7 +40,8 @@ class Packages:
 
     def programs(self, name: str) -> set[str]:
         """The names of a package's programs; empty if its folder has none at all."""
-        return {path.stem for path in self.folder(name).glob("*.py")}
+        found = {path.stem for path in self.folder(name).glob("*.py")}
+        return found | self._programs if found else found
 
     def file(self, text: str, folder: Path) -> Path | None:
         """The file that a path leads to once the package is installed; None if there is none, or not in the lab.

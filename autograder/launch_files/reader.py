@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
 
 from autograder.launch_files import values
@@ -17,7 +17,10 @@ _OUTPUTS = ("screen", "log", "both", "own_log", "full")
 
 
 def read_launch_file(
-    path: Path, arguments: Mapping[str, str], find: Callable[[str], Path] | None = None
+    path: Path,
+    arguments: Mapping[str, str],
+    find: Callable[[str], Path] | None = None,
+    programs: Collection[str] = (),
 ) -> list[LaunchedNode]:
     """Read a launch file and say what it starts, in its order.
 
@@ -26,6 +29,7 @@ def read_launch_file(
         arguments: launch arguments, as `name:=value` on the command line of `ros2 launch`.
         find: the folder with a package's programs and files; KeyError if there is no such package. Without it every
             package is the folder of the launch file.
+        programs: names of programs that a package has beside those in its folder.
 
     Raises:
         LaunchFileError: it is missing, is no launch file, is refused by `ros2 launch`, or uses what is not covered.
@@ -33,7 +37,7 @@ def read_launch_file(
     folder = path.resolve().parent
     reader = _Reader()
     context = Context(
-        Packages(find or (lambda package: folder)), {name: str(value) for name, value in arguments.items()}
+        Packages(find or (lambda package: folder), programs), {name: str(value) for name, value in arguments.items()}
     )
     reader.file(path, context, set(arguments), Place(path.name, folder), depth=1)
     return reader.nodes
