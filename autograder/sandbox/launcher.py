@@ -44,7 +44,8 @@ STACK_SIGNAL = signal.SIGRTMIN + 10
 PR_SET_PDEATHSIG, PR_SET_DUMPABLE, PR_SET_SECCOMP, PR_SET_CHILD_SUBREAPER, PR_SET_NO_NEW_PRIVS = 1, 4, 22, 36, 38
 PR_CAPBSET_DROP, PR_CAP_AMBIENT, PR_CAP_AMBIENT_CLEAR_ALL = 24, 47, 4
 CLONE_NEWNS, CLONE_NEWPID = 0x20000, 0x20000000
-MS_NOSUID, MS_NODEV, MS_NOEXEC, MS_REC, MS_PRIVATE = 2, 4, 8, 0x4000, 1 << 18
+MS_RDONLY, MS_NOSUID, MS_NODEV, MS_NOEXEC = 1, 2, 4, 8
+MS_REMOUNT, MS_BIND, MS_REC, MS_PRIVATE = 0x20, 0x1000, 0x4000, 1 << 18
 EVENTS_FD, STACKS_FD = 3, 4
 
 WARM = (
@@ -177,6 +178,10 @@ def _fresh_places(disk: int, inodes: int) -> None:
     for place in (b"/tmp", b"/dev/shm"):
         _checked(_libc.mount(b"tmpfs", place, b"tmpfs", MS_NOSUID | MS_NODEV, options))
     _checked(_libc.mount(b"proc", b"/proc", b"proc", MS_NOSUID | MS_NODEV | MS_NOEXEC, None))
+    # Settings of the namespaces, some of which would be the programs' own.
+    _checked(_libc.mount(b"/proc/sys", b"/proc/sys", None, MS_BIND, None))
+    read_only = MS_BIND | MS_REMOUNT | MS_RDONLY | MS_NOSUID | MS_NODEV | MS_NOEXEC
+    _checked(_libc.mount(None, b"/proc/sys", None, read_only, None))
 
 
 def _give_up_privileges() -> None:

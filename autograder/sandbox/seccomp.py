@@ -40,6 +40,7 @@ _NAMESPACE_FLAGS = 0x7E020000  # every CLONE_NEW* that clone takes
 _THREAD_FLAG, _SHARED_FILES_FLAG = 0x10000, 0x400
 _UNIX, _IPV4, _IPV6, _NETLINK = 1, 2, 10, 16
 _DATAGRAM, _ROUTE = 2, 0
+_SETSOCKOPT, _SOL_SOCKET, _BUFFER_SIZES = 54, 1, (7, 8, 32, 33)  # SO_SNDBUF, SO_RCVBUF, and by force
 
 _LOAD, _AND, _EQUAL, _SET, _AT_LEAST, _RETURN = 0x20, 0x54, 0x15, 0x45, 0x35, 0x06
 _NUMBER, _ARGUMENTS = 0, 16
@@ -69,6 +70,15 @@ def filter_program() -> bytes:
     for number, argument, value in _ON_THE_FIRST_PROCESS:
         program += [_step(_EQUAL, number, 0, 4), _step(_LOAD, _ARGUMENTS + 8 * argument), _step(_EQUAL, value, 0, 1)]
         program += [_REFUSE, _step(_LOAD, _NUMBER)]
+    # Sockets keep the buffers they are born with, and are told otherwise: what lies in them is in no limit.
+    sizes = [_step(_EQUAL, option, len(_BUFFER_SIZES) - place, 0) for place, option in enumerate(_BUFFER_SIZES)]
+    checks = [
+        _step(_LOAD, _ARGUMENTS + 8),
+        _step(_EQUAL, _SOL_SOCKET, 0, len(sizes) + 1),
+        _step(_LOAD, _ARGUMENTS + 16),
+    ]
+    checks += [*sizes, _step(_RETURN, _ALLOW), _step(_RETURN, _ERRNO)]
+    program += [_step(_EQUAL, _SETSOCKOPT, 0, len(checks)), *checks]
     for call in (_SOCKET, _SOCKETPAIR):
         checks = _socket_checks()
         program += [_step(_EQUAL, call, 0, len(checks)), *checks]

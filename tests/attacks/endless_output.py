@@ -1,4 +1,7 @@
-"""Prints without end."""
+"""Prints without end.
+
+Must: output limit.
+"""
 
 import os
 

@@ -1,4 +1,7 @@
-"""Floods the channels of the probe and of the stacks, and writes nonsense there."""
+"""Floods the channels of the probe and of the stacks, and writes nonsense there.
+
+Must: refused.
+"""
 
 import os
 

@@ -1,4 +1,7 @@
-"""Forks without end, and does not care for refusals; also by the raw calls, and with other programs."""
+"""Forks without end, and does not care for refusals; also by the raw calls, and with other programs.
+
+Must: refused.
+"""
 
 import ctypes
 import os
@@ -26,4 +29,4 @@ for _ in range(1000):
     ):
         made += starts(make)
 made += starts(lambda: subprocess.Popen([sys.executable, "--version"]).pid)
-print("processes", made, flush=True)
+print("ESCAPED processes" if made else "processes", made, flush=True)

@@ -1,4 +1,7 @@
-"""Does not end when it is asked to."""
+"""Does not end when it is asked to.
+
+Must: goes on.
+"""
 
 import signal
 import time

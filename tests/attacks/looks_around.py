@@ -1,4 +1,7 @@
-"""Looks for the checks, for other programs, and for what others put into their environment."""
+"""Looks for the checks, for other programs, and for what others put into their environment.
+
+Must: refused.
+"""
 
 import os
 
@@ -7,7 +10,7 @@ for folder, folders, files in os.walk("/"):
         folders.clear()
     for name in [*folders, *files]:
         if "secret" in name and "site-packages" not in folder and "/lib/python" not in folder:
-            print("FOUND", os.path.join(folder, name))
+            print("ESCAPED", os.path.join(folder, name))
 for pid in filter(str.isdigit, os.listdir("/proc")):
     for name in ("environ", "cmdline", "mem", "maps", "root", "cwd"):
         if int(pid) == os.getpid():
@@ -21,6 +24,7 @@ for pid in filter(str.isdigit, os.listdir("/proc")):
         except OSError:
             continue
         if b"secret" in text.lower():
-            print("FOUND", pid, name, text)
-print("processes", len([name for name in os.listdir("/proc") if name.isdigit()]))
-print("environment", sorted(name for name in os.environ if "secret" in name.lower()))
+            print("ESCAPED", pid, name, text)
+for name in os.environ:
+    if "secret" in name.lower():
+        print("ESCAPED", name)

@@ -1,4 +1,7 @@
-"""Takes memory until it is stopped."""
+"""Takes memory until it is stopped.
+
+Must, alone: memory limit.
+"""
 
 hoard = []
 while True:

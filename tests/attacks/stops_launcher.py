@@ -1,4 +1,7 @@
-"""Freezes the process that started it, and goes on."""
+"""Freezes the process that started it, and goes on.
+
+Must, alone: goes on.
+"""
 
 import os
 import signal

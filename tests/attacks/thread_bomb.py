@@ -1,4 +1,7 @@
-"""Starts threads without end, and does not care for refusals."""
+"""Starts threads without end, and does not care for refusals.
+
+Must, alone: process limit.
+"""
 
 import threading
 import time
