@@ -128,7 +128,7 @@ def test_a_right_node_earns_the_points_under_names_and_values_that_vary(grade: G
         ("        self.count = 0", "        self.count = nothing", 'ros.expect_node("/talker")', "crashed",
          "self.count = nothing"),
         ("def main():", "class NoWord(Exception): pass\n\n\ndef main():\n    raise NoWord(1)",
-         'ros.expect_node("/talker")', "crashed", "line 32 (`raise NoWord(1)`): NoWord: 1"),
+         'ros.expect_node("/talker")', "crashed", "line 32: NoWord: 1"),
         ("rclpy.spin(Talker())", "node = Talker(); node.destroy_publisher(node.publisher); node.tick()",
          'ros.expect_messages("/chatter", String, within=6)', "used-after-destroy", "InvalidHandle"),
         ("def main():", "def main()", 'ros.expect_node("/talker")', "syntax-error", "line"),

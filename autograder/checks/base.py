@@ -7,9 +7,9 @@ import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, NoReturn
 
+from autograder import diagnosis
 from autograder.checks import outcomes, session
-from autograder.graph import diagnosis
-from autograder.graph.diagnosis import Diagnosis, Scene
+from autograder.diagnosis import Diagnosis, Scene
 from autograder.graph.observer import Observer
 from autograder.sandbox.nodes import Program
 
@@ -48,6 +48,8 @@ class ExpectationBase:
     def prepare(self) -> None:
         """Set up what each group needs for this launch."""
         self._ended: float | None = None
+        self.stopped: list[Program] = []
+        """Programs that the check itself has stopped."""
         self.may_end: list[Program] = []
         """Programs that the check itself has stopped, or that are asked to end by themselves."""
         session.current.block_began = len(session.current.outcomes)
@@ -63,9 +65,9 @@ class ExpectationBase:
             [program for _, program in self.programs],
             self._missing,
             session.current.folder,
-            [rule for node, _ in self.programs for rule in node.all_rules()],
-            self._trouble,
             [node.all_rules() for node, _ in self.programs],
+            self._trouble,
+            self.stopped,
         )
 
     def served(self, name: str) -> list[tuple[float, float]]:

@@ -10,11 +10,12 @@ from typing import Any, Literal
 from rcl_interfaces.srv import ListParameters
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
+from autograder import diagnosis
 from autograder.checks import outcomes
 from autograder.checks.base import SETTLE, WITHIN, ExpectationBase
+from autograder.diagnosis import Diagnosis
 from autograder.errors import KitError
-from autograder.graph import diagnosis, qos
-from autograder.graph.diagnosis import Diagnosis
+from autograder.graph import qos
 from autograder.graph.names import full_name, type_name
 from autograder.graph.services import ServiceMissing, call_all
 
@@ -112,21 +113,10 @@ class GraphExpectations(ExpectationBase):
         self.expect_that(
             gone,
             f"Nobody uses the topic `{topic}`",
-            lambda: self._topic_present(topic),
+            lambda: diagnosis.why_topic_present(self.scene(), topic),
             observed=lambda: self._topics(),
             hint=hint,
         )
-
-    def _topic_present(self, topic: str) -> Diagnosis:
-        ends = self.observer.publishers(topic) + self.observer.subscriptions(topic)
-        owners = sorted({full_name(end.node_namespace, end.node_name) for end in ends})
-        if any(end.node_namespace != "/" and not topic.startswith(end.node_namespace + "/") for end in ends):
-            return Diagnosis(
-                f"{', '.join(owners)} uses `{topic}`, outside the node's own namespace: the name is absolute.",
-                "absolute-name",
-                "A topic name with a leading slash is absolute: no namespace reaches it. Write it without the slash.",
-            )
-        return Diagnosis(f"{', '.join(owners) or 'A node'} uses `{topic}`.", "topic-present")
 
     def _topics(self) -> str:
         own = [t for t in sorted(self.observer.topics()) if t not in ("/rosout", "/parameter_events")]
@@ -236,7 +226,7 @@ class GraphExpectations(ExpectationBase):
                 f"expect_qos knows no policy called {', '.join(unknown) or 'nothing'}.",
                 f"Policies on the graph are {', '.join(sorted(qos.POLICIES))}.",
             )
-        wanted = ", ".join(f"{policy} {_value(value)}" for policy, value in policies.items())
+        wanted = ", ".join(f"{policy} {qos.in_words(value)}" for policy, value in policies.items())
         title = f"The {of} on `{topic}` has {wanted}"
         if not self.wait(lambda: self._ends(topic, None, of, node), within):
             self.fail(
@@ -250,9 +240,12 @@ class GraphExpectations(ExpectationBase):
         seen, wrong = [], []
         for end in self._ends(topic, None, of, node):
             owner, have = full_name(end.node_namespace, end.node_name), qos.describe(end.qos_profile)
-            seen.append(", ".join(f"{policy} {_value(have[policy])}" for policy in policies))
+            seen.append(", ".join(f"{policy} {qos.in_words(have[policy])}" for policy in policies))
             wrong += [
-                (policy, f"The {policy} of the {of} of `{owner}` is {_value(have[policy])}, not {_value(value)}.")
+                (
+                    policy,
+                    f"The {policy} of `{owner}`'s {of} is {qos.in_words(have[policy])}, not {qos.in_words(value)}.",
+                )
                 for policy, value in policies.items()
                 if not _same(have[policy], value)
             ]
@@ -295,12 +288,6 @@ class GraphExpectations(ExpectationBase):
         ]
         reason = next((found for found in reasons if found), None)
         self.expect_that(not reason, title, lambda: reason, hint=hint)
-
-
-def _value(value: Any) -> str:
-    if value is None:
-        return "none"
-    return value.replace("_", " ") if isinstance(value, str) else f"{value:g} s"
 
 
 def _same(have: Any, want: Any) -> bool:

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import NoReturn
 
+from autograder import diagnosis
 from autograder.checks import outcomes
 from autograder.checks.base import WITHIN
 from autograder.checks.expect_graph import GraphExpectations
-from autograder.graph import diagnosis
-from autograder.graph.diagnosis import Diagnosis
+from autograder.diagnosis import Diagnosis
 from autograder.graph.lifecycle import Change, LifecycleClient, Requested, in_order
 from autograder.graph.parameters import NoAnswer
 from autograder.graph.services import ServiceMissing

@@ -5,17 +5,18 @@ from __future__ import annotations
 import itertools
 import statistics
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any
 
 from rclpy.qos import QoSProfile
 
+from autograder import diagnosis
 from autograder.checks import outcomes
 from autograder.checks.activity import Activity
 from autograder.checks.base import WITHIN
 from autograder.checks.expect_graph import GraphExpectations
 from autograder.checks.message_text import in_words, shorten
-from autograder.graph import diagnosis
-from autograder.graph.diagnosis import Diagnosis
+from autograder.diagnosis import Diagnosis
 from autograder.graph.names import full_name
 from autograder.graph.recording import Received, Recording, quiet_profile
 
@@ -90,19 +91,22 @@ class MessageExpectations(GraphExpectations):
 
         title = _title(topic, need, most, rate)
         if not self.wait(lambda: len(counted()) >= need, within):
-            got = len(counted())
-            reason = diagnosis.why_silent(self.scene(), topic, msg_type, qos or quiet_profile())
-            if got and reason.code == "silent":
-                reason = Diagnosis(f"Only {got} of {need} messages came in {within:g} s.", "too-few")
-            elif where and not got and recording.count > after:
+            got, scene = len(counted()), self.scene()
+            if where and not got and recording.count > after:
                 # Messages do come, so what keeps callbacks waiting is not the reason.
-                scene, last = self.scene(), shorten(in_words(recording.messages[-1].msg, where), 120)
+                last = shorten(in_words(recording.messages[-1].msg, where), 120)
                 reason = (
                     diagnosis.program_trouble(scene)
                     or diagnosis.inside_reason(scene)
                     or diagnosis.lifecycle_silence(scene)
                     or Diagnosis(f"Messages came, but none as expected; the last of them is `{last}`.", "content")
                 )
+            else:
+                reason = diagnosis.why_silent(scene, topic, msg_type, qos or quiet_profile())
+                if got and reason.code == diagnosis.SILENT:
+                    reason = Diagnosis(
+                        f"Only {got} of {need} messages came in {within:g} s. {reason.because}", "too-few"
+                    )
             self.fail(title, reason, expected=f"{need} messages", observed=f"{got} messages", hint=hint)
         if most is not None:
             self.observer.wait(lambda: len(counted()) > most, window)
@@ -249,16 +253,21 @@ class MessageExpectations(GraphExpectations):
         found = self.activity(topic)
         counts = {name: found.runs(name) for name in names}
         told = ", ".join(f"{name} {count}" for name, count in counts.items())
-        reason = diagnosis.why_silent(self.scene(), topic, String, quiet_profile())
-        if any(counts.values()):
-            starved = [name for name, count in counts.items() if count < runs]
-            serial = diagnosis.why_serial(self.scene())
-            reason = diagnosis.program_trouble(self.scene()) or Diagnosis(
-                f"{', '.join(starved)} did not run {runs} times while others did. "
-                + (serial.because if serial else ""),
-                "starved",
-                serial.hint if serial else "",
+        scene = self.scene()
+        if not any(counts.values()):
+            reason = diagnosis.why_silent(scene, topic, String, quiet_profile())
+        else:
+            missing = ", ".join(name for name, count in counts.items() if count < runs)
+            trouble = diagnosis.program_trouble(scene) or diagnosis.inside_reason(scene)
+            reason = (
+                trouble or diagnosis.why_starved(scene) or Diagnosis(diagnosis.account(scene, topic), "too-few-runs")
             )
+            if not trouble:
+                reason = replace(
+                    reason,
+                    because=f"{missing} did not run {'once' if runs == 1 else f'{runs} times'} while others did. "
+                    + reason.because,
+                )
         self.fail(title, reason, expected=f"{runs} complete runs of each", observed=told or "no run", hint=hint)
 
     def expect_runs(
@@ -371,8 +380,11 @@ class MessageExpectations(GraphExpectations):
         self.fail(
             title,
             diagnosis.program_trouble(self.scene())
-            or diagnosis.why_serial(self.scene())
-            or Diagnosis(f"There were never more than {most} at once.", "no-overlap"),
+            or diagnosis.inside_reason(self.scene())
+            or diagnosis.why_not_together(self.scene(), 2 if others else at_least, itself)
+            or Diagnosis(
+                f"There were never more than {most} at once. {diagnosis.layout(self.scene())}".strip(), "no-overlap"
+            ),
             expected=f"{at_least} at once",
             observed=f"{most} at once" if most > 1 else "one at a time",
             hint=hint,
@@ -460,12 +472,17 @@ class MessageExpectations(GraphExpectations):
             if not service and not seen:
                 self._wait_for_runs(activity, [callback], 1, title, 0.0, hint)
             told = ", ".join(str(count) for count in seen) or "no complete run"
+            scene = self.scene()
             self.fail(
                 title,
-                diagnosis.program_trouble(self.scene())
-                or diagnosis.inside_reason(self.scene())
-                or diagnosis.why_serial(self.scene())
-                or Diagnosis(f"Nothing came on `{topic}` meanwhile: both wait for each other's end.", "starved"),
+                diagnosis.program_trouble(scene)
+                or diagnosis.inside_reason(scene)
+                or diagnosis.waits_for_its_group(scene)
+                or diagnosis.why_not_together(scene)
+                or Diagnosis(
+                    f"At most {max(seen, default=0)} messages came on `{topic}` in one run. {diagnosis.layout(scene)}",
+                    "paused",
+                ),
                 expected=f"at least {at_least} messages in one run",
                 observed=told,
                 hint=hint,

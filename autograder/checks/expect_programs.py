@@ -7,12 +7,12 @@ from typing import Any
 
 from rclpy.qos import QoSDurabilityPolicy, QoSProfile
 
+from autograder import diagnosis
 from autograder.checks import outcomes
 from autograder.checks.base import WITHIN
 from autograder.checks.expect_graph import GraphExpectations
-from autograder.graph import diagnosis
+from autograder.diagnosis import Diagnosis
 from autograder.graph.clock import ClockDriver
-from autograder.graph.diagnosis import Diagnosis
 from autograder.sandbox.nodes import Program
 
 _LEVELS = {"DEBUG": 10, "INFO": 20, "WARN": 30, "ERROR": 40, "FATAL": 50}
@@ -38,6 +38,7 @@ class ProgramExpectations(GraphExpectations):
         """End one of several programs: politely (SIGTERM), or without a chance to clean up."""
         program = self.program(name)
         self.may_end.append(program)
+        self.stopped.append(program)
         program.stop(grace=0.0 if kill else 2.0)
 
     def expect_running(self, name: str, *, hint: str = "") -> None:
@@ -56,10 +57,9 @@ class ProgramExpectations(GraphExpectations):
         title = f"`{name}` ends by itself" + ("" if status is None else f" with exit status {status}")
         if not self.wait(lambda: not program.running(), within):
             reason = diagnosis.inside_reason(self.scene())
-            where = "" if reason else diagnosis.waiting_line(self.scene(), program)
             self.fail(
                 title,
-                reason or Diagnosis(f"It still runs after {within:g} s.{where}", "still-running"),
+                reason or Diagnosis(f"It still runs after {within:g} s.", "still-running"),
                 expected="ended",
                 observed="still running",
                 hint=hint,

@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 from rcl_interfaces.srv import GetParameters
 
+from autograder import diagnosis
 from autograder.checks import outcomes, session
 from autograder.checks.base import WITHIN
 from autograder.checks.expect_graph import GraphExpectations
-from autograder.graph import diagnosis, parameters, params_file, remap_rules
-from autograder.graph.diagnosis import Diagnosis
+from autograder.diagnosis import Diagnosis
+from autograder.graph import parameters, params_file, remap_rules
 from autograder.graph.names import type_name
 from autograder.graph.services import Answer, OfferedService, ServiceMissing, call_all
 
@@ -157,7 +158,7 @@ class ServiceExpectations(GraphExpectations):
 
     def _given_as_a_rule(self, name: str) -> Diagnosis | None:
         """Whether the parameter was given with `-r`, as if it were a name to be changed."""
-        for text in self.scene().rules:
+        for text in itertools.chain.from_iterable(self.scene().rules):
             rule = remap_rules.parse(text)
             if rule and rule.left == name:
                 because = f"`{text}` is given as a remap rule, and rules reach topics and services, no parameters."

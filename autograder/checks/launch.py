@@ -26,8 +26,8 @@ from autograder.checks.scoring import score
 from autograder.checks.session import Score
 from autograder.checks.trial import Log, log_of, try_out
 from autograder.checks.watch import NotLaunchedError, Watch, watched
+from autograder.diagnosis import Diagnosis
 from autograder.graph import params_file, remap_rules
-from autograder.graph.diagnosis import Diagnosis
 from autograder.graph.observer import Observer
 from autograder.launch_files import LaunchFileError, read_launch_file, remove_written
 from autograder.results import NodeLog

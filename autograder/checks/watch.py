@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from html import escape
 from typing import Any
 
-from autograder.graph.diagnosis import Diagnosis
+from autograder.diagnosis import Diagnosis
 from autograder.graph.observer import Observer
 from autograder.kernel import Kernel
 from autograder.report.output import tidy

@@ -31,6 +31,13 @@ def describe(profile: QoSProfile) -> dict[str, str | float | None]:
     }
 
 
+def in_words(value: str | float | None) -> str:
+    """A policy's value as it stands in a sentence: `best effort`, `0.2 s`, `none`."""
+    if value is None:
+        return "none"
+    return value.replace("_", " ") if isinstance(value, str) else f"{value:g} s"
+
+
 def first_mismatch(offered: QoSProfile, requested: QoSProfile) -> str | None:
     """The first policy over which a publisher (offered) and a subscription (requested) do not match; None if they do.
 

@@ -24,6 +24,8 @@ _LONGEST_NOTE = 4096
 """Bytes; the probe's own are shorter."""
 _NOTES_KEPT = 1 << 20
 """Bytes of notes that are kept of one program: what they become in memory is twenty times as much at worst."""
+_RECORDS = 500
+"""Notes that stand for a thing: only the last one of each is kept."""
 
 
 class Program:
@@ -53,6 +55,8 @@ class Program:
         self._status: int | None = None
         self._stopped_by = ""
         self._events: list[dict[str, Any]] = []
+        self._records: dict[str, dict[str, Any]] = {}
+        """Events that stand for a thing, by its key: only the last one counts."""
         self._event_rest = b""
         self._event_bytes = 0
         self._stacks = bytearray()
@@ -81,13 +85,21 @@ class Program:
         *lines, self._event_rest = (self._event_rest + data).split(b"\n")
         self._event_rest = self._event_rest[-_LONGEST_NOTE:]
         for line in lines:
-            if len(self._events) >= self._limits.events or self._event_bytes > _NOTES_KEPT:
-                return
+            if len(line) >= _LONGEST_NOTE:
+                continue
             with contextlib.suppress(ValueError, RecursionError):
-                event = json.loads(line) if len(line) < _LONGEST_NOTE else None
+                event = json.loads(line)
                 if isinstance(event, dict):
-                    self._event_bytes += len(line)
-                    self._events.append(event)
+                    self._take_event(event, len(line))
+
+    def _take_event(self, event: dict[str, Any], size: int) -> None:
+        """Keep an event; one that has a key stands for a thing, and takes the place of the one before it."""
+        key = event.get("key")
+        if isinstance(key, str) and (key in self._records or len(self._records) < _RECORDS):
+            self._records[key] = event
+        elif key is None and len(self._events) < self._limits.events and self._event_bytes <= _NOTES_KEPT:
+            self._event_bytes += size
+            self._events.append(event)
 
     def _take_stacks(self, data: bytes) -> None:
         self._noted += len(data)
@@ -142,11 +154,12 @@ class Program:
     def events(self) -> list[dict[str, Any]]:
         """Return what the probe inside it noted, in order. The program can forge it: for hints, never for points.
 
-        Whatever it noted before it sent an answer or a message is in here once that has arrived.
+        What happened before it sent an answer or a message is in here once that has arrived; what stands for a thing
+        (the events with a `key`) follows within a moment.
         """
         self._catch_up(self)
         with self._changed:
-            return list(self._events)
+            return [*self._events, *self._records.values()]
 
     def wait(self, timeout: float) -> bool:
         """Wait until it has ended, at most `timeout` seconds; return whether it has."""

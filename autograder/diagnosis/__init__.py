@@ -1,0 +1,45 @@
+"""Why something did not happen: walks the chain from the program to the message and names the first broken link.
+
+    program started? → still alive? → node name? → namespace? → topic name? → message type? → QoS pair?
+    → error in a callback? → blocked callback? → spun at all? → lifecycle state? → timer due? → kept waiting by others?
+
+A link speaks only if what its docstring demands has been seen; a reason is established or not given. Where no link
+speaks, the report says what was observed, and so ruled out, without advice.
+
+What the graph shows is evidence. What the student's process says about itself (its output, its probe's events, its
+threads' stacks) is used here for the *reason* only; points never depend on it.
+"""
+
+from autograder.diagnosis.base import Diagnosis, RunningProgram, Scene
+from autograder.diagnosis.callbacks import failed_in_a_callback
+from autograder.diagnosis.chain import inside_reason
+from autograder.diagnosis.matching import why_not_matched
+from autograder.diagnosis.names import why_doubled, why_no_endpoint, why_no_node, why_no_service, why_topic_present
+from autograder.diagnosis.programs import program_trouble, shut_down_inside
+from autograder.diagnosis.silence import SILENT, account, lifecycle_silence, why_no_answer, why_silent
+from autograder.diagnosis.together import layout, waits_for_its_group, why_not_together, why_starved
+
+__all__ = [
+    "SILENT",
+    "Diagnosis",
+    "RunningProgram",
+    "Scene",
+    "account",
+    "failed_in_a_callback",
+    "inside_reason",
+    "layout",
+    "lifecycle_silence",
+    "program_trouble",
+    "shut_down_inside",
+    "waits_for_its_group",
+    "why_doubled",
+    "why_no_answer",
+    "why_no_endpoint",
+    "why_no_node",
+    "why_no_service",
+    "why_not_matched",
+    "why_not_together",
+    "why_silent",
+    "why_starved",
+    "why_topic_present",
+]

@@ -1,0 +1,194 @@
+"""Callbacks that do not come to an end: what they wait for, and why that cannot come."""
+
+from __future__ import annotations
+
+from autograder.diagnosis.base import Diagnosis
+from autograder.diagnosis.events import Call, Thing
+from autograder.diagnosis.inside import Inside, called
+from autograder.diagnosis.sources import Place
+from autograder.graph.names import nearest
+
+STUCK_AFTER = 1.5
+"""Seconds that a run must have taken to count as one that does not end."""
+
+_OWN_GROUP = "Give the client, or the callback that waits, a callback group of its own."
+
+
+def _blocked(inside: Inside, what: str) -> list[Call]:
+    """Calls of this kind, made in a callback, that have not come back."""
+    return [call for call in inside.calls if call.what == what and call.in_callback and call.blocks]
+
+
+def _at(inside: Inside, call: Call) -> str:
+    return f"`{inside.name}`, {call.line} (`{call.code}`): "
+
+
+def call_same_group(inside: Inside) -> Diagnosis | None:
+    """Must have seen: `call()` in a callback that has not come back, and client and callback in one exclusive group."""
+    for call in _blocked(inside, "client.call"):
+        client, callback = inside.things.get(call.target), inside.things.get(call.callback)
+        executor = inside.executor_of(callback.node) if callback else None
+        if not client or not callback or not client.exclusive or client.group_id != callback.group_id:
+            continue
+        if executor and executor.size > 1:
+            return Diagnosis(
+                f"{_at(inside, call)}`call()` blocks this callback until the answer is taken, but the client is in the "
+                "same mutually exclusive group as the callback: more threads do not help, the answer must wait for the "
+                "callback's end.",
+                "call-same-group",
+                _OWN_GROUP,
+            )
+    return None
+
+
+def call_in_callback(inside: Inside) -> Diagnosis | None:
+    """Must have seen: `call()` in a callback that has not come back, and every thread of the executor taken."""
+    for call in _blocked(inside, "client.call"):
+        callback = inside.things.get(call.callback)
+        executor = inside.executor_of(callback.node) if callback else None
+        if executor and executor.busy >= executor.size:
+            threads = "the only thread" if executor.size == 1 else f"the last of {executor.size} threads"
+            return Diagnosis(
+                f"{_at(inside, call)}`call()` blocks inside a callback until the answer comes, but no thread is free "
+                f"to take the answer: this callback holds {threads}, and waits for itself.",
+                "call-in-callback",
+                "Use `call_async` with a done callback. Or keep `call()`, with a MultiThreadedExecutor, and with the "
+                "client in another group than the callback.",
+            )
+    return None
+
+
+def waits_for_a_service(inside: Inside) -> Diagnosis | None:
+    """Must have seen: a call that waits for a service, and no service of that name on the graph."""
+    for call in inside.calls:
+        client = inside.things.get(call.target)
+        if call.what not in ("wait_for_service", "client.call") or not call.begun or not client:
+            continue
+        lasting = call.blocks or (call.what == "wait_for_service" and call.begun > 1)
+        services = inside.scene.observer.services()
+        if lasting and client.name and client.name not in services:
+            close = nearest(client.name, [n for n, types in services.items() if "rcl_interfaces" not in types[0]])
+            return Diagnosis(
+                f"{_at(inside, call)}it waits for the service `{client.name}`, and no node offers that"
+                + (f"; the nearest name is `{close}`." if close else "."),
+                "waits-for-service",
+                f"The code says `{client.given}`: compare the names, namespace included."
+                if client.given
+                else "Compare the names, namespace included.",
+            )
+    return None
+
+
+def nested_spin(inside: Inside) -> Diagnosis | None:
+    """Must have seen: a callback that spins, and has not ended since or has lost its node to that spinning."""
+    for call in inside.calls:
+        if call.what != "spin" or not call.in_callback:
+            continue
+        callback = inside.things.get(call.callback)
+        within = bool(callback and callback.running)
+        lost = bool(callback and callback.node and not inside.spinning(callback.node))
+        if call.blocks or within or lost:
+            so = (
+                "the spinning waits for something that only the end of this callback lets happen."
+                if call.blocks or (within and not lost)
+                else "it took the node away from the executor that runs it, so the node's other callbacks stop."
+            )
+            return Diagnosis(
+                f"{_at(inside, call)}It spins inside a callback: {so}",
+                "nested-spin",
+                "Never spin inside a callback: use `call_async` and a done callback, or `await`.",
+            )
+    return None
+
+
+def rate_in_callback(inside: Inside) -> Diagnosis | None:
+    """Must have seen: `rate.sleep()` in a callback that has not come back, and every thread of the executor taken."""
+    for call in _blocked(inside, "rate.sleep"):
+        callback = inside.things.get(call.callback)
+        executor = inside.executor_of(callback.node) if callback else None
+        if executor and executor.busy >= executor.size:
+            return Diagnosis(
+                f"{_at(inside, call)}`rate.sleep()` inside a callback waits for a timer that only the executor can "
+                "run, and no thread of the executor is free while the callback waits: a deadlock.",
+                "rate-in-callback",
+                "Use a timer for what must happen periodically.",
+            )
+    return None
+
+
+def rate_unspun(inside: Inside) -> Diagnosis | None:
+    """Must have seen: `rate.sleep()` outside a callback that has not come back, and no executor that spins."""
+    for call in inside.calls:
+        spun = any(executor.spinning for executor in inside.executors)
+        if call.what == "rate.sleep" and not call.in_callback and call.blocks and not spun and not _foreign(inside):
+            return Diagnosis(
+                f"{_at(inside, call)}`rate.sleep()` waits for a timer of the node, and nothing spins the node.",
+                "rate-unspun",
+                "Spin the node in another thread, or better: use a timer and `rclpy.spin`.",
+            )
+    return None
+
+
+def _foreign(inside: Inside) -> bool:
+    return any(node.foreign for node in inside.nodes.values())
+
+
+def await_same_group(inside: Inside) -> Diagnosis | None:
+    """Must have seen: a callback that awaits a client's answer now, and both in one mutually exclusive group."""
+    for thing in inside.things.values():
+        client = inside.things.get(thing.awaits.client)
+        if not thing.running or not client or not thing.exclusive or client.group_id != thing.group_id:
+            continue
+        where = thing.awaits
+        return Diagnosis(
+            f"`{inside.name}`, {where.line} (`{where.code}`): the client is in the same mutually exclusive group as "
+            "the callback that awaits it. A group is held until its callback ends, so the answer is never taken.",
+            "await-same-group",
+            _OWN_GROUP,
+        )
+    return None
+
+
+def busy_wait(inside: Inside) -> Diagnosis | None:
+    """Must have seen: a callback in one loop all the time, whose source asks a future, and an answer not taken."""
+    for thing, since, place in _stuck(inside):
+        asked = [client for client in inside.things.values() if client.kind == "client" and client.runs > client.done]
+        if not place.loop or ".done()" not in place.loop or not asked:
+            continue
+        executor = inside.executor_of(thing.node)
+        same = asked[0].exclusive and asked[0].group_id == thing.group_id
+        if same or (executor and executor.busy >= executor.size):
+            why = "its client is in the same exclusive group" if same else "no thread is free to take the answer"
+            return Diagnosis(
+                f"`{inside.name}`: a callback waits in {place} for a future, for {since:.1f} s so far. While this "
+                f"callback runs, {why}, so the future is never done.",
+                "busy-wait",
+                "Let the callback end: `future.add_done_callback(...)` goes on when the answer is there, and so does "
+                "`await` with the client in another group.",
+            )
+    return None
+
+
+def stuck(inside: Inside) -> Diagnosis | None:
+    """Must have seen: one run of a callback that lasts, and its thread in one line or loop of the student's."""
+    for thing, since, place in _stuck(inside):
+        return Diagnosis(
+            f"`{inside.name}`: {called(thing)} has been running one callback for {since:.1f} s. It is in {place}.",
+            "stuck-callback",
+            "A callback has to come to its end; what belongs to it waits for that.",
+        )
+    return None
+
+
+def _stuck(inside: Inside) -> list[tuple[Thing, float, Place]]:
+    """Runs that last, with their age and their place."""
+    found = []
+    for thing in inside.things.values():
+        for began, thread in thing.running:
+            age = inside.now - began
+            if age < STUCK_AFTER or thing.awaits.line:
+                continue
+            place = inside.place(thread)
+            if place is not None:
+                found.append((thing, age, place))
+    return found

@@ -1,0 +1,129 @@
+"""What went wrong in a callback: rclpy lets it end the spinning, or swallows it."""
+
+from __future__ import annotations
+
+from autograder.diagnosis.base import Diagnosis, RunningProgram, Scene
+from autograder.diagnosis.events import BadMessage, BadReturn, CallbackError, Event, ThreadError, read
+from autograder.diagnosis.inside import Inside
+from autograder.diagnosis.traces import KNOWN_ERRORS, quoted
+
+_AFTER = {
+    "service": "The client gets no answer and the node no longer spins.",
+    "lifecycle": "rclpy swallows it without a log line and treats the transition as ERROR.",
+}
+_CODES = {"service": "service-exception", "lifecycle": "lifecycle-exception"}
+
+
+def failed(inside: Inside) -> Diagnosis | None:
+    """Must have seen: an exception leave a callback, a return value of the wrong type, or a message refused."""
+    for event in inside.events:
+        found = _of(inside.name, event)
+        if found:
+            return found
+    return None
+
+
+def thread_failed(inside: Inside) -> Diagnosis | None:
+    """Must have seen: an exception end a thread of the program's own."""
+    for event in inside.all(ThreadError):
+        error = f"{event.type}: {event.text}".strip(": ")
+        return Diagnosis(
+            f"A thread of `{inside.name}` ended with an error in {event.line}{quoted(event.code, error)}: {error}",
+            "thread-exception",
+            "What this thread had to do is not done any more; the rest of the program goes on.",
+        )
+    return None
+
+
+def failed_in_a_callback(scene: Scene) -> RunningProgram | None:
+    """A program with an error in a callback, which ends it.
+
+    A lifecycle node outlives its own. A node outlives a parameter callback that returns nothing, too: the value is
+    refused, and rclpy warns.
+    When it ends is luck: a multi-threaded executor of rclpy 7.1 looks for errors only at its next event.
+    """
+    for program in scene.programs:
+        for event in read(program.events()):
+            if isinstance(event, CallbackError) and event.kind != "lifecycle":
+                return program
+            if isinstance(event, BadReturn) and event.kind not in ("lifecycle", "parameter"):
+                return program
+    return None
+
+
+def _of(program: str, event: Event) -> Diagnosis | None:
+    if isinstance(event, BadMessage):
+        return _bad_message(program, event)
+    if isinstance(event, BadReturn):
+        return _bad_return(program, event)
+    if isinstance(event, CallbackError):
+        return _error(program, event)
+    return None
+
+
+def _bad_message(program: str, event: BadMessage) -> Diagnosis:
+    at = f" in {event.line} (`{event.code}`)" if event.line else ""
+    if not event.field:
+        return Diagnosis(
+            f"`{program}` sends the wrong type on `{event.name}`{at}: a {event.kind} there is a {event.expected}, and "
+            f"it got {event.value} ({event.given}).",
+            "message-type",
+            "The message class must be the one that the publisher, client or service was made with.",
+        )
+    return Diagnosis(
+        f"`{program}` cannot send its {event.kind} on `{event.name}`{at}: the field `{event.field}` is of type "
+        f"{event.expected}, and its value is {event.value} ({event.given}).",
+        "message-field",
+        "Python does not notice when the field is set, only when the message is sent: convert the value first.",
+    )
+
+
+def _bad_return(program: str, event: BadReturn) -> Diagnosis:
+    at = f" ({event.line})" if event.line else ""
+    if event.kind == "service":
+        return Diagnosis(
+            f"A service callback of `{program}`{at} did not return the response, which ends the node's spinning: the "
+            "client never gets an answer.",
+            "service-no-return",
+            "Fill `response` and `return response`.",
+        )
+    if event.kind == "lifecycle":
+        return Diagnosis(
+            f"A lifecycle callback of `{program}`{at} did not return a TransitionCallbackReturn: the node stops "
+            "answering in the middle of the transition.",
+            "lifecycle-return",
+            "Return TransitionCallbackReturn.SUCCESS, FAILURE or ERROR from every path.",
+        )
+    return Diagnosis(
+        f"A {event.kind} callback of `{program}`{at} returned {event.text or 'the wrong type'}.",
+        "bad-return",
+        "Every path of the callback must return a value of that type.",
+    )
+
+
+def _error(program: str, event: CallbackError) -> Diagnosis:
+    error = f"{event.type}: {event.text}".strip(": ")
+    at = f" ({event.line})" if event.line else ""
+    callback = f"A {event.kind} callback of `{program}`{at}" if event.kind else f"A callback of `{program}`{at}"
+    source = quoted(event.code, error)
+    if "no running event loop" in error:
+        return Diagnosis(
+            f"{callback} awaits asyncio{source}, and rclpy does not run an asyncio loop ({error}).",
+            "asyncio-in-callback",
+            "Await rclpy futures only (such as the one of `call_async`), or use a timer.",
+        )
+    if "ParameterAlreadyDeclared" in error:
+        return Diagnosis(
+            f"{callback} declares a parameter that is declared already{source}: {error}. A parameter lives as long as "
+            "its node.",
+            "declared-twice",
+            "Declare parameters in `__init__`, once for all lives of the node.",
+        )
+    code = _CODES.get(event.kind, "callback-exception")
+    hint = "The line that raised it, and what was in its variables, is where to begin."
+    for exception, word, advice in KNOWN_ERRORS:
+        if exception in error and word.startswith("parameter"):
+            code, hint = word, advice
+    return Diagnosis(
+        f"{callback} raised {error}{source}. {_AFTER.get(event.kind, 'It ended the spinning.')}".rstrip(), code, hint
+    )

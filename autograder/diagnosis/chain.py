@@ -1,0 +1,45 @@
+"""The chain inside a living program: which links there are, and in which order they are asked.
+
+Each link is a function that says in its docstring what it must have seen; it gives None where it has not seen that,
+and the next one is asked. What comes first explains what comes after it: an error in a callback ends the spinning, a
+blocked callback keeps others from running, and only where callbacks can run does it matter what they do.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from autograder.diagnosis import blocked, callbacks, spinning
+from autograder.diagnosis.base import Diagnosis, Scene, first
+
+if TYPE_CHECKING:
+    from autograder.diagnosis.inside import Inside
+
+Link = Callable[["Inside"], Diagnosis | None]
+
+SAID: tuple[Link, ...] = (callbacks.failed, callbacks.thread_failed)
+"""What a program says by itself; true whatever else the probe could see."""
+
+SEEN: tuple[Link, ...] = (
+    blocked.call_same_group,
+    blocked.call_in_callback,
+    blocked.waits_for_a_service,
+    blocked.nested_spin,
+    blocked.rate_in_callback,
+    blocked.await_same_group,
+    blocked.busy_wait,
+    blocked.rate_unspun,
+    spinning.in_the_constructor,
+    spinning.not_added,
+    spinning.never_spun,
+    spinning.no_longer_spun,
+    blocked.stuck,
+)
+"""What is concluded from all that the probe has seen; nothing where it could not see all."""
+
+
+def inside_reason(scene: Scene, node: str = "") -> Diagnosis | None:
+    """Why a program that lives does nothing: the first broken link inside the program of `node`, or inside any."""
+    insides = scene.inside_of(node) if node else scene.insides
+    return first(SAID, insides) or first(SEEN, [inside for inside in insides if inside.alive])

@@ -1,0 +1,97 @@
+"""What one program says about itself: its probe's events, its threads' stacks, its source."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from functools import cached_property
+from typing import TypeVar
+
+from autograder.diagnosis import events, sources
+from autograder.diagnosis.base import RunningProgram, Scene
+from autograder.diagnosis.events import Call, Event, ExecutorSeen, NodeSeen, ParameterSeen, Thing
+
+_T = TypeVar("_T")
+
+
+class Inside:
+    """One program as its probe shows it. Where the probe could not attach, nothing is known and nothing is said."""
+
+    def __init__(self, scene: Scene, program: RunningProgram) -> None:
+        """Read the program's events."""
+        self.scene = scene
+        self.program = program
+        self.name = program.name
+        self.now = time.monotonic()
+        self.events: list[Event] = events.read(program.events())
+        self.attached = bool(self.all(events.Attached)) and not self.all(events.ProbeFailed)
+        self.things: dict[int, Thing] = {thing.id: thing for thing in self.all(Thing)}
+        self.executors: list[ExecutorSeen] = self.all(ExecutorSeen)
+        self.nodes: dict[str, NodeSeen] = {node.name: node for node in self.all(NodeSeen)}
+        self.calls: list[Call] = self.all(Call)
+        self.parameters: list[ParameterSeen] = self.all(ParameterSeen)
+
+    def all(self, kind: type[_T]) -> list[_T]:
+        """The events of one kind, in their order."""
+        return [event for event in self.events if isinstance(event, kind)]
+
+    @property
+    def alive(self) -> bool:
+        """Whether the program runs and its probe can be believed to tell all."""
+        return self.attached and self.program.running()
+
+    @property
+    def age(self) -> float:
+        """Seconds since the program was started."""
+        return self.now - self.program.began
+
+    @property
+    def callbacks(self) -> list[Thing]:
+        """Timers, subscriptions and services that are still there."""
+        return [thing for thing in self.things.values() if thing.has_callback and not thing.destroyed]
+
+    def group(self, thing: Thing) -> list[Thing]:
+        """What is in the same callback group, itself included; clients too."""
+        return [other for other in self.things.values() if thing.group_id and other.group_id == thing.group_id]
+
+    def executor_of(self, node: str) -> ExecutorSeen | None:
+        """The executor that holds a node."""
+        return next((executor for executor in self.executors if node in executor.nodes), None)
+
+    def spinning(self, node: str) -> bool:
+        """Whether an executor that spins now holds the node."""
+        return any(executor.spinning and node in executor.nodes for executor in self.executors)
+
+    @cached_property
+    def stacks(self) -> list[sources.Stacks]:
+        """Several looks at where the threads are."""
+        return sources.look(self.program)
+
+    @cached_property
+    def source(self) -> sources.Source:
+        """The student's file."""
+        return sources.Source(self.scene.folder / f"{self.name}.py")
+
+    def place(self, thread: int) -> sources.Place | None:
+        """Where the student's own code on this thread is, in the callback that runs there."""
+        return self.source.place(self.name, [stacks.get(thread, []) for stacks in self.stacks])
+
+    def main_place(self) -> sources.Place | None:
+        """Where the program's main thread is, in the student's own code."""
+        return self.source.place(self.name, [next(reversed(stacks.values()), []) for stacks in self.stacks], True)
+
+
+def called(thing: Thing) -> str:
+    """A callback as a student knows it: `the timer of line 12 (every 0.5 s)`."""
+    at = f" made in line {thing.made.rpartition(':')[2]}" if thing.made else ""
+    if thing.kind == "timer":
+        return f"the timer{at} (every {thing.period:g} s)"
+    if thing.name:
+        return f"the {thing.kind} `{thing.name}`"
+    return f"the {thing.kind or 'other'} callback{f' in {thing.line}' if thing.line else ''}"
+
+
+def listed(things: Sequence[Thing]) -> str:
+    """Several of them in a row."""
+    names = [called(thing) for thing in things]
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"

@@ -1,0 +1,214 @@
+"""Why a node, a topic's end or a service is not there under the name that was looked for."""
+
+from __future__ import annotations
+
+from autograder.diagnosis.base import Diagnosis, Scene
+from autograder.diagnosis.chain import inside_reason
+from autograder.diagnosis.events import Thing
+from autograder.diagnosis.programs import program_trouble
+from autograder.graph import remap_rules
+from autograder.graph.names import full_name, nearest, type_name
+
+_LETTER_BY_LETTER = "Compare the two names letter by letter, namespace included."
+_EVERY_NODES = ("/rosout", "/parameter_events")
+
+
+def _no_node_at_all(scene: Scene) -> Diagnosis:
+    """Nothing is on the graph, though nothing is known to be wrong with a program."""
+    if not scene.programs:
+        return Diagnosis(
+            "No program was started: there is nothing to look at.",
+            "nothing-started",
+            "A launch file starts what its `node` entries name.",
+        )
+    names = ", ".join(f"`{program.name}`" for program in scene.programs)
+    return inside_reason(scene) or Diagnosis(
+        f"{names} {'runs' if len(scene.programs) == 1 else 'run'}, but no node is on the graph.", "no-node"
+    )
+
+
+def why_no_node(scene: Scene, wanted: str) -> Diagnosis:
+    """Why the node `wanted` is not on the graph."""
+    trouble = program_trouble(scene)
+    if trouble:
+        return trouble
+    names = scene.observer.nodes()
+    if not names:
+        return _no_node_at_all(scene)
+    doubles = [name for name in names if names.count(name) > 1]
+    if doubles:
+        return why_doubled(scene, doubles[0])
+    base = wanted.rsplit("/", 1)[-1]
+    for name in names:
+        if name.rsplit("/", 1)[-1] == base:
+            return Diagnosis(
+                f"The node `{base}` exists, but in another namespace: `{name}`.",
+                "namespace",
+                "A namespace given at the start (`-r __ns:=/name`) reaches every node that does not fix its own.",
+            )
+    close = nearest(wanted, names) or names[0]
+    return Diagnosis(
+        f"There is no node `{wanted}`; the nearest name on the graph is `{close}`.",
+        "node-name",
+        "The name given to the Node constructor (or by `-r __node:=`) decides.",
+    )
+
+
+def why_doubled(scene: Scene, name: str) -> Diagnosis:
+    """Why several nodes have one name."""
+    count = scene.observer.nodes().count(name)
+    for rule in map(remap_rules.parse, scene.rules_for(name)):
+        if rule and rule.left in ("__node", "__name") and not rule.prefix and len(scene.programs) == 1:
+            return Diagnosis(
+                f"`{rule.text}` renames every node of its process: now {count} nodes are called `{name}`.",
+                "one-name-for-all",
+                "Say which node is meant by its name in the code: `NODE:__node:=NEW`.",
+            )
+    return Diagnosis(
+        f"{count} nodes are called `{name}`: their parameters and services cannot be told apart.",
+        "duplicate-node",
+        "Give each node a name of its own.",
+    )
+
+
+def _made_as(scene: Scene, kind: str, name: str) -> list[Thing]:
+    """The ends of this kind and full name that the probes have seen being made."""
+    return [
+        thing
+        for inside in scene.insides
+        for thing in inside.things.values()
+        if (thing.kind, thing.name) == (kind, name)
+    ]
+
+
+def absolute_name(scene: Scene, kind: str, name: str) -> Diagnosis | None:
+    """Must have seen: the code make this end with a name that begins with a slash."""
+    for thing in _made_as(scene, kind, name):
+        if thing.given.startswith("/"):
+            at = f" in {thing.made}" if thing.made else ""
+            return Diagnosis(
+                f"The {kind} is on `{name}`: the code{at} gives the absolute name `{thing.given}`, which does not "
+                "follow the namespace.",
+                "absolute-name",
+                "A topic name with a leading slash is absolute: no namespace reaches it. Write it without the slash.",
+            )
+    return None
+
+
+def why_topic_present(scene: Scene, topic: str) -> Diagnosis:
+    """Who uses a topic that nobody should use."""
+    ends = scene.observer.publishers(topic) + scene.observer.subscriptions(topic)
+    owners = sorted({full_name(end.node_namespace, end.node_name) for end in ends})
+    outside = any(end.node_namespace != "/" and not topic.startswith(end.node_namespace + "/") for end in ends)
+    absolute = absolute_name(scene, "publisher", topic) or absolute_name(scene, "subscription", topic)
+    if outside and absolute:
+        return absolute
+    return Diagnosis(f"{', '.join(owners) or 'A node'} uses `{topic}`.", "topic-present")
+
+
+def why_no_endpoint(scene: Scene, topic: str, msg_type: type | None, kind: str, node: str = "") -> Diagnosis:
+    """Why no `kind` ("publisher" or "subscription") of this type (None: of any) is on the topic."""
+    trouble = program_trouble(scene)
+    if trouble:
+        return trouble
+    observer = scene.observer
+    reach = observer.publishers if kind == "publisher" else observer.subscriptions
+    ends = reach(topic)
+    wanted = type_name(msg_type) if msg_type else ""
+    others = sorted({end.topic_type for end in ends if end.topic_type != wanted})
+    if others and wanted:
+        return Diagnosis(f"The {kind} on `{topic}` has the type {others[0]}, not {wanted}.", "wrong-type")
+    if ends and node:
+        owners = sorted({full_name(end.node_namespace, end.node_name) for end in ends})
+        return Diagnosis(f"The {kind} on `{topic}` belongs to {', '.join(owners)}, not to `{node}`.", "wrong-node")
+    if not observer.nodes():
+        return _no_node_at_all(scene)
+    if node and node not in observer.nodes():
+        return why_no_node(scene, node)
+    used = [name for name in observer.topics() if name not in _EVERY_NODES and not name.endswith("/transition_event")]
+    found = _idle_rule(scene, topic, node) or _elsewhere(scene, topic, kind, [n for n in used if reach(n)])
+    if found:
+        return found
+    opposite = observer.subscriptions(topic) if kind == "publisher" else observer.publishers(topic)
+    if opposite:
+        return Diagnosis(
+            f"On `{topic}` there is only the other end: a {'subscription' if kind == 'publisher' else 'publisher'}.",
+            "wrong-end",
+        )
+    return inside_reason(scene, node) or Diagnosis(
+        f"No node has a {kind} on `{topic}`. The nodes are {', '.join(observer.nodes())}; "
+        + (f"their topics are {', '.join(sorted(used))}." if used else "they have no topic of their own."),
+        "no-topic",
+    )
+
+
+def _idle_rule(scene: Scene, topic: str, node: str) -> Diagnosis | None:
+    """A remap rule, of the program in question, that was meant to make the topic's name and did not."""
+    observer = scene.observer
+    users = {
+        name: {full_name(end.node_namespace, end.node_name) for end in ends}
+        for name in observer.topics()
+        for ends in [[*observer.publishers(name), *observer.subscriptions(name)]]
+    }
+    for inside, rules in zip(scene.insides, scene.rules, strict=False):
+        own = [name for name in observer.nodes() if name in inside.nodes] or observer.nodes()
+        nodes = [name for name in own if name == node] if node else own
+        found = remap_rules.without_effect(rules, topic, nodes, users)
+        if found and (
+            found[1] != "absolute-name" or any(_is_absolute(scene, name) for name in users if name in found[0])
+        ):
+            return Diagnosis(*found)
+    return None
+
+
+def _is_absolute(scene: Scene, name: str) -> bool:
+    return bool(absolute_name(scene, "publisher", name) or absolute_name(scene, "subscription", name))
+
+
+def _elsewhere(scene: Scene, topic: str, kind: str, names: list[str]) -> Diagnosis | None:
+    """The same end under another name: absolute in the code, or misspelt.
+
+    A name that only the observer's own launch line or another node uses is not what the student meant.
+    """
+    base = topic.rsplit("/", 1)[-1]
+    for name in names:
+        if name != topic and name.rsplit("/", 1)[-1] == base and topic.endswith(name):
+            absolute = absolute_name(scene, kind, name)
+            if absolute:
+                return absolute
+    close = nearest(topic, [name for name in names if name != topic])
+    if not close:
+        return None
+    made = _made_as(scene, kind, close)
+    given = made[0].given if made else ""
+    return Diagnosis(
+        f"There is no {kind} on `{topic}`; the nearest topic with one is `{close}`"
+        + (f" (`{given}` in the code)." if given and given != close else "."),
+        "topic-name",
+        _LETTER_BY_LETTER,
+    )
+
+
+def why_no_service(scene: Scene, name: str, srv_type: type) -> Diagnosis:
+    """Why there is no server for a service."""
+    trouble = program_trouble(scene)
+    if trouble:
+        return trouble
+    services = scene.observer.services()
+    wanted = type_name(srv_type)
+    if name in services and wanted not in services[name]:
+        return Diagnosis(f"The service `{name}` has the type {services[name][0]}, not {wanted}.", "wrong-type")
+    if not scene.observer.nodes():
+        return _no_node_at_all(scene)
+    names = [n for n, types in services.items() if not types[0].startswith(("rcl_interfaces/", "type_description"))]
+    close = nearest(name, names)
+    if close and close != name:
+        made = _made_as(scene, "service", close)
+        given = made[0].given if made else ""
+        return Diagnosis(
+            f"There is no service `{name}`; the nearest name on the graph is `{close}`"
+            + (f" (`{given}` in the code)." if given and given != close else "."),
+            "service-name",
+            _LETTER_BY_LETTER,
+        )
+    return inside_reason(scene) or Diagnosis(f"No node offers the service `{name}`.", "no-service")

@@ -1,0 +1,81 @@
+"""Link one of every chain: is every program there, and alive?"""
+
+from __future__ import annotations
+
+from autograder.diagnosis import callbacks
+from autograder.diagnosis.base import Diagnosis, Scene
+from autograder.diagnosis.inside import Inside
+from autograder.diagnosis.traces import last_traceback
+from autograder.graph import remap_rules
+
+
+def program_trouble(scene: Scene) -> Diagnosis | None:
+    """Must have seen: a program that no cell defines, that could not be started, or that has ended."""
+    for name in scene.missing:
+        return Diagnosis(
+            f"There is no program `{name}`: no cell that begins with `%%node {name}` was found.",
+            "program-missing",
+            "Check the first line of the cell, which must stand there unchanged; in a notebook, run the cell first.",
+        )
+    for trouble in scene.trouble:
+        return trouble
+    for number, program in enumerate(scene.programs):
+        if program.running() or program in scene.stopped:
+            continue
+        refused = remap_rules.refused(scene.rules[number]) if number < len(scene.rules) else None
+        if refused and "arse remap rule" in program.output():
+            return Diagnosis(*refused)
+        return _death(Inside(scene, program))
+    return None
+
+
+def _death(inside: Inside) -> Diagnosis:
+    program = inside.program
+    limit = program.stopped_by()
+    if limit:
+        return Diagnosis(
+            f"`{program.name}` was ended because it went over the {limit}.",
+            limit.replace(" ", "-"),
+            "Look for a loop without an end, or for data that grows without a bound.",
+        )
+    found = callbacks.failed(inside) or last_traceback(program.output(), program.name)
+    if found:
+        return found
+    status = program.exit_status()
+    if status is not None and status < 0:
+        return Diagnosis(
+            f"`{program.name}` was ended by signal {-status}.", "crashed", "The log says what came before."
+        )
+    if inside.attached and not any(executor.spins for executor in inside.executors):
+        foreign = any(node.foreign for node in inside.nodes.values())
+        if not foreign:
+            return Diagnosis(
+                f"`{program.name}` ended by itself without spinning: no callback ever ran.",
+                "not-spinning",
+                "`main` must spin the node (`rclpy.spin(node)` or an executor's `spin()`), and must be called.",
+            )
+    last = next((line for line in reversed(program.output().splitlines()) if line.strip()), "")
+    return Diagnosis(
+        f"`{program.name}` ended by itself with exit status {status}"
+        + (f"; the last line it printed is `{last.strip()[:200]}`." if last else ", and it printed nothing."),
+        "exited",
+    )
+
+
+def shut_down_inside(scene: Scene) -> Diagnosis | None:
+    """Why a program that shut down inside a callback did not end well. Must have seen: that call."""
+    for inside in scene.insides:
+        for call in inside.calls:
+            if call.what == "shutdown" and call.in_callback:
+                error = last_traceback(inside.program.output(), inside.name)
+                return Diagnosis(
+                    f"`{inside.name}`, {call.line} (`{call.code}`) shuts down inside a callback, "
+                    + (
+                        f"and what comes after finds it done already: {error.because}"
+                        if error
+                        else "so what spins the node is pulled away under it."
+                    ),
+                    "shutdown-in-callback",
+                    "Let the callback set a future or a flag, and let `main` end the spinning and shut down.",
+                )
+    return None

@@ -1,0 +1,137 @@
+"""Why nothing, or too little, arrived on a topic; and why a service that is there did not answer."""
+
+from __future__ import annotations
+
+from rclpy.qos import QoSProfile
+
+from autograder.diagnosis import spinning
+from autograder.diagnosis.base import Diagnosis, Scene, first
+from autograder.diagnosis.chain import inside_reason
+from autograder.diagnosis.events import LifecyclePublishOff, Thing
+from autograder.diagnosis.inside import Inside, called
+from autograder.diagnosis.matching import why_not_matched
+from autograder.diagnosis.names import why_no_endpoint
+from autograder.diagnosis.programs import program_trouble
+from autograder.diagnosis.together import why_starved
+from autograder.graph.names import full_name, type_name
+
+SILENT = "silent"
+"""The code where no reason is established."""
+
+
+def why_silent(scene: Scene, topic: str, msg_type: type, profile: QoSProfile) -> Diagnosis:
+    """Why nothing (more) arrived on a topic: the first link that is seen to be broken, or what was seen."""
+    trouble = program_trouble(scene)
+    if trouble:
+        return trouble
+    ends = [end for end in scene.observer.publishers(topic) if end.topic_type == type_name(msg_type)]
+    if not ends:
+        return why_no_endpoint(scene, topic, msg_type, "publisher")
+    mismatch = why_not_matched(scene, topic, profile, "publisher")
+    if mismatch:
+        return mismatch
+    node = full_name(ends[0].node_namespace, ends[0].node_name)
+    return (
+        inside_reason(scene, node)
+        or lifecycle_silence(scene, topic)
+        or not_due(scene, topic)
+        or why_starved(scene)
+        or Diagnosis(account(scene, topic), SILENT)
+    )
+
+
+def lifecycle_silence(scene: Scene, topic: str = "") -> Diagnosis | None:
+    """Must have seen: a lifecycle publisher (of this topic) that dropped a message because it was not activated."""
+    for inside in scene.insides:
+        for event in inside.all(LifecyclePublishOff):
+            if topic and event.name != topic:
+                continue
+            if event.state == "active":
+                return Diagnosis(
+                    f"`{inside.name}` is active, but its lifecycle publisher was never activated: `on_activate` does "
+                    "not call `super().on_activate(state)`.",
+                    "no-super-on-activate",
+                    "End `on_activate` with `return super().on_activate(state)`.",
+                )
+            return Diagnosis(
+                f"`{inside.name}` publishes in {event.line} while it is {event.state or 'not active'}: a lifecycle "
+                "publisher drops such messages.",
+                "lifecycle-inactive",
+                "It sends from `on_activate` to `on_deactivate` only.",
+            )
+    return None
+
+
+def not_due(scene: Scene, topic: str) -> Diagnosis | None:
+    """Must have seen: a node that is spun and has published nothing, and a timer of it that is not due for long yet."""
+    for inside, publisher in _publishers(scene, topic):
+        timers = [t for t in inside.callbacks if t.kind == "timer" and t.node == publisher.node and not t.cancelled]
+        late = [t for t in timers if not t.runs and t.period > inside.age]
+        if inside.alive and not publisher.runs and late and len(late) == len(timers):
+            return Diagnosis(
+                f"`{inside.name}`: {called(late[0])} has not fired yet; the program has run for {inside.age:.0f} s.",
+                "timer-period",
+                "`create_timer` takes its period in seconds.",
+            )
+    return None
+
+
+def _publishers(scene: Scene, topic: str) -> list[tuple[Inside, Thing]]:
+    return [
+        (inside, thing)
+        for inside in scene.insides
+        for thing in inside.things.values()
+        if thing.kind == "publisher" and thing.name == topic and not thing.destroyed
+    ]
+
+
+def account(scene: Scene, topic: str) -> str:
+    """What was seen of a silent publisher, and so ruled out, where no reason is established."""
+    found = _publishers(scene, topic)
+    if not found or not all(inside.alive for inside, _ in found):
+        return f"The publisher on `{topic}` is on the graph, and nothing (more) came from it."
+    inside, publisher = found[0]
+    said = [f"The publisher on `{topic}` is on the graph", f"its node `{publisher.node}` is spun"]
+    runs = []
+    for thing in inside.callbacks:
+        if thing.node == publisher.node:
+            verb = {"timer": "fired", "subscription": "got a message", "service": "was asked"}[thing.kind]
+            times = {0: "never", 1: "once"}.get(thing.runs, f"{thing.runs} times")
+            runs.append(f"{called(thing)} {verb} {times}")
+    said += runs[:6]
+    sent = {0: "nothing was published", 1: "one message was published"}.get(
+        publisher.runs, f"{publisher.runs} messages were published"
+    )
+    if publisher.runs:
+        sent += f", the last of them {inside.now - publisher.last:.1f} s ago"
+    return f"{', '.join(said)}, and {sent}."
+
+
+def why_no_answer(scene: Scene, name: str) -> Diagnosis:
+    """Why a service that exists did not answer."""
+    found = program_trouble(scene) or inside_reason(scene, _owner(scene, name))
+    if found:
+        return found
+    insides = [inside for inside in scene.inside_of(_owner(scene, name)) if inside.alive]
+    found = first((spinning.cannot_answer,), insides) or why_starved(scene)
+    if found:
+        return found
+    for inside in insides:
+        for thing in inside.things.values():
+            if thing.kind == "service" and thing.name == name:
+                asked = {0: "has not run", 1: "ran once"}.get(thing.runs, f"ran {thing.runs} times")
+                return Diagnosis(
+                    f"The service `{name}` is on the graph and its node is spun, but no answer came; its callback "
+                    f"{asked} and ended {thing.done} times.",
+                    "no-answer",
+                )
+    return Diagnosis(f"The service `{name}` is on the graph, but no answer came.", "no-answer")
+
+
+def _owner(scene: Scene, name: str) -> str:
+    """The node that offers a service, by its probe or by the name of a service that every node has."""
+    for inside in scene.insides:
+        for thing in inside.things.values():
+            if thing.kind == "service" and thing.name == name:
+                return thing.node
+    return name.rpartition("/")[0]

@@ -1,0 +1,124 @@
+"""Where a program is: the stacks of its threads, and the student's lines that they stand in."""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from autograder.diagnosis.base import RunningProgram
+
+LOOKS = 4
+"""How often the stacks are looked at: a busy loop is in another of its lines each time."""
+
+Frame = tuple[str, int, str]
+"""File, line, function."""
+
+Stacks = dict[int, list[Frame]]
+"""By thread: its frames, newest call first. The main thread comes last."""
+
+_THREAD = re.compile(r"(?:Current thread|Thread) 0x([0-9a-f]+)")
+_FRAME = re.compile(r'\s+File "(.*)", line (\d+) in (.*)')
+
+
+@dataclass(frozen=True)
+class Place:
+    """A line of the student's, or the loop that it is in."""
+
+    first: int
+    last: int
+    code: str
+    """The first of these lines."""
+    loop: str
+    """The loop's own source, for questions about what it waits for; empty outside a loop."""
+    function: str
+
+    def __str__(self) -> str:
+        """As it stands in a sentence: `line 12 (...)` or `lines 12 to 14, the loop ...`."""
+        if self.loop:
+            lines = f"line {self.first}" if self.first == self.last else f"lines {self.first} to {self.last}"
+            return f"the loop in {lines} (`{self.code}`)"
+        return f"line {self.first} (`{self.code}`)"
+
+
+def look(program: RunningProgram, times: int = LOOKS) -> list[Stacks]:
+    """Look at the stacks of a program several times; each look takes about 50 ms."""
+    return [found for found in (parse(program.stacks(1.0)) for _ in range(times)) if found]
+
+
+def parse(dump: str) -> Stacks:
+    """Read what faulthandler writes."""
+    stacks: Stacks = {}
+    thread = None
+    for line in dump.splitlines():
+        if head := _THREAD.match(line):
+            thread = int(head[1], 16)
+            stacks[thread] = []
+        elif thread is not None and (frame := _FRAME.match(line)):
+            stacks[thread].append((frame[1], int(frame[2]), frame[3]))
+    return stacks
+
+
+class Source:
+    """A student's program as text."""
+
+    def __init__(self, path: Path) -> None:
+        """Read it; what cannot be read or parsed is an empty program."""
+        self._name = path.name
+        try:
+            text = path.read_text(encoding="utf-8", errors="replace")
+            self._tree = ast.parse(text)
+            self._lines = text.splitlines()
+        except (OSError, SyntaxError, ValueError, RecursionError, MemoryError):
+            self._tree, self._lines = ast.Module(body=[], type_ignores=[]), []
+
+    def line(self, number: int) -> str:
+        """One line, without its indentation."""
+        return self._lines[number - 1].strip() if 0 < number <= len(self._lines) else ""
+
+    def place(self, name: str, looks: Sequence[list[Frame]], innermost: bool = False) -> Place | None:
+        """Where the looks at one thread agree that the student's code is.
+
+        Args:
+            name: the program's.
+            looks: the thread's frames, each time it was looked at.
+            innermost: in the innermost function of the student's; otherwise in the callback that called that.
+        """
+        found = [self._own(name, frames, innermost) for frames in looks]
+        places = [frame for frame in found if frame]
+        if not places or len(places) < len(looks) or len({frame[2] for frame in places}) > 1:
+            return None
+        lines = {frame[1] for frame in places}
+        loop = self._loop(lines)
+        if loop is not None:
+            last = max(getattr(part, "end_lineno", 0) or 0 for part in ast.walk(loop))
+            text = "\n".join(self._lines[loop.lineno - 1 : last])
+            return Place(loop.lineno, last, self.line(loop.lineno), text, places[0][2])
+        if len(lines) > 1:
+            return None
+        (number,) = lines
+        return Place(number, number, self.line(number), "", places[0][2])
+
+    def _own(self, name: str, frames: list[Frame], innermost: bool) -> Frame | None:
+        """The frame of the student's callback: the outermost of the innermost row of the student's frames."""
+        found = None
+        for frame in frames:
+            if frame[0].endswith(f"/{name}.py"):
+                found = frame
+                if innermost:
+                    break
+            elif found:
+                break
+        return found
+
+    def _loop(self, lines: set[int]) -> ast.stmt | None:
+        """The innermost loop that all these lines are in."""
+        loops = [
+            node
+            for node in ast.walk(self._tree)
+            if isinstance(node, (ast.While, ast.For))
+            and all(node.lineno <= line <= (node.end_lineno or 0) for line in lines)
+        ]
+        return min(loops, key=lambda node: (node.end_lineno or 0) - node.lineno, default=None)

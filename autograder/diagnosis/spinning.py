@@ -1,0 +1,86 @@
+"""Whether the program came to spin its nodes at all."""
+
+from __future__ import annotations
+
+from autograder.diagnosis.base import Diagnosis
+from autograder.diagnosis.inside import Inside
+
+ENDED_AFTER = 1.0
+"""Seconds without spinning after which it has ended: a program may spin once in a while."""
+
+
+def _unspun(inside: Inside) -> list[str]:
+    """Nodes that no executor has ever spun; none where one is in an executor that the probe does not watch."""
+    if any(node.foreign for node in inside.nodes.values()):
+        return []
+    return [node.name for node in inside.nodes.values() if not node.spun and not node.destroyed]
+
+
+def in_the_constructor(inside: Inside) -> Diagnosis | None:
+    """Must have seen: no node spun yet, and the program in one place of an `__init__` each time it is looked at."""
+    if not _unspun(inside) or any(executor.spins for executor in inside.executors):
+        return None
+    place = inside.main_place()
+    if place is None or place.function != "__init__":
+        return None
+    return Diagnosis(
+        f"`{inside.name}` is still in `__init__`, in {place}: it never comes to spinning, so no callback can run.",
+        "stuck-in-init",
+        "A constructor has to come to its end. What must happen again and again belongs into a timer.",
+    )
+
+
+def not_added(inside: Inside) -> Diagnosis | None:
+    """Must have seen: an executor that spins without any node, and a node that no executor has ever spun."""
+    unspun = _unspun(inside)
+    empty = [executor for executor in inside.executors if executor.spinning and not executor.nodes]
+    if unspun and empty and not any(executor.nodes for executor in inside.executors):
+        return Diagnosis(
+            f"`{inside.name}` spins a {empty[0].type}, but that holds no node: `{unspun[0]}` was never added to it.",
+            "node-not-added",
+            "`executor.add_node(node)` comes before `executor.spin()`.",
+        )
+    return None
+
+
+def never_spun(inside: Inside) -> Diagnosis | None:
+    """Must have seen: a node with callbacks, and no executor that ever spun while it held that node."""
+    with_callbacks = {thing.node for thing in inside.callbacks}
+    return _never_spun(inside, [name for name in _unspun(inside) if name in with_callbacks])
+
+
+def cannot_answer(inside: Inside) -> Diagnosis | None:
+    """For a service of every node's, such as those of its parameters. Must have seen: what `never_spun` must, but
+    of any node.
+    """
+    return _never_spun(inside, _unspun(inside))
+
+
+def _never_spun(inside: Inside, names: list[str]) -> Diagnosis | None:
+    for name in names:
+        others = [node.name for node in inside.nodes.values() if node.spun]
+        place = inside.main_place() if not others else None
+        return Diagnosis(
+            f"`{inside.name}` made its node `{name}` but nothing spins it, so no callback of it can run."
+            + (f" The program is in {place}." if place else "")
+            + (f" Only {', '.join(f'`{other}`' for other in others)} is spun." if others else ""),
+            "not-spinning",
+            "Call `rclpy.spin(node)`, or `spin()` of the executor that the node was added to.",
+        )
+    return None
+
+
+def no_longer_spun(inside: Inside) -> Diagnosis | None:
+    """Must have seen: a node that was spun, and that no spinning executor holds now, while the program lives on."""
+    for node in inside.nodes.values():
+        left = node.spun and not inside.spinning(node.name) and inside.now - node.spun > ENDED_AFTER
+        if left and not node.destroyed and not node.foreign:
+            busy = any(executor.spinning for executor in inside.executors)
+            place = None if busy else inside.main_place()
+            return Diagnosis(
+                f"`{inside.name}`: the node `{node.name}` was spun for a while, and nothing spins it now."
+                + (f" The program is in {place}." if place else ""),
+                "spinning-ended",
+                "Only while something spins the node can its callbacks run.",
+            )
+    return None

@@ -1,0 +1,216 @@
+"""Why callbacks did not run at the same time, or some hardly at all: the executor, its threads, the groups."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from autograder.diagnosis.base import Diagnosis, Scene
+from autograder.diagnosis.events import ExecutorSeen, Thing
+from autograder.diagnosis.inside import Inside, called, listed
+
+MOST_OF_THE_TIME = 0.6
+"""Share of the time that others must have taken for a callback to count as kept waiting by them."""
+
+FAR_FEWER = 0.6
+"""Share of the due runs below which a timer counts as kept waiting."""
+
+
+def _used(inside: Inside) -> list[ExecutorSeen]:
+    """The executors that have run a callback."""
+    return [executor for executor in inside.executors if executor.most]
+
+
+def _active(inside: Inside) -> list[Thing]:
+    return [thing for thing in inside.callbacks if thing.runs]
+
+
+def single_threaded(inside: Inside) -> Diagnosis | None:
+    """Must have seen: callbacks run, and every executor that ran one has one thread and is no MultiThreadedExecutor."""
+    used = _used(inside)
+    if not used or len(used) > 1 or used[0].threads is not None:
+        return None
+    unused = [e for e in inside.executors if e.threads is not None and not e.most]
+    if unused:
+        because = "It makes a MultiThreadedExecutor, but spins the node with another, single-threaded one."
+    elif any(thing.group == "ReentrantCallbackGroup" for thing in _active(inside)):
+        because = f"It is spun by a {used[0].type}, one callback at a time: a reentrant group changes nothing there."
+    else:
+        because = f"It is spun by a {used[0].type} (that is what `rclpy.spin` uses), which runs one callback at a time."
+    return Diagnosis(
+        f"`{inside.name}`: {because}",
+        "single-threaded-executor",
+        "Add the node to a MultiThreadedExecutor(num_threads=...) and spin that.",
+    )
+
+
+def few_threads(inside: Inside, at_once: int) -> Diagnosis | None:
+    """Must have seen: an executor that ran callbacks on fewer threads than have to run at once."""
+    for executor in _used(inside):
+        if executor.threads is None or executor.threads >= at_once:
+            continue
+        have = f"{executor.threads} thread{'s' * (executor.threads != 1)}"
+        if not executor.threads_given:
+            return Diagnosis(
+                f"`{inside.name}` leaves the number of threads to the machine: MultiThreadedExecutor() took {have} "
+                f"here, as many as there are CPUs, and {at_once} callbacks have to run at once.",
+                "machine-threads",
+                "Name it: MultiThreadedExecutor(num_threads=8).",
+            )
+        return Diagnosis(
+            f"`{inside.name}`: its MultiThreadedExecutor has {have}, and {at_once} callbacks have to run at once.",
+            "few-threads",
+            "Each callback that runs needs a thread of its own while it runs: count those that may run at once.",
+        )
+    return None
+
+
+def one_group(inside: Inside) -> Diagnosis | None:
+    """Must have seen: several callbacks run, all of them in one and the same mutually exclusive group."""
+    active = _active(inside)
+    groups = {thing.group_id for thing in active}
+    if len(active) < 2 or len(groups) != 1 or not all(thing.exclusive for thing in active):
+        return None
+    if active[0].default_group:
+        return Diagnosis(
+            f"`{inside.name}` has a MultiThreadedExecutor, but all its callbacks are in the node's default group, "
+            "which is mutually exclusive: they run one after another.",
+            "no-callback-groups",
+            "Give the callbacks that may overlap a callback group of their own.",
+        )
+    return Diagnosis(
+        f"`{inside.name}` has all its callbacks in one mutually exclusive group ({listed(active)}): they run one after "
+        "another.",
+        "one-group",
+        "Callbacks that may overlap need different groups.",
+    )
+
+
+def exclusive_itself(inside: Inside) -> Diagnosis | None:
+    """Must have seen: callbacks run, and none of them in a reentrant group. (For a callback that overlaps itself.)"""
+    active = _active(inside)
+    if not active or any(not thing.exclusive for thing in active):
+        return None
+    return Diagnosis(
+        f"`{inside.name}`: every callback is in a mutually exclusive group ({listed(active)}). In such a group a "
+        "callback never runs beside itself, however many threads there are.",
+        "exclusive-group",
+        "A callback may overlap itself only in a ReentrantCallbackGroup.",
+    )
+
+
+def why_not_together(scene: Scene, at_once: int = 2, itself: bool = False) -> Diagnosis | None:
+    """Why callbacks did not overlap; None where what was seen excludes none of the ways in which that happens.
+
+    Args:
+        scene: the launch.
+        at_once: how many should have run at the same time.
+        itself: they should have been runs of one callback.
+    """
+    for inside in scene.insides:
+        if not inside.attached or not _used(inside):
+            continue
+        found = single_threaded(inside) or few_threads(inside, 2)
+        found = found or (exclusive_itself(inside) if itself else one_group(inside)) or few_threads(inside, at_once)
+        if found:
+            return found
+    return None
+
+
+def waits_for_its_group(scene: Scene) -> Diagnosis | None:
+    """Why timers pause while a service is called. Must have seen: a callback that waits for an answer, and every timer
+    of its node in the mutually exclusive group of that callback.
+    """
+    for inside in scene.insides:
+        if not inside.attached:
+            continue
+        waiting = {call.callback for call in inside.calls if call.what == "client.call" and call.in_callback}
+        for thing in inside.callbacks:
+            if not thing.exclusive or (thing.id not in waiting and not thing.awaited):
+                continue
+            timers = [other for other in inside.callbacks if other.kind == "timer" and other.node == thing.node]
+            if timers and all(timer.group_id == thing.group_id and timer.id != thing.id for timer in timers):
+                group = "the node's default group" if thing.default_group else "one group"
+                return Diagnosis(
+                    f"`{inside.name}`: {called(thing)} holds its group while it waits for the answer, and "
+                    f"{listed(timers)} {'is' if len(timers) == 1 else 'are'} in the same one ({group}, mutually "
+                    "exclusive): no tick until the answer is there.",
+                    "timer-same-group",
+                    "Give the timer a callback group of its own.",
+                )
+    return None
+
+
+def why_starved(scene: Scene) -> Diagnosis | None:
+    """Why some timers ran far less often than they were due.
+
+    Must have seen: such a timer, and others of its exclusive group, or of its executor, take most of the time.
+    """
+    for inside in scene.insides:
+        if not inside.attached:
+            continue
+        for thing in inside.callbacks:
+            found = _starved(inside, thing) if thing.kind == "timer" and not thing.cancelled else None
+            if found:
+                return found
+    return None
+
+
+def _starved(inside: Inside, timer: Thing) -> Diagnosis | None:
+    node, executor = inside.nodes.get(timer.node), inside.executor_of(timer.node)
+    if not node or not node.spun or not executor or not timer.period:
+        return None
+    lasted = inside.now - node.made
+    if timer.runs >= FAR_FEWER * lasted / timer.period:
+        return None
+    others = [other for other in inside.group(timer) if other.id != timer.id and other.has_callback and other.runs]
+    if timer.exclusive and _taken(inside, others) > MOST_OF_THE_TIME * lasted:
+        group = "the node's default group" if timer.default_group else "one mutually exclusive group"
+        return Diagnosis(
+            f"`{inside.name}`: {called(timer)} ran {_times(timer.runs)}. It is in {group} with {listed(others)}; while "
+            "one of a mutually exclusive group runs, the others wait, and these took most of the time.",
+            "starved",
+            "Callbacks that must not wait for each other need different groups.",
+        )
+    others = [other for other in _active(inside) if other.id != timer.id]
+    if _taken(inside, others) > MOST_OF_THE_TIME * lasted * executor.size and executor.most >= executor.size:
+        threads = "the only thread" if executor.size == 1 else f"all {executor.size} threads"
+        return Diagnosis(
+            f"`{inside.name}`: {called(timer)} ran {_times(timer.runs)}: {listed(others)} kept {threads} of the "
+            f"{executor.type} busy most of the time.",
+            "single-threaded-executor" if executor.threads is None else "few-threads",
+            "Callbacks that must not wait for each other need threads of their own."
+            if executor.threads is not None
+            else "Spin the node with a MultiThreadedExecutor(num_threads=...), and give these callbacks own groups.",
+        )
+    return None
+
+
+def _taken(inside: Inside, things: Sequence[Thing]) -> float:
+    """Seconds that these ran, together."""
+    now = inside.now
+    return sum(thing.spent + sum(now - began for began, _ in thing.running) for thing in things)
+
+
+def _times(number: int) -> str:
+    return {0: "never", 1: "once"}.get(number, f"{number} times only")
+
+
+def layout(scene: Scene) -> str:
+    """What was seen of executors, groups and runs, where no reason is established."""
+    said = []
+    for inside in scene.insides:
+        if not inside.attached or not _used(inside):
+            continue
+        executor = _used(inside)[0]
+        groups: dict[int, list[Thing]] = {}
+        for thing in _active(inside):
+            groups.setdefault(thing.group_id, []).append(thing)
+        kinds = "; ".join(
+            f"{'an exclusive' if members[0].exclusive else 'a reentrant'} group has {listed(members)}"
+            for members in groups.values()
+        )
+        said.append(
+            f"`{inside.name}` runs on {executor.size} thread{'s' * (executor.size != 1)}, of which at most "
+            f"{executor.most} were busy at once; {kinds}."
+        )
+    return " ".join(said)

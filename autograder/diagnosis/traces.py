@@ -1,0 +1,98 @@
+"""The error that a program printed, with the student's own line."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+from autograder.diagnosis.base import Diagnosis
+
+KNOWN_ERRORS = (
+    (
+        "ParameterNotDeclaredException",
+        "parameter-not-declared",
+        "A parameter exists from `declare_parameter` on: declare it before you read it, even if a value was given.",
+    ),
+    (
+        "InvalidParameterTypeException",
+        "parameter-type",
+        "The value's type must be the declared one: 40 is an integer, 40.0 a double, '40' a string.",
+    ),
+    (
+        "PermissionError: [Errno 1]",
+        "refused-call",
+        "A program may not ask this of the system. New processes (`fork`, `subprocess`, `multiprocessing`) are among "
+        "what it may not ask for: use threads, or one more program in the launch.",
+    ),
+    (
+        "InvalidHandle",
+        "used-after-destroy",
+        "It used something that had been destroyed. Under a MultiThreadedExecutor the executor does this itself, now "
+        "and then, while a callback destroys a publisher, subscription or timer (rclpy issue 1355): spin such a node "
+        "with a SingleThreadedExecutor.",
+    ),
+    (
+        "timer argument is null",
+        "used-after-destroy",
+        "A MultiThreadedExecutor asked a timer that a callback had just destroyed (rclpy issue 1355): spin a node that "
+        "destroys its timers with a SingleThreadedExecutor, or use `cancel()` and `reset()`.",
+    ),
+)
+
+_KIND = re.compile(r"[A-Za-z_][\w.]*(Error|Exception|Interrupt|Exit|Warning|Shutdown\w*)\b")
+"""What the line of an error begins with, by the names that errors usually have."""
+
+
+def quoted(code: str, error: str) -> str:
+    """The student's line in brackets, unless it says no more than the error does."""
+    kind = error.partition(":")[0].rpartition(".")[2]
+    return f" (`{code}`)" if code and kind not in code else ""
+
+
+def last_traceback(output: str, program: str) -> Diagnosis | None:
+    """The last error that a Python program printed. Must have seen: a line that is one by its name or its frames."""
+    lines = output.splitlines()
+    error_at = None
+    for number in range(len(lines) - 1, -1, -1):
+        if _KIND.match(lines[number]) or _under_frames(lines, number):
+            error_at = number
+            break
+    if error_at is None:
+        return None
+    error = lines[error_at].strip()
+    where, code = _own_line(lines[:error_at], program)
+    said = f"{where}{quoted(code, error)}: {error}"
+    for exception, word, hint in KNOWN_ERRORS:
+        if exception in error:
+            return Diagnosis(f"`{program}` ended with an error{said}", word, hint)
+    if error.startswith(("SyntaxError", "IndentationError", "TabError")):
+        return Diagnosis(
+            f"`{program}` is not a Python program{said}", "syntax-error", "Python stops reading at this line or before."
+        )
+    return Diagnosis(
+        f"`{program}` ended with an error{said}", "crashed", "The lines above it in the log say how it got there."
+    )
+
+
+def _own_line(lines: Sequence[str], program: str) -> tuple[str, str]:
+    """Where in the student's file the frames above an error end, and what stands there."""
+    for number in range(len(lines) - 1, -1, -1):
+        match = re.match(rf'\s+File "[^"]*\b{re.escape(program)}\.py", line (\d+)', lines[number])
+        if match:
+            code = lines[number + 1].strip() if number + 1 < len(lines) else ""
+            return f" in line {match[1]}", code
+        if lines[number].startswith("Traceback"):
+            break
+    return "", ""
+
+
+def _under_frames(lines: Sequence[str], number: int) -> bool:
+    """Whether this line is an error of any name: it stands under the frames of a traceback."""
+    if not re.match(r"[A-Za-z_][\w.]*(: |$)", lines[number]):
+        return False
+    for above in reversed(lines[:number]):
+        if above.startswith('  File "'):
+            return True
+        if not above.startswith("    "):
+            return False
+    return False
