@@ -89,7 +89,8 @@ def nested_spin(inside: Inside) -> Diagnosis | None:
         lost = bool(callback and callback.node and not inside.spinning(callback.node))
         if call.blocks or within or lost:
             so = (
-                "the spinning waits for something that only the end of this callback lets happen."
+                "the callback has not ended since, and what it spins for cannot happen while it holds its thread and "
+                "its group."
                 if call.blocks or (within and not lost)
                 else "it took the node away from the executor that runs it, so the node's other callbacks stop."
             )

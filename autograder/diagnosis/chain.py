@@ -33,6 +33,7 @@ SEEN: tuple[Link, ...] = (
     spinning.in_the_constructor,
     spinning.not_added,
     spinning.never_spun,
+    spinning.pulled_down,
     spinning.no_longer_spun,
     blocked.stuck,
 )

@@ -5,6 +5,7 @@ from __future__ import annotations
 from autograder.diagnosis import callbacks
 from autograder.diagnosis.base import Diagnosis, Scene
 from autograder.diagnosis.inside import Inside
+from autograder.diagnosis.spinning import SHUT_DOWN_IN_MAIN
 from autograder.diagnosis.traces import last_traceback
 from autograder.graph import remap_rules
 
@@ -76,6 +77,6 @@ def shut_down_inside(scene: Scene) -> Diagnosis | None:
                         else "so what spins the node is pulled away under it."
                     ),
                     "shutdown-in-callback",
-                    "Let the callback set a future or a flag, and let `main` end the spinning and shut down.",
+                    SHUT_DOWN_IN_MAIN,
                 )
     return None

@@ -5,6 +5,8 @@ from __future__ import annotations
 from autograder.diagnosis.base import Diagnosis
 from autograder.diagnosis.inside import Inside
 
+SHUT_DOWN_IN_MAIN = "Let the callback set a future or a flag, and let `main` end the spinning and shut down."
+
 ENDED_AFTER = 1.0
 """Seconds without spinning after which it has ended: a program may spin once in a while."""
 
@@ -67,6 +69,20 @@ def _never_spun(inside: Inside, names: list[str]) -> Diagnosis | None:
             "not-spinning",
             "Call `rclpy.spin(node)`, or `spin()` of the executor that the node was added to.",
         )
+    return None
+
+
+def pulled_down(inside: Inside) -> Diagnosis | None:
+    """Must have seen: a shutdown in a callback, and a program that runs on while none of its nodes is spun."""
+    spun = any(executor.spinning and executor.nodes for executor in inside.executors)
+    for call in inside.calls:
+        if call.what == "shutdown" and call.in_callback and not spun:
+            return Diagnosis(
+                f"`{inside.name}`, {call.line} (`{call.code}`) shuts down inside a callback, so what spins the node is "
+                "pulled away under it; the program itself runs on.",
+                "shutdown-in-callback",
+                SHUT_DOWN_IN_MAIN,
+            )
     return None
 
 

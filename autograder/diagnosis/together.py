@@ -65,8 +65,8 @@ def few_threads(inside: Inside, at_once: int) -> Diagnosis | None:
 
 
 def one_group(inside: Inside) -> Diagnosis | None:
-    """Must have seen: several callbacks run, all of them in one and the same mutually exclusive group."""
-    active = _active(inside)
+    """Must have seen: several callbacks, those that ran and all timers, in one and the same exclusive group."""
+    active = [thing for thing in inside.callbacks if thing.runs or thing.kind == "timer"]
     groups = {thing.group_id for thing in active}
     if len(active) < 2 or len(groups) != 1 or not all(thing.exclusive for thing in active):
         return None

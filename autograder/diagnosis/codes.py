@@ -1,0 +1,81 @@
+"""The codes of all reasons, each with what must have been seen for it. A test holds a case for and a near miss of each.
+
+Codes of limits (`memory-limit` and the like) come from the sandbox, codes of remap rules and of launch and parameter
+files from `autograder/graph` and `autograder/launch_files.py`, others from the check cells themselves.
+"""
+
+CODES = {
+    # The program.
+    "program-missing": "no cell defines a program of the launch",
+    "nothing-started": "the launch has no program",
+    "syntax-error": "Python printed a SyntaxError, IndentationError or TabError and the program ended",
+    "crashed": "the program ended with an error that it printed, or by a signal",
+    "exited": "the program ended by itself, and printed no error",
+    "parameter-not-declared": "the error is a ParameterNotDeclaredException",
+    "parameter-type": "the error is an InvalidParameterTypeException",
+    "refused-call": "the error is the system's refusal of a call",
+    "used-after-destroy": "the error says that something destroyed was used",
+    "shutdown-in-callback": "a callback called shutdown, and the program did not end as it should",
+    # Errors in callbacks.
+    "callback-exception": "an exception left a timer's or subscription's callback",
+    "service-exception": "an exception left a service callback",
+    "lifecycle-exception": "an exception left a lifecycle callback",
+    "thread-exception": "an exception ended a thread of the program's own",
+    "asyncio-in-callback": "a callback raised that there is no running event loop",
+    "declared-twice": "a callback raised ParameterAlreadyDeclaredException",
+    "service-no-return": "a service callback returned something else than the response",
+    "lifecycle-return": "a lifecycle callback returned something else than a TransitionCallbackReturn",
+    "bad-return": "another callback returned something of the wrong type",
+    "message-field": "a message was refused, and a field's value is not of its type",
+    "message-type": "a message was refused, and it is of another class",
+    # Blocked callbacks.
+    "call-same-group": "call() in a callback has not come back; client and callback share an exclusive group",
+    "call-in-callback": "call() in a callback has not come back; every thread of the executor is taken",
+    "waits-for-service": "a call waits for a service that is not on the graph",
+    "nested-spin": "a callback spins, and has not ended since, or its node is in no spinning executor now",
+    "rate-in-callback": "rate.sleep() in a callback has not come back; every thread of the executor is taken",
+    "rate-unspun": "rate.sleep() has not come back; no executor spins",
+    "await-same-group": "a callback awaits a client's answer; both are in one exclusive group",
+    "busy-wait": "a callback stays in a loop that asks a future; its answer cannot be taken meanwhile",
+    "stuck-callback": "one run of a callback lasts; its thread is in one line or loop each time",
+    # Spinning.
+    "stuck-in-init": "nothing was ever spun; the program is in one place of an __init__ each time",
+    "node-not-added": "an executor without nodes spins; the node was never spun",
+    "not-spinning": "a node with callbacks was never spun, or the program ended without spinning",
+    "spinning-ended": "the node was spun, and no spinning executor has held it for a while",
+    # At the same time.
+    "single-threaded-executor": "all callbacks ran on one single-threaded executor",
+    "machine-threads": "fewer threads than callbacks that must run at once, and no number given",
+    "few-threads": "fewer threads than callbacks that must run at once",
+    "no-callback-groups": "all timers and all callbacks that ran are in the node's default group",
+    "one-group": "all timers and all callbacks that ran are in one exclusive group",
+    "exclusive-group": "all callbacks that ran are in exclusive groups, where one was to overlap itself",
+    "timer-same-group": "a callback waits for an answer, and all timers of its node are in its exclusive group",
+    "starved": "a timer ran far less often than due; others of its exclusive group took most of the time",
+    # Names on the graph.
+    "no-node": "programs run, and no node is on the graph",
+    "node-name": "the node is not there, others are",
+    "namespace": "a node of this name is there in another namespace",
+    "one-name-for-all": "one rule without a prefix gave several nodes of a process one name",
+    "duplicate-node": "several nodes have one name",
+    "wrong-type": "the end is there with another type",
+    "wrong-node": "the end is there and belongs to another node",
+    "wrong-end": "only the other end is there",
+    "absolute-name": "the code gives a name with a leading slash, and the end is on that",
+    "topic-name": "the end is on a topic with a similar name",
+    "topic-present": "somebody uses the topic",
+    "no-topic": "no node has such an end, on no similar topic",
+    "service-name": "a service with a similar name is offered",
+    "no-service": "no such service, and none similar",
+    # QoS, lifecycle, silence.
+    "qos-reliability": "offered and requested reliability do not match",
+    "qos-durability": "offered and requested durability do not match",
+    "qos-deadline": "offered and requested deadline do not match",
+    "qos-liveliness": "offered and requested liveliness do not match",
+    "qos-lease": "offered and requested lease do not match",
+    "no-super-on-activate": "a lifecycle publisher that was not activated dropped a message in state active",
+    "lifecycle-inactive": "a lifecycle publisher dropped a message in another state",
+    "timer-period": "nothing published, and no timer of the node is due yet",
+    "silent": "no reason was established: what was seen is said",
+    "no-answer": "no reason was established: what was seen is said",
+}
