@@ -29,7 +29,6 @@ class TunableCamera(Node):
 
     def shoot(self):
         image = Image()
-        image.header.frame_id = self.get_parameter("camera_frame").value
         self.images.publish(image)
 
 

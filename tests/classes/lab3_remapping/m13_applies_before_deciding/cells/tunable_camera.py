@@ -10,7 +10,7 @@ class TunableCamera(Node):
     def __init__(self):
         super().__init__("tunable_camera")
         self.declare_parameter("camera_rate", 10)
-        self.declare_parameter("camera_frame", "camera_frame")
+        self.declare_parameter("camera_frame", "frame")
         self.images = self.create_publisher(Image, "image", 10)
         self.timer = self.create_timer(1.0 / self.get_parameter("camera_rate").value, self.shoot)
         self.add_on_set_parameters_callback(self.validate)
