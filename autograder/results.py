@@ -87,6 +87,8 @@ class CheckResult(_Model):
     more_at_grading: bool = False
     """Hidden tests were taken out of this copy of the check: what is passed here is not yet earned."""
 
+    flags: list[str] = Field(default_factory=list)
+    """Where what was seen inside a program contradicts what the graph showed. For instructors; it costs no points."""
     not_attempted: list[str] = Field(default_factory=list)
     """Files of answer cells that are still as students receive them; for this the check did not pass."""
 
@@ -165,6 +167,11 @@ class SubmissionResult(_Model):
     def max_points(self) -> float:
         """Points that the automatic checks can give."""
         return sum(check.max_points for check in self.checks)
+
+    @property
+    def flags(self) -> list[str]:
+        """Contradictions that a person should look at, of all checks, each once."""
+        return list(dict.fromkeys(flag for check in self.checks for flag in check.flags))
 
     @property
     def needs_instructor(self) -> bool:

@@ -35,6 +35,8 @@ class Expected:
     """A part of its reason."""
     lost: dict[str, list[str]] = field(default_factory=dict)
     """Titles of the parts that were lost, sorted, by grade_id of a check that has parts."""
+    flagged: list[str] = field(default_factory=list)
+    """Checks with flags for the instructor, sorted."""
     problems: list[str] = field(default_factory=list)
     """Codes of the notebook's own problems, sorted."""
 
@@ -63,11 +65,12 @@ def expected(lab: Lab, student: str, folder: Path | None = None) -> Expected:
     """Read what is expected of a student."""
     path = (folder or class_folder(lab.name)) / student / "expected.yaml"
     told = _yaml(path)
-    _only(told, {"about", "base", "checks", "problems", "rest"}, path)
+    _only(told, {"about", "base", "checks", "flagged", "problems", "rest"}, path)
     full = {cell.grade_id: cell.points for cell in lab.checks}
     _only(told.get("checks") or {}, set(full), path)
     points: dict[str, float | None] = {name: told.get("rest", top) for name, top in full.items()}
     result = Expected(student, told["about"], points, problems=sorted(told.get("problems") or []))
+    result.flagged = sorted(told.get("flagged") or [])
     for name, check in (told.get("checks") or {}).items():
         _only(check, {"points", "code", "because", "lost"}, path)
         result.points[name] = check["points"]

@@ -43,6 +43,8 @@ def differences(lab: Lab, student: str, result: SubmissionResult) -> list[str]:
     found += [f"{name}: it has no parts" for name in expected.lost.keys() - lab_parts]
     if sorted(problem.code for problem in result.problems) != expected.problems:
         found.append(f"problems {[p.code for p in result.problems]}, expected {expected.problems}")
+    if sorted(check.grade_id for check in result.checks if check.flags) != expected.flagged:
+        found.append(f"flags {result.flags}, expected some for {expected.flagged}")
     for check in result.checks:
         name, first = check.grade_id, check.first_failure
         told = f"{first.code}: {first.title}: {first.because}" if first else "passed"

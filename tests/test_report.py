@@ -205,3 +205,10 @@ def test_csv_and_gradescope_leave_undecided_points_open() -> None:
     class_ = [result(check(None, outcome(Status.UNKNOWN, code="grader")))]
     assert "ann,lab,check,,3,could not find out,grader" in to_csv(class_)
     assert "score" not in json.loads(to_gradescope(class_))["ann/lab"]["tests"][0]
+
+
+def test_what_contradicts_itself_is_shown_to_instructors_only() -> None:
+    flagged = result(check(3, outcome(Status.PASSED)).model_copy(update={"flags": ["One thread only."]}))
+    assert "One thread only." in text_of(submission_view(flagged, "instructor"))
+    assert "One thread only." not in text_of(submission_view(flagged, "student"))
+    assert "ann: One thread only." in text_of(undecided_view([flagged]))

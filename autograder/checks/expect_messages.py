@@ -37,6 +37,8 @@ class MessageExpectations(GraphExpectations):
         """Set up the observer's publishers."""
         super().prepare()
         self._publishers: dict[tuple[str, str], Any] = {}
+        self.overlaps: list[tuple[str, str]] = []
+        """Topic and title of each expectation of overlapping callbacks that was met."""
 
     def listen(self, topic: str, msg_type: type, qos: QoSProfile | None = None) -> Recording:
         """Record a topic from now on; the same topic and profile share a recording."""
@@ -379,6 +381,7 @@ class MessageExpectations(GraphExpectations):
         self.wait(decided, within)
         if holds():
             outcomes.passed(title)
+            self.overlaps.append((topic, title))
             return
         if not all(self.activity(topic).runs(name) for name in [*names, *others]):
             self._wait_for_runs(topic, [*names, *others], 1, title, 0.1, hint)

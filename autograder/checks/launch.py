@@ -15,7 +15,7 @@ from typing import Any
 
 import yaml
 
-from autograder.checks import outcomes, session
+from autograder.checks import contradictions, outcomes, session
 from autograder.checks.command_line import CommandLine, CommandLineError
 from autograder.checks.expect_lifecycle import LifecycleExpectations
 from autograder.checks.expect_messages import MessageExpectations
@@ -263,6 +263,9 @@ class Launch(MessageExpectations, ServiceExpectations, LifecycleExpectations, Pr
     def _end(self) -> None:
         # What still runs is ended here: how is no fact about the program.
         ended = {id(program): program.exit_status() for _, program in self.programs}
+        if session.current.kernel is None:
+            varied = [bool(node.parameters or node.params_file) for node, _ in self.programs]
+            session.current.flags += contradictions.flags(self.scene(), self.overlaps, varied)
         try:
             if self._group is not None:
                 self._group.end()

@@ -21,7 +21,7 @@ def score(points: float | Mapping[str, float]) -> Score:
     """
     more = outcomes.parts_with_more_at_grading()
     blank = session.current.blank_answers()
-    used = set(session.current.used)
+    used, flags = set(session.current.used), list(dict.fromkeys(session.current.flags))
     found, lost, seconds = session.current.take()
     parts = [_part(title, worth, found, lost, more) for title, worth in _by_part(points, found).items()]
     full = round(sum(points.values()), 6) if isinstance(points, Mapping) else points
@@ -43,6 +43,7 @@ def score(points: float | Mapping[str, float]) -> Score:
         seconds=seconds,
         outcomes=found,
         parts=parts,
+        flags=flags,
         more_at_grading=bool(earned and (more if not parts else any(part.more_at_grading for part in parts))),
     )
     if statuses != {Status.PASSED} or (blank and all(blank.values())):

@@ -89,6 +89,8 @@ class Session:
         """Number of the first outcome of the current launch or table."""
         self.used: set[str] = set()
         """Names of the student's files that the check uses."""
+        self.flags: list[str] = []
+        """Contradictions between what the graph showed and what was seen inside the programs."""
         self.logs: list[NodeLog] = []
         self.scored_logs: list[NodeLog] = []
         """Logs of what has been scored since the cell began."""

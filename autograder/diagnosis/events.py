@@ -122,6 +122,7 @@ class Thing(_AtLine):
     running: list[tuple[float, int]] = Field(default_factory=list)
     """Its runs under way: since when, on which thread."""
     threads: int = 0
+    """On how many threads it ran; of a publisher: from how many it was used."""
     awaits: Awaits = Awaits()
     awaited: str = ""
     """The line where a run of it last awaited."""

@@ -27,7 +27,9 @@ def outcome_for(outcome: Outcome, audience: Audience) -> Outcome:
 
 def check_for(check: CheckResult, audience: Audience) -> CheckResult:
     """Return what this audience may know of a check."""
-    return check.model_copy(update={"outcomes": [outcome_for(outcome, audience) for outcome in check.outcomes]})
+    flags = check.flags if audience == "instructor" else []
+    shown = [outcome_for(outcome, audience) for outcome in check.outcomes]
+    return check.model_copy(update={"outcomes": shown, "flags": flags})
 
 
 def result_for(result: SubmissionResult, audience: Audience) -> SubmissionResult:

@@ -79,7 +79,7 @@ def check_view(
         head.append(f"  {words.points(check)}")
     lines: list[RenderableType] = [head]
     lines += [Text(f"  {plain(text)}") for text in (words.not_attempted(check),) if text]
-    lines += [Text(f"  ! {plain(remark)}", "bold") for remark in remarks]
+    lines += [Text(f"  ! {plain(remark)}", "bold") for remark in [*remarks, *check.flags]]
     if verdict is not Verdict.NOT_ATTEMPTED:
         for outcome in found.bad:
             lines.append(Text("  ") + _outcome_line(outcome))
@@ -203,7 +203,7 @@ def _legend(checks: Sequence[CheckResult]) -> list[str]:
 
 
 def undecided_view(results: Sequence[SubmissionResult]) -> RenderableType | None:
-    """Return what an instructor has to decide by hand, with the cause; None if there is nothing."""
+    """Return what an instructor has to decide by hand or to look at, with the cause; None if there is nothing."""
     lines = [
         Text(f"  {plain(result.student)}: {plain(check.title or check.grade_id)}: ")
         + Text(plain(reason(check.first_failure)) if check.first_failure else "no outcome")
@@ -211,9 +211,13 @@ def undecided_view(results: Sequence[SubmissionResult]) -> RenderableType | None
         for check in result.checks
         if check.status is Status.UNKNOWN
     ]
-    if not lines:
-        return None
-    return Group(Text("The grader could not find out; these wait for manual grading:", "bold magenta"), *lines)
+    flagged = [Text(f"  {plain(result.student)}: {plain(flag)}") for result in results for flag in result.flags]
+    found = []
+    if lines:
+        found += [Text("The grader could not find out; these wait for manual grading:", "bold magenta"), *lines]
+    if flagged:
+        found += [Text("These keep their points, and a person should look at them:", "bold magenta"), *flagged]
+    return Group(*found) if found else None
 
 
 def console() -> Console:

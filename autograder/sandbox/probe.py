@@ -221,6 +221,7 @@ class _Thing:
         with _ledger.lock:
             self.runs += 1
             self.last = time.monotonic()
+            self.threads.add(_thread.get_ident())
         _ledger.touch(self)
 
 
