@@ -19,6 +19,7 @@ from autograder.checks.message_text import in_words, shorten
 from autograder.diagnosis import Diagnosis
 from autograder.graph.names import full_name
 from autograder.graph.recording import Received, Recording, quiet_profile
+from autograder.graph.stream import Stream
 
 RELIABLE_DEEP = 1000
 """Depth of the observer's own publishers, so that a burst of its own is never cut."""
@@ -234,19 +235,41 @@ class MessageExpectations(GraphExpectations):
         if key not in self._publishers:
             self._publishers[key] = self.observer.publisher(topic, msg_type, profile)
         publisher = self._publishers[key]
-        if not self.wait(lambda: publisher.get_subscription_count() > 0, within):
-            reason = diagnosis.why_not_matched(
-                self.scene(), topic, profile, "subscription"
-            ) or diagnosis.why_no_endpoint(self.scene(), topic, msg_type, "subscription")
-            self.fail(
-                f"A node listens to `{topic}`",
-                reason,
-                expected=f"a subscription on {topic}",
-                observed=self._topics(),
-                hint=hint,
-            )
+        self._wait_until_heard(publisher.get_subscription_count, topic, msg_type, profile, within, hint)
         for message in messages:
             publisher.publish(message)
+
+    def _wait_until_heard(
+        self, matched: Callable[[], int], topic: str, msg_type: type, profile: QoSProfile, within: float, hint: str
+    ) -> None:
+        """Wait until a subscription has matched a publisher of the observer's; fail with what keeps them apart."""
+        if self.wait(matched, within):
+            return
+        reason = diagnosis.why_not_matched(self.scene(), topic, profile, "subscription") or diagnosis.why_no_endpoint(
+            self.scene(), topic, msg_type, "subscription"
+        )
+        self.fail(
+            f"A node listens to `{topic}`",
+            reason,
+            expected=f"a subscription on {topic}",
+            observed=self._topics(),
+            hint=hint,
+        )
+
+    def stream(self, topic: str, message: Any, *, rate: float, qos: QoSProfile) -> Stream:
+        """A message that is sent again and again, as by a sensor or a controller, between `start()` and `stop()`.
+
+        Args:
+            topic: full name; a node of the student's must subscribe to it with a profile that matches.
+            message: what is sent.
+            rate: hertz.
+            qos: what is offered.
+        """
+
+        def expect_heard(matched: Callable[[], int]) -> None:
+            self._wait_until_heard(matched, topic, type(message), qos, WITHIN, "")
+
+        return Stream(self.observer, topic, message, rate, qos, expect_heard)
 
     def activity(self, topic: str) -> Activity:
         """Begins and ends of callbacks that have arrived on a topic so far."""

@@ -48,6 +48,8 @@ class Recording:
         self.qos = qos
         self.incompatible: list[str] = []
         """Names of QoS policies over which a publisher and this subscription did not match."""
+        self.alive = 0
+        """Publishers that count as alive; a lease in the profile is needed to see one that hangs."""
         self._observer = observer
         self._messages: list[Received] = []
         self._subscription = observer.node.create_subscription(
@@ -56,7 +58,9 @@ class Recording:
             self._take,
             qos,
             raw=True,
-            event_callbacks=SubscriptionEventCallbacks(incompatible_qos=self._refused, use_default_callbacks=False),
+            event_callbacks=SubscriptionEventCallbacks(
+                incompatible_qos=self._refused, liveliness=self._asserted, use_default_callbacks=False
+            ),
         )
 
     def _take(self, data: bytes, info: dict[str, int]) -> None:
@@ -71,6 +75,10 @@ class Recording:
 
     def _refused(self, event: Any) -> None:
         self.incompatible.append(QoSPolicyKind(event.last_policy_kind).name)
+        self._observer.notify()
+
+    def _asserted(self, event: Any) -> None:
+        self.alive = event.alive_count
         self._observer.notify()
 
     @property

@@ -4,7 +4,7 @@ import time
 import rclpy
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
-from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.qos import QoSProfile
 from std_msgs.msg import Int32
 
 
@@ -13,7 +13,7 @@ class Recorder(Node):
         super().__init__("recorder")
         self.work = self.declare_parameter("work", 0.02).value
         self.publisher = self.create_publisher(Int32, "recorded", 100)
-        self.create_subscription(Int32, "frames", self.record, QoSProfile(depth=1000, reliability=ReliabilityPolicy.BEST_EFFORT))
+        self.create_subscription(Int32, "frames", self.record, QoSProfile(depth=1000))
 
     def record(self, frame):
         time.sleep(self.work)
