@@ -55,10 +55,8 @@ def read(folder: Path, text: str, given: dict[str, str] | None = None) -> list[L
     def find(package: str) -> Path:
         return {"lab": folder}[package]
 
-    for program in ("cam", "camera_demo"):
-        (folder / f"{program}.py").write_text("")
     (folder / "main.launch.yaml").write_text(text, encoding="utf-8")
-    return read_launch_file(folder / "main.launch.yaml", given or {}, find)
+    return read_launch_file(folder / "main.launch.yaml", given or {}, find, ["cam", "camera_demo"])
 
 
 def run(node: LaunchedNode) -> dict[str, Any]:

@@ -161,9 +161,10 @@ class Launch(MessageExpectations, ServiceExpectations, LifecycleExpectations, Pr
             return folder
 
         folder = session.current.folder.resolve()
+        programs = {path.stem for path in folder.glob("*.py")} | set(self._stand_ins)
         session.current.use(name)
         try:
-            found = read_launch_file(folder / name, arguments, find, list(self._stand_ins))
+            found = read_launch_file(folder / name, arguments, find, programs)
         except LaunchFileError as error:
             self._trouble.append(Diagnosis(str(error), "launch-file", error.hint))
             return []

@@ -140,17 +140,18 @@ class Doing:
 
     def program(self, package: str, program: str) -> None:
         """Refuse a program that the package does not have."""
+        packages = self.context.packages
         try:
-            programs = self.context.packages.programs(package)
+            packages.folder(package)
         except KeyError:
             raise self.place.at("pkg").error(
                 f"there is no package `{package}`.",
                 "`pkg` is the package's name and `exec` the program's: see the task.",
             ) from None
-        if program.endswith(".py") or (programs and program not in programs):
-            listed = f" It has {', '.join(f'`{name}`' for name in sorted(programs))}." if programs else ""
+        if program.endswith(".py") or (packages.programs is not None and program not in packages.programs):
+            listed = ", ".join(f"`{name}`" for name in sorted(packages.programs or []))
             raise self.place.at("exec").error(
-                f"the package `{package}` has no program `{program}`.{listed}",
+                f"the package `{package}` has no program `{program}`.{f' It has {listed}.' if listed else ''}",
                 "A program is called as in the first line of its cell, `%%node NAME`, without `.py`.",
             )
 

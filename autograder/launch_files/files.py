@@ -14,14 +14,14 @@ from pathlib import Path
 class Packages:
     """The packages that a launch file may name."""
 
-    def __init__(self, find: Callable[[str], Path], programs: Collection[str] = ()) -> None:
-        """Ask `find` for the folder of a package, KeyError if there is none; `programs` every package has."""
-        self._programs = set(programs)
+    def __init__(self, find: Callable[[str], Path], programs: Collection[str] | None) -> None:
+        """Ask `find` for the folder of a package, KeyError if there is none; None: any program is taken to exist."""
+        self.programs = programs
         self._find = find
         self._folders: dict[str, Path] = {}
 
     def folder(self, name: str) -> Path:
-        """The folder that has a package's programs and files.
+        """The folder that has a package's files.
 
         Raises:
             KeyError: there is no such package.
@@ -37,11 +37,6 @@ class Packages:
             KeyError: there is no such package.
         """
         return f"{self.folder(name)}/share/{name}"
-
-    def programs(self, name: str) -> set[str]:
-        """The names of a package's programs; empty if its folder has none at all."""
-        found = {path.stem for path in self.folder(name).glob("*.py")}
-        return found | self._programs if found else found
 
     def file(self, text: str, folder: Path) -> Path | None:
         """The file that a path leads to once the package is installed; None if there is none, or not in the lab.

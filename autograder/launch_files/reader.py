@@ -20,16 +20,16 @@ def read_launch_file(
     path: Path,
     arguments: Mapping[str, str],
     find: Callable[[str], Path] | None = None,
-    programs: Collection[str] = (),
+    programs: Collection[str] | None = None,
 ) -> list[LaunchedNode]:
     """Read a launch file and say what it starts, in its order.
 
     Args:
         path: a launch file in YAML; its folder also holds what it includes and its parameter files.
         arguments: launch arguments, as `name:=value` on the command line of `ros2 launch`.
-        find: the folder with a package's programs and files; KeyError if there is no such package. Without it every
+        find: the folder with a package's files; KeyError if there is no such package. Without it every
             package is the folder of the launch file.
-        programs: names of programs that a package has beside those in its folder.
+        programs: names of the programs that a package has; without it they are not looked at.
 
     Raises:
         LaunchFileError: it is missing, is no launch file, is refused by `ros2 launch`, or uses what is not covered.
