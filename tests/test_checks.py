@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import linecache
 import textwrap
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -575,3 +576,68 @@ def test_a_parameter_rule_that_rcl_refuses_is_explained(grade: Grade) -> None:
         """
     found = failure(grade(check, talker__py=TALKER))
     assert found.code == "name-characters" and "`-` cannot stand in the name" in found.because
+
+
+LATE = """
+import threading
+import time
+import rclpy
+from rclpy.node import Node
+from std_msgs.msg import String
+
+
+class Late(Node):
+    def __init__(self):
+        super().__init__("late")
+        self.create_timer(2.5, self.once)
+        self.made = None
+
+    def once(self):
+        if self.made is None:
+            self.made = self.create_publisher(String, "chatter", 10)
+
+
+rclpy.init()
+BODY
+"""
+SLOW_MAIN = """node = Late()
+spinning = threading.Thread(target=rclpy.spin, args=(node,))
+spinning.start()
+time.sleep(2.5)
+second = rclpy.create_node("second")
+spinning.join()
+"""
+
+
+@pytest.mark.parametrize(
+    ("expectation", "code"),
+    [
+        ('ros.expect_node("/talkr", within=300)', "node-name"),
+        ('ros.expect_publisher("/chater", String, within=300)', "topic-name"),
+        ('ros.expect_subscription("/chatter", String, within=300)', "wrong-end"),
+        ('ros.expect_messages("/chater", String, within=300)', "topic-name"),
+        ('ros.publish("/words", String(), within=300)', "no-topic"),
+        ('ros.expect_service("/how_mny", Trigger, within=300)', "service-name"),
+        ('ros.call("/how_mny", Trigger, Trigger.Request(), within=300)', "service-name"),
+        ('ros.expect_parameter("/talkr", "word", "hello", within=300)', "node-name"),
+        ('ros.expect_state("/talkr", "active", within=300)', "node-name"),
+    ],
+)
+def test_a_decided_verdict_does_not_wait_for_its_deadline(grade: Grade, expectation: str, code: str) -> None:
+    deadline = time.monotonic() + 200
+    result = grade(f'with launch("talker") as ros:\n    {expectation}\nros.score(2)', talker__py=TALKER)
+    assert failure(result).code == code
+    assert time.monotonic() < deadline
+
+
+@pytest.mark.parametrize(
+    ("body", "expectation"),
+    [
+        ("rclpy.spin(Late())", 'ros.expect_publisher("/chatter", String, node="/late")'),
+        (SLOW_MAIN, 'ros.expect_node("/second")'),
+    ],
+)
+def test_what_comes_late_is_waited_for(grade: Grade, body: str, expectation: str) -> None:
+    check = f'with launch("late") as ros:\n    ros.expect_node("/late")\n    {expectation}\nros.score(2)'
+    result = grade(check, late__py=LATE.replace("BODY", body))
+    assert result.points == 2, result.first_failure

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 from autograder import diagnosis
 from autograder.checks import outcomes, session
+from autograder.checks.settling import Settling
 from autograder.diagnosis import Diagnosis, Scene
 from autograder.graph.observer import Observer
 from autograder.sandbox.nodes import Program
@@ -83,9 +84,31 @@ class ExpectationBase:
             self._ended = time.monotonic()
         return time.monotonic() - self._ended > AFTER_EXIT
 
-    def wait(self, ready: Callable[[], object], within: float = WITHIN) -> bool:
-        """Wait for evidence; at most `within` seconds, less when every program has ended."""
-        return self.observer.wait(ready, within, self.all_ended)
+    def wait(
+        self, ready: Callable[[], object], within: float = WITHIN, needs: Callable[[], object] | None = None
+    ) -> bool:
+        """Wait for evidence; at most `within` seconds, less when it cannot come any more.
+
+        Args:
+            ready: whether it is there.
+            within: seconds.
+            needs: whether that is on the graph without which it cannot come; on a graph that has settled without it,
+                the verdict is decided.
+        """
+        return self.observer.wait(ready, within, self.hopeless(needs) if needs else self.all_ended)
+
+    def hopeless(self, needs: Callable[[], object]) -> Callable[[], bool]:
+        """Return a question to ask while waiting: whether what needs this on the graph cannot come any more."""
+        settling = Settling(self.observer, [program for _, program in self.programs])
+        return lambda: self.all_ended() or (not needs() and settling.decided())
+
+    def without_node(self, node: str) -> Callable[[], bool]:
+        """Return the question whether a node that is waited for cannot come any more."""
+        return self.hopeless(lambda: node in self.observer.nodes())
+
+    def wait_for_graph(self, ready: Callable[[], object], within: float = WITHIN) -> bool:
+        """Wait for something on the graph; at most `within` seconds, less when the graph has settled without it."""
+        return self.wait(ready, within, needs=ready)
 
     def gone_program(self) -> Program | None:
         """A program that has ended by itself, though it had to go on: it failed, or it ended as the last one."""

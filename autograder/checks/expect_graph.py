@@ -37,7 +37,7 @@ class GraphExpectations(ExpectationBase):
     def expect_node(self, name: str, *, within: float = WITHIN, hint: str = "") -> None:
         """The node with this full name is on the graph, exactly once."""
         title = f"The node `{name}` is on the graph"
-        if not self.wait(lambda: name in self.observer.nodes(), within):
+        if not self.wait_for_graph(lambda: name in self.observer.nodes(), within):
             self.fail(
                 title,
                 diagnosis.why_no_node(self.scene(), name),
@@ -97,7 +97,7 @@ class GraphExpectations(ExpectationBase):
     def expect_topic(self, topic: str, msg_type: type, *, within: float = WITHIN, hint: str = "") -> None:
         """The topic exists with this message type."""
         wanted = type_name(msg_type)
-        found = self.wait(lambda: wanted in self.observer.topics().get(topic, []), within)
+        found = self.wait_for_graph(lambda: wanted in self.observer.topics().get(topic, []), within)
         self.expect_that(
             found,
             f"The topic `{topic}` carries {wanted}",
@@ -141,7 +141,7 @@ class GraphExpectations(ExpectationBase):
         def number() -> int:
             return len(self._ends(topic, msg_type, kind, node))
 
-        found = self.wait(lambda: number() >= count, within)
+        found = self.wait_for_graph(lambda: number() >= count, within)
         if found and number() == count:
             outcomes.passed(title, observed=topic)
             return
@@ -228,7 +228,7 @@ class GraphExpectations(ExpectationBase):
             )
         wanted = ", ".join(f"{policy} {qos.in_words(value)}" for policy, value in policies.items())
         title = f"The {of} on `{topic}` has {wanted}"
-        if not self.wait(lambda: self._ends(topic, None, of, node), within):
+        if not self.wait_for_graph(lambda: self._ends(topic, None, of, node), within):
             self.fail(
                 title,
                 diagnosis.why_no_endpoint(self.scene(), topic, None, of, node),
@@ -272,7 +272,7 @@ class GraphExpectations(ExpectationBase):
         def ends(kind: End) -> list[TopicEndpointInfo]:
             return self._ends(topic, None, kind, "")
 
-        if not self.wait(lambda: ends("publisher") and ends("subscription"), within):
+        if not self.wait_for_graph(lambda: ends("publisher") and ends("subscription"), within):
             missing: End = "subscription" if ends("publisher") else "publisher"
             self.fail(
                 title,

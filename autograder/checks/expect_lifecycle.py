@@ -47,7 +47,7 @@ class LifecycleExpectations(GraphExpectations):
     def state(self, node: str, *, within: float = WITHIN) -> str:
         """Label of a node's current state."""
         try:
-            return self.watch_transitions(node).state(within, self.all_ended)
+            return self.watch_transitions(node).state(within, self.without_node(node))
         except (ServiceMissing, NoAnswer) as error:
             self._unreachable(f"`{node}` tells its lifecycle state", node, error, "")
 
@@ -57,7 +57,7 @@ class LifecycleExpectations(GraphExpectations):
         """A lifecycle node is in this state, or gets there within `within` seconds."""
         title = f"`{node}` is {state}"
         try:
-            seen = self.watch_transitions(node).wait_for_state(state, within, self.all_ended)
+            seen = self.watch_transitions(node).wait_for_state(state, within, self.without_node(node))
         except (ServiceMissing, NoAnswer) as error:
             self._unreachable(title, node, error, hint)
         self.expect_that(
@@ -84,7 +84,7 @@ class LifecycleExpectations(GraphExpectations):
     def available_transitions(self, node: str, *, within: float = WITHIN) -> Mapping[str, str]:
         """Labels of the transitions that a node offers now, each with the state it leads to."""
         try:
-            return self.watch_transitions(node).available(within, self.all_ended)
+            return self.watch_transitions(node).available(within, self.without_node(node))
         except (ServiceMissing, NoAnswer) as error:
             self._unreachable(f"`{node}` tells its transitions", node, error, "")
 
@@ -102,7 +102,7 @@ class LifecycleExpectations(GraphExpectations):
         """
         title = f"`{node}`: {label}" + {"success": " succeeds", "failure": " does not succeed", None: ""}[expect]
         try:
-            done = self.watch_transitions(node).transition(label, within, self.all_ended)
+            done = self.watch_transitions(node).transition(label, within, self.without_node(node))
         except (ServiceMissing, NoAnswer) as error:
             self._unreachable(title, node, error, hint)
         if expect is None:
@@ -150,7 +150,7 @@ class LifecycleExpectations(GraphExpectations):
     ) -> None:
         """A node took exactly these steps (state left, state entered) since it is watched."""
         client = self.watch_transitions(node)
-        seen = [change.step for change in client.wait_for_changes(len(steps), within, self.all_ended)]
+        seen = [change.step for change in client.wait_for_changes(len(steps), within, self.without_node(node))]
         told = ", ".join(f"{a} to {b}" for a, b in seen) or "no step"
         self.expect_that(
             seen == list(steps),

@@ -97,7 +97,7 @@ class MessageExpectations(GraphExpectations):
             return [r for r in recording.messages[after:] if where is None or bool(where(r.msg))]
 
         title = _title(topic, need, most, rate)
-        if not self.wait(lambda: len(counted()) >= need, within):
+        if not self.wait(lambda: len(counted()) >= need, within, lambda: self._ends(topic, msg_type, "publisher", "")):
             got, scene = len(counted()), self.scene()
             if where and not got and recording.count > after:
                 # Messages do come, so what keeps callbacks waiting is not the reason.
@@ -243,7 +243,7 @@ class MessageExpectations(GraphExpectations):
         self, matched: Callable[[], int], topic: str, msg_type: type, profile: QoSProfile, within: float, hint: str
     ) -> None:
         """Wait until a subscription has matched a publisher of the observer's; fail with what keeps them apart."""
-        if self.wait(matched, within):
+        if self.wait_for_graph(matched, within):
             return
         reason = diagnosis.why_not_matched(self.scene(), topic, profile, "subscription") or diagnosis.why_no_endpoint(
             self.scene(), topic, msg_type, "subscription"

@@ -51,7 +51,7 @@ class ServiceExpectations(GraphExpectations):
     def expect_service(self, name: str, srv_type: type, *, within: float = WITHIN, hint: str = "") -> None:
         """A node offers this service with this type."""
         wanted = type_name(srv_type)
-        found = self.wait(lambda: wanted in self.observer.services().get(name, []), within)
+        found = self.wait_for_graph(lambda: wanted in self.observer.services().get(name, []), within)
         self.expect_that(
             found,
             f"The service `{name}` ({wanted}) is offered",
@@ -65,8 +65,9 @@ class ServiceExpectations(GraphExpectations):
     ) -> list[Answer]:
         """Send all requests at once; each must be answered. Missing server or answer is a failed outcome."""
         title = f"The service `{name}` answers"
+        gone = self.hopeless(lambda: name in self.observer.services())
         try:
-            answers = call_all(self.observer, name, srv_type, requests, within, self.all_ended)
+            answers = call_all(self.observer, name, srv_type, requests, within, gone)
         except ServiceMissing:
             self.fail(title, diagnosis.why_no_service(self.scene(), name, srv_type), expected=name, hint=hint)
         unanswered = sum(1 for answer in answers if answer.response is None)
@@ -100,21 +101,21 @@ class ServiceExpectations(GraphExpectations):
     def get_parameters(self, node: str, names: Sequence[str], *, within: float = WITHIN) -> Mapping[str, Any]:
         """Values of a node's parameters; those it has not declared are left out."""
         try:
-            return parameters.get_parameters(self.observer, node, names, within, self.all_ended)
+            return parameters.get_parameters(self.observer, node, names, within, self.without_node(node))
         except (ServiceMissing, parameters.NoAnswer) as error:
             self._no_parameters(f"`{node}` tells its parameters", node, error, "")
 
     def list_parameters(self, node: str, *, within: float = WITHIN) -> list[str]:
         """Names of the parameters that a node has declared."""
         try:
-            return parameters.list_parameters(self.observer, node, within, self.all_ended)
+            return parameters.list_parameters(self.observer, node, within, self.without_node(node))
         except (ServiceMissing, parameters.NoAnswer) as error:
             self._no_parameters(f"`{node}` tells its parameters", node, error, "")
 
     def set_parameter(self, node: str, name: str, value: Any, *, within: float = WITHIN) -> Any:
         """Ask a node to set a parameter; gives its SetParametersResult."""
         try:
-            return parameters.set_parameter(self.observer, node, name, value, within, self.all_ended)
+            return parameters.set_parameter(self.observer, node, name, value, within, self.without_node(node))
         except (ServiceMissing, parameters.NoAnswer) as error:
             self._no_parameters(f"`{node}` answers when `{name}` is set to {value!r}", node, error, "")
 
@@ -122,11 +123,11 @@ class ServiceExpectations(GraphExpectations):
         """A node has a parameter with this value and type."""
         title = f"Parameter `{name}` of `{node}` is {value!r}"
         try:
-            have = parameters.get_parameters(self.observer, node, [name], within, self.all_ended)
+            have = parameters.get_parameters(self.observer, node, [name], within, self.without_node(node))
         except (ServiceMissing, parameters.NoAnswer) as error:
             self._no_parameters(title, node, error, hint)
         if name not in have:
-            declared = parameters.list_parameters(self.observer, node, within, self.all_ended)
+            declared = parameters.list_parameters(self.observer, node, within, self.without_node(node))
             own = [p for p in declared if p != "use_sim_time" and "qos_overrides" not in p]
             self.fail(
                 title,
@@ -188,7 +189,7 @@ class ServiceExpectations(GraphExpectations):
         title = f"`{node}` refuses `{name}` = {value!r} with a reason and lives on"
         before = self.get_parameters(node, [name], within=within)
         try:
-            reply = parameters.set_parameter(self.observer, node, name, value, within, self.all_ended)
+            reply = parameters.set_parameter(self.observer, node, name, value, within, self.without_node(node))
         except (ServiceMissing, parameters.NoAnswer) as error:
             self._no_parameters(title, node, error, hint)
         reason = ""

@@ -171,6 +171,8 @@ class ExecutorSeen(_Event):
     nodes: list[str] = Field(default_factory=list)
     spins: int = 0
     spinning: bool = False
+    main: bool = False
+    """The program's main thread is in its `spin`, which goes on until the end."""
     busy: int = 0
     """Callbacks on its threads now."""
     most: int = 0

@@ -269,7 +269,7 @@ class _Executor:
         self.key = f"executor{self.number}"
         self.executor = weakref.ref(executor)
         self.threads_given: bool | None = None
-        self.spins = self.spinning = self.busy = self.most = 0
+        self.spins = self.spinning = self.main = self.busy = self.most = 0
 
     def nodes(self) -> list[Any]:
         executor = self.executor()
@@ -286,6 +286,7 @@ class _Executor:
             "nodes": sorted(_ledger.known[node].name for node in self.nodes() if node in _ledger.known),
             "spins": self.spins,
             "spinning": self.spinning > 0,
+            "main": self.main > 0,
             "busy": self.busy,
             "most": self.most,
         }
@@ -304,9 +305,11 @@ class _Executor:
         if not again:
             _ledger.touch(self)
 
-    def spin(self, change: int) -> None:
+    def spin(self, change: int, long: bool = False) -> None:
         """Something began to spin it (1), or ended that (-1), or its nodes have changed (0)."""
         with _ledger.lock:
+            if long and threading.current_thread() is threading.main_thread():
+                self.main += change
             self.spinning += max(change, 0)
             self.spins += change > 0
         for node in self.nodes():
@@ -596,9 +599,17 @@ def _wrap(
 
 
 def _wrap_blocking(
-    owner: Any, name: str, what: str, executor_of: Callable[..., Any] | None = None, seen: bool = False
+    owner: Any,
+    name: str,
+    what: str,
+    executor_of: Callable[..., Any] | None = None,
+    seen: bool = False,
+    long: bool = False,
 ) -> None:
-    """As `_wrap`, for a call that may block. `executor_of`: it spins that one. `seen`: outside a callback as well."""
+    """As `_wrap`, for a call that may block.
+
+    `executor_of`: it spins that one; `long`: until the end. `seen`: it is noted outside a callback as well.
+    """
     original = getattr(owner, name)
 
     @functools.wraps(original)
@@ -617,7 +628,7 @@ def _wrap_blocking(
                 if noted is not None:
                     noted.begin()
                 if spun is not None:
-                    spun.spin(1)
+                    spun.spin(1, long)
             return original(*args, **kwargs)
         finally:
             _here.depth -= 1
@@ -625,7 +636,7 @@ def _wrap_blocking(
                 if noted is not None:
                     noted.end()
                 if spun is not None:
-                    spun.spin(-1)
+                    spun.spin(-1, long)
 
     setattr(owner, name, call)
 
@@ -792,10 +803,10 @@ def _prepare_executors(rclpy: Any) -> None:
     _wrap(base, "remove_node", after=nodes_changed)
     for name in ("SingleThreadedExecutor", "MultiThreadedExecutor"):
         _wrap_blocking(getattr(rclpy.executors, name), "spin_once", "spin", itself)
-    _wrap_blocking(base, "spin", "spin", itself)
+    _wrap_blocking(base, "spin", "spin", itself, long=True)
     _wrap_blocking(base, "spin_until_future_complete", "spin", itself)
     for name in ("spin", "spin_once", "spin_until_future_complete"):
-        _wrap_blocking(rclpy, name, "spin", given)
+        _wrap_blocking(rclpy, name, "spin", given, long=name == "spin")
     for name in ("_take_timer", "_take_subscription", "_take_service"):
         _wrap_take(base, name)
     take_answer = base._take_client

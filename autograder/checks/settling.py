@@ -1,0 +1,84 @@
+"""When nothing new can be expected on the graph any more: a verdict that is decided need not wait for its deadline.
+
+What decides is not that time went by. Each program must have said, through its probe, that its main thread has come to
+spinning; all that it said it made must be on the observer's graph; and then nothing new may come for as long as its
+slowest timer takes, and a while more. Where that evidence is missing, the deadline decides as ever.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+
+from autograder.diagnosis.events import Event, ExecutorSeen, NodeSeen, ProbeFailed, Thing, read
+from autograder.graph.names import full_name
+from autograder.graph.observer import Observer
+from autograder.sandbox.nodes import Program
+
+QUIET = 1.5
+"""Seconds without anything new, besides the longest period of a timer: what timers' callbacks make is there then."""
+
+_EACH = 0.2
+"""Seconds between two looks."""
+
+
+class Settling:
+    """Watches whether the graph of a launch still grows, from now on.
+
+    Args:
+        observer: of the launch.
+        programs: that were started.
+    """
+
+    def __init__(self, observer: Observer, programs: Sequence[Program]) -> None:
+        """Begin to watch."""
+        self._observer, self._programs = observer, list(programs)
+        self._seen: object = None
+        self._looked = 0.0
+        self._since = time.monotonic()
+        self._pause = QUIET
+        self._complete = False
+
+    def decided(self) -> bool:
+        """Whether nothing more can be expected to come."""
+        now = time.monotonic()
+        if now - self._looked >= _EACH:
+            self._looked = now
+            self._look(now)
+        return self._complete and now - self._since > self._pause
+
+    def _look(self, now: float) -> None:
+        told = [read(program.events()) for program in self._programs]
+        nodes, topics = self._observer.nodes(), self._observer.topics()
+        made = [sum(isinstance(event, NodeSeen) for event in events) for events in told]
+        things = [[(thing.id, thing.destroyed) for thing in _things(events)] for events in told]
+        seen = (nodes, topics, made, things)
+        if seen != self._seen:
+            self._seen, self._since = seen, now
+        self._pause = QUIET + max((thing.period for events in told for thing in _things(events)), default=0.0)
+        self._complete = bool(told) and all(
+            program.running() and _spins(events) and self._shows(events, nodes)
+            for program, events in zip(self._programs, told, strict=True)
+        )
+
+    def _shows(self, events: Sequence[Event], nodes: Sequence[str]) -> bool:
+        """Whether all that a program made is on the graph as the observer sees it."""
+        for event in events:
+            if isinstance(event, NodeSeen) and not event.destroyed and event.name not in nodes:
+                return False
+        look = {"publisher": self._observer.publishers, "subscription": self._observer.subscriptions}
+        return all(
+            any(full_name(end.node_namespace, end.node_name) == thing.node for end in look[thing.kind](thing.name))
+            for thing in _things(events)
+            if thing.kind in look and not thing.destroyed
+        )
+
+
+def _things(events: Sequence[Event]) -> list[Thing]:
+    return [event for event in events if isinstance(event, Thing)]
+
+
+def _spins(events: Sequence[Event]) -> bool:
+    """Whether the program's main thread has come to spinning, and the probe sees all that it makes."""
+    blind = any(isinstance(event, ProbeFailed) for event in events)
+    return not blind and any(isinstance(event, ExecutorSeen) and event.main for event in events)
