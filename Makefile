@@ -42,7 +42,7 @@ check: setup ## report on one notebook: NB=path/to/notebook.ipynb
 	@$(RUN) autograder check "$(NB)" $(ARGS)
 
 jupyter: setup ## open the labs in JupyterLab
-	@cd labs && $(RUN) jupyter lab $(if $(filter 0,$(shell id -u)),--allow-root) $(ARGS)
+	@cd labs && JUPYTER_CONFIG_PATH="$(CURDIR)/autograder/jupyter" $(RUN) jupyter lab $(if $(filter 0,$(shell id -u)),--allow-root) $(ARGS)
 
 release: setup ## make labs/ from solutions/
 	@$(RUN) autograder release $(ARGS)

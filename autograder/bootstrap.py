@@ -241,21 +241,23 @@ def finish(locks: "List[str]", version: "Tuple[int, ...]") -> None:
         encoding="utf-8",
     )
     command.chmod(0o755)
-    lead_nbgrader()
+    lead_jupyter()
     write_marker(locks, version)
 
 
-def lead_nbgrader() -> None:
-    """Let every nbgrader command of this environment use the course's configuration, whatever folder it is started in.
+def lead_jupyter() -> None:
+    """Let nbgrader and nbconvert of this environment use the course's configuration, whatever folder they start in.
 
     Started elsewhere than in the course, nbgrader would go on with its own stages, which run what students wrote.
+    nbconvert would write reports into Markdown as HTML, though they have a plain text.
     """
-    link, config = VENV / "etc" / "jupyter" / "nbgrader_config.py", ROOT / "nbgrader_config.py"
-    if not link.exists() or link.resolve() != config:
-        with contextlib.suppress(OSError):
-            link.unlink()
-        link.parent.mkdir(parents=True, exist_ok=True)
-        link.symlink_to(config)
+    for config in (ROOT / "nbgrader_config.py", ROOT / "autograder" / "jupyter" / "jupyter_nbconvert_config.json"):
+        link = VENV / "etc" / "jupyter" / config.name
+        if not link.exists() or link.resolve() != config:
+            with contextlib.suppress(OSError):
+                link.unlink()
+            link.parent.mkdir(parents=True, exist_ok=True)
+            link.symlink_to(config)
 
 
 def write_marker(locks: "List[str]", version: "Tuple[int, ...]") -> None:
@@ -393,7 +395,7 @@ def make_ready(dev: bool, wanted: str) -> None:
     # What tests and lectures need is a superset, so that one environment serves both, and stays so once it is.
     locks = [STUDENT_LOCK, DEV_LOCK] if dev or DEV_LOCK in known else [STUDENT_LOCK]
     if all(known.get(lock) == digest(lock) for lock in locks):
-        lead_nbgrader()
+        lead_jupyter()
         return
     refuse_other_machines()
     refuse_closed_folder(VENV if state else ROOT)

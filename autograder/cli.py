@@ -196,12 +196,15 @@ def release(
 ) -> None:
     """Generate what students receive: `labs/` from `solutions/`."""
     from autograder.course import course_root
+    from autograder.files import write_beside
     from autograder.grading.stage_b import release as generate
     from autograder.submission.lab import lab_names
+    from autograder.submission.start_page import START_PAGE, start_page
 
     root = course_root()
     for name in [lab] if lab else lab_names(root):
         print(f"{name} → {generate(root, name)}")
+    write_beside(root / "labs" / START_PAGE, start_page(root / "labs"))
 
 
 @app.command()
