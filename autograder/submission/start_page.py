@@ -13,9 +13,9 @@ START_PAGE = "README.md"
 _TOP = """\
 # The labs
 
-Open a lab with a click on its name, and work through it from the top: run each cell with Shift+Enter. A cell that begins
-with `%%node NAME` or `%%file NAME` writes your program or file. The check below it runs that and says at once what holds,
-and what does not and why.
+Open a lab with a click on its name, and work through it from the top: run each cell with Shift+Enter. A cell that
+begins with `%%node NAME` or `%%file NAME` writes your program or file. The check below it runs that and says at once
+what holds, and what does not and why.
 
 | lab | about |
 |---|---|
