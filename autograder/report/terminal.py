@@ -214,7 +214,8 @@ def undecided_view(results: Sequence[SubmissionResult]) -> RenderableType | None
     flagged = [Text(f"  {plain(result.student)}: {plain(flag)}") for result in results for flag in result.flags]
     found = []
     if lines:
-        found += [Text("The grader could not find out; these wait for manual grading:", "bold magenta"), *lines]
+        head = "The grader could not find out; these wait for manual grading (--force runs them again):"
+        found += [Text(head, "bold magenta"), *lines]
     if flagged:
         found += [Text("These keep their points, and a person should look at them:", "bold magenta"), *flagged]
     return Group(*found) if found else None
