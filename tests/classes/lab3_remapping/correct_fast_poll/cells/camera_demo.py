@@ -31,8 +31,9 @@ def camera():
 
 
 if __name__ == "__main__":
-    with rclpy.init():
-        try:
-            rclpy.spin(camera())
-        except (KeyboardInterrupt, ExternalShutdownException):
-            pass
+    rclpy.init()
+    try:
+        rclpy.spin(camera())
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    rclpy.try_shutdown()
