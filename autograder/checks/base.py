@@ -71,6 +71,23 @@ class ExpectationBase:
             self.stopped,
         )
 
+    def seen_at_once(self, program: str, kind: str, name: str = "") -> int | None:
+        """How many runs of a program's callbacks of one kind its probe has seen at once: evidence for reasons only.
+
+        Args:
+            program: its name.
+            kind: `timer`, `subscription` or `service`: the highest number of runs of one of them.
+            name: full name of its topic or service, if several are of that kind.
+
+        Returns:
+            None where the probe does not tell.
+        """
+        for inside in self.scene().insides:
+            things = [t for t in inside.callbacks if t.kind == kind and (not name or t.name == name)]
+            if inside.name == program and inside.attached and things:
+                return max(thing.most for thing in things)
+        return None
+
     def served(self, name: str) -> list[tuple[float, float]]:
         """When requests to an offered service arrived and were answered, seconds on the system clock."""
         raise NotImplementedError

@@ -67,16 +67,30 @@ def waits_for_a_service(inside: Inside) -> Diagnosis | None:
         lasting = call.blocks or (call.what == "wait_for_service" and call.begun > 1)
         services = inside.scene.observer.services()
         if lasting and client.name and client.name not in services:
-            close = nearest(client.name, [n for n, types in services.items() if "rcl_interfaces" not in types[0]])
-            return Diagnosis(
-                f"{_at(inside, call)}it waits for the service `{client.name}`, and no node offers that"
-                + (f"; the nearest name is `{close}`." if close else "."),
-                "waits-for-service",
-                f"The code says `{client.given}`: compare the names, namespace included."
-                if client.given
-                else "Compare the names, namespace included.",
-            )
+            return _nobody_offers(client, services, f"{_at(inside, call)}it waits for ")
     return None
+
+
+def asks_nobody(inside: Inside) -> Diagnosis | None:
+    """Must have seen: a request that was not answered, sent a while ago to a service that is not on the graph."""
+    for client in inside.things.values():
+        waited = client.runs > client.done and inside.now - client.last > STUCK_AFTER
+        if client.kind == "client" and waited and not client.destroyed:
+            services = inside.scene.observer.services()
+            if client.name not in services:
+                return _nobody_offers(client, services, f"`{inside.name}` has asked for an answer of ")
+    return None
+
+
+def _nobody_offers(client: Thing, services: dict[str, list[str]], said: str) -> Diagnosis:
+    close = nearest(client.name, [n for n, types in services.items() if "rcl_interfaces" not in types[0]])
+    given = f" (`{client.given}` in the code)" if client.given and client.given != client.name else ""
+    return Diagnosis(
+        f"{said}the service `{client.name}`{given}, and no node offers that"
+        + (f"; the nearest name is `{close}`." if close else "."),
+        "waits-for-service",
+        "Compare the names, namespace included.",
+    )
 
 
 def nested_spin(inside: Inside) -> Diagnosis | None:

@@ -25,6 +25,7 @@ SEEN: tuple[Link, ...] = (
     blocked.call_same_group,
     blocked.call_in_callback,
     blocked.waits_for_a_service,
+    blocked.asks_nobody,
     blocked.nested_spin,
     blocked.rate_in_callback,
     blocked.await_same_group,

@@ -31,7 +31,7 @@ CODES = {
     # Blocked callbacks.
     "call-same-group": "call() in a callback has not come back; client and callback share an exclusive group",
     "call-in-callback": "call() in a callback has not come back; every thread of the executor is taken",
-    "waits-for-service": "a call waits for a service that is not on the graph",
+    "waits-for-service": "a call, or a request that was sent, waits for a service that is not on the graph",
     "nested-spin": "a callback spins, and has not ended since, or its node is in no spinning executor now",
     "rate-in-callback": "rate.sleep() in a callback has not come back; every thread of the executor is taken",
     "rate-unspun": "rate.sleep() has not come back; no executor spins",

@@ -1,0 +1,627 @@
+"""Programs for `test_diagnosis.py`: for each reason one where it must speak, and a near miss where it must not."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from rclpy.duration import Duration
+from rclpy.qos import DurabilityPolicy, LivelinessPolicy, QoSProfile
+from std_msgs.msg import Int64, String
+from std_srvs.srv import Trigger
+
+from autograder import diagnosis
+from autograder.diagnosis import Diagnosis, Scene
+from autograder.diagnosis.inside import Inside
+from autograder.graph.recording import quiet_profile
+
+PRELUDE = """
+import threading, time
+import rclpy
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup as Exclusive, ReentrantCallbackGroup as Reentrant
+from rclpy.executors import MultiThreadedExecutor, SingleThreadedExecutor
+from rclpy.lifecycle import LifecycleNode, TransitionCallbackReturn
+from rclpy.duration import Duration
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, LivelinessPolicy, QoSProfile, ReliabilityPolicy
+from std_msgs.msg import Int64, String
+from std_srvs.srv import Trigger
+"""
+
+Ask = Callable[[Scene, str], Diagnosis | None]
+
+
+def silent(scene: Scene, name: str) -> Diagnosis | None:
+    return diagnosis.why_silent(scene, f"/{name}/out", String, quiet_profile())
+
+
+def inside(scene: Scene, name: str) -> Diagnosis | None:
+    return diagnosis.inside_reason(scene, f"/{name}")
+
+
+def together(at_once: int = 2, itself: bool = False) -> Ask:
+    return lambda scene, name: diagnosis.why_not_together(scene, at_once, itself)
+
+
+def starved(scene: Scene, name: str) -> Diagnosis | None:
+    return diagnosis.why_starved(scene)
+
+
+def trouble(scene: Scene, name: str) -> Diagnosis | None:
+    return diagnosis.program_trouble(scene)
+
+
+@dataclass
+class Case:
+    """A program, what must be said about it, and what must not."""
+
+    init: str = ""
+    """The rest of the constructor, after `self.out`, a publisher on `~/out`."""
+    methods: str = ""
+    main: str = "rclpy.spin(node)"
+    says: str = ""
+    because: str = ""
+    never: tuple[str, ...] = ()
+    """Reasons that this is a near miss of."""
+    ask: Ask = silent
+    ready: Callable[[Inside], object] = field(default=lambda it: any(thing.done >= 3 for thing in it.callbacks))
+    """When a near miss has done its work."""
+    base: str = "Node"
+
+    def source(self, name: str) -> str:
+        parts = (
+            PRELUDE,
+            f"class It({self.base}):",
+            "    def __init__(self):",
+            f'        super().__init__("{name}")',
+            '        self.out = self.create_publisher(String, "~/out", 10)',
+            textwrap.indent(textwrap.dedent(self.init), " " * 8),
+            textwrap.indent(textwrap.dedent(self.methods), " " * 4),
+            "",
+            "def main():",
+            "    rclpy.init()",
+            "    node = It()",
+            textwrap.indent(textwrap.dedent(self.main), " " * 4),
+            "",
+            "main()",
+        )
+        return "\n".join(parts)
+
+
+THREADS = "executor = MultiThreadedExecutor(num_threads={})\nexecutor.add_node(node)\nexecutor.spin()"
+TALK = "self.create_timer(0.05, lambda: self.out.publish(String(data='x')))\n"
+SERVER = "self.create_service(Trigger, '~/gate', lambda request, response: response, callback_group=Reentrant())\n"
+CLIENT = "self.client = self.create_client(Trigger, '~/gate'{})\n"
+ASKER = SERVER + CLIENT + "self.create_timer(0.05, self.ask)\n"
+CALL = "def ask(self):\n    self.client.call(Trigger.Request())\n"
+AWAIT = "async def ask(self):\n    await self.client.call_async(Trigger.Request())\n"
+POLL = """
+def ask(self):
+    future = self.client.call_async(Trigger.Request())
+    while not future.done():
+        time.sleep(0.01)
+"""
+SLOW = "def slow(self):\n    time.sleep(0.1)\n"
+TWO = "self.create_timer(0.05, self.slow{})\nself.create_timer(0.05, self.slow{})\n"
+OWN = ", callback_group=Exclusive()"
+ONCE = "self.client.call_async(Trigger.Request())\n"
+ANSWER = "def answer(self, request, response):\n    {}\n"
+CONFIGURE = "def on_configure(self, state):\n    {}\n"
+TRIGGER = "node.trigger_configure()\nrclpy.spin(node)"
+MANAGED = "self.create_timer(0.05, lambda: self.managed.publish(String()))\n"
+STRICT = QoSProfile(
+    depth=1,
+    durability=DurabilityPolicy.TRANSIENT_LOCAL,
+    deadline=Duration(seconds=1),
+    liveliness=LivelinessPolicy.MANUAL_BY_TOPIC,
+    liveliness_lease_duration=Duration(seconds=1),
+)
+_BEST = {
+    "durability": ", durability=DurabilityPolicy.TRANSIENT_LOCAL",
+    "deadline": ", deadline=Duration(seconds=0.5)",
+    "liveliness": ", liveliness=LivelinessPolicy.MANUAL_BY_TOPIC",
+    "lease": ", liveliness_lease_duration=Duration(seconds=0.5)",
+}
+OFFERS = {
+    policy: "".join(words for other, words in _BEST.items() if other != policy)
+    + (", reliability=ReliabilityPolicy.BEST_EFFORT" if policy == "reliability" else "")
+    for policy in ("reliability", *_BEST)
+}
+
+CASES = {
+    # Blocked callbacks.
+    "calls": Case(ASKER.format(""), CALL, says="call-in-callback", because="holds the only thread"),
+    "calls_same_group": Case(
+        ASKER.format(""), CALL, THREADS.format(4), says="call-same-group", never=("call-in-callback",)
+    ),
+    "calls_well": Case(
+        ASKER.format(OWN), CALL, THREADS.format(4), says="silent", never=("call-same-group", "stuck-callback")
+    ),
+    "calls_nobody": Case(
+        ASKER.format(OWN)
+        .replace("'~/gate'{},", "'~/gate',")
+        .replace("(Trigger, '~/gate', cal", "(Trigger, '~/gat', cal"),
+        CALL,
+        THREADS.format(4),
+        says="waits-for-service",
+        because="the nearest name is",
+        never=("call-same-group",),
+    ),
+    "waits_for_nobody": Case(
+        "self.create_client(Trigger, '/gate').wait_for_service()\n",
+        says="waits-for-service",
+        because="`/gate`",
+        never=("stuck-in-init",),
+    ),
+    "waits_well": Case(
+        SERVER + CLIENT.format("") + "self.client.wait_for_service()\n" + TALK,
+        says="silent",
+        never=("waits-for-service",),
+    ),
+    "awaits": Case(ASKER.format(""), AWAIT, says="await-same-group", because="await self.client"),
+    "awaits_well": Case(ASKER.format(OWN), AWAIT, says="silent", never=("await-same-group", "spinning-ended")),
+    "polls": Case(ASKER.format(OWN), POLL, says="busy-wait", because="no thread is free", never=("stuck-callback",)),
+    "polls_well": Case(ASKER.format(OWN), POLL, THREADS.format(2), says="silent", never=("busy-wait",)),
+    "spins_inside": Case(
+        ASKER.format(OWN),
+        "def ask(self):\n"
+        "    rclpy.spin_until_future_complete(self, self.client.call_async(Trigger.Request()), timeout_sec=0.3)\n",
+        "executor = SingleThreadedExecutor()\nexecutor.add_node(node)\nexecutor.spin()",
+        says="nested-spin",
+        because="took the node away",
+        never=("spinning-ended",),
+    ),
+    "spins_before": Case(
+        "self.create_timer(0.05, self.tick)\n",
+        "def tick(self):\n    pass\n",
+        "rclpy.spin_once(node)\nrclpy.spin(node)",
+        says="silent",
+        never=("nested-spin", "spinning-ended", "not-spinning"),
+    ),
+    "rate": Case(
+        "self.rate = self.create_rate(20)\nself.create_timer(0.05, self.tick)\n",
+        "def tick(self):\n    while True:\n        self.rate.sleep()\n",
+        says="rate-in-callback",
+        never=("stuck-callback",),
+    ),
+    "rate_well": Case(
+        "self.rate = self.create_rate(20)\nself.create_timer(0.05, self.tick)\n",
+        "def tick(self):\n    self.rate.sleep()\n",
+        THREADS.format(2),
+        says="silent",
+        never=("rate-in-callback", "rate-unspun"),
+    ),
+    "rate_unspun": Case(main="rate = node.create_rate(20)\nrate.sleep()", says="rate-unspun"),
+    "loops": Case(
+        "self.create_timer(0.05, self.tick)\n",
+        "def tick(self):\n    number = 0\n    while True:\n        number += 1\n",
+        says="stuck-callback",
+        because="the loop in line",
+        never=("starved", "busy-wait"),
+    ),
+    "works_long": Case(
+        "self.create_timer(0.05, self.tick)\n",
+        "def tick(self):\n    time.sleep(0.2)\n",
+        says="silent",
+        never=("stuck-callback",),
+    ),
+    # Spinning.
+    "never_spins": Case(
+        TALK, main="threading.Event().wait()", says="not-spinning", because="`threading.Event().wait()`"
+    ),
+    "needs_no_spin": Case(
+        main="while rclpy.ok():\n    time.sleep(0.1)",
+        says="silent",
+        never=("not-spinning", "node-not-added"),
+        ready=lambda it: it.age > 1,
+    ),
+    "in_init": Case(
+        TALK + "while True:\n    pass\n", says="stuck-in-init", because="`while True:`", never=("not-spinning",)
+    ),
+    "slow_init": Case(TALK + "time.sleep(0.3)\n", says="silent", never=("stuck-in-init", "timer-period")),
+    "not_added": Case(TALK, main="SingleThreadedExecutor().spin()", says="node-not-added", never=("not-spinning",)),
+    "ends_spinning": Case(
+        TALK,
+        main="executor = SingleThreadedExecutor()\nexecutor.add_node(node)\nexecutor.spin_once()\ntime.sleep(60)",
+        says="spinning-ended",
+        because="`time.sleep(60)`",
+    ),
+    "spins_in_a_loop": Case(
+        TALK,
+        main="while rclpy.ok():\n    rclpy.spin_once(node, timeout_sec=0.05)",
+        says="silent",
+        never=("spinning-ended", "not-spinning", "node-not-added"),
+    ),
+    # Errors in callbacks.
+    "raises": Case(
+        "self.create_timer(0.05, self.tick)\n",
+        "def tick(self):\n    self.nothing()\n",
+        THREADS.format(2),
+        says="callback-exception",
+        because="nothing",
+    ),
+    "catches": Case(
+        "self.create_timer(0.05, self.tick)\n",
+        "def tick(self):\n    try:\n        self.nothing()\n    except AttributeError:\n        pass\n",
+        says="silent",
+        never=("callback-exception", "thread-exception"),
+    ),
+    "thread_raises": Case(
+        "self.create_timer(0.05, self.tick)\nthreading.Thread(target=self.work).start()\n",
+        "def tick(self):\n    pass\n\ndef work(self):\n    raise ValueError('no')\n",
+        says="thread-exception",
+        because="ValueError: no",
+        never=("callback-exception",),
+    ),
+    "wrong_field": Case(
+        "self.create_timer(0.05, self.tick)\n",
+        "def tick(self):\n    self.out.publish(String(data=5))\n",
+        THREADS.format(2),
+        says="message-field",
+        because="`data` is of type string, and its value is 5 (int)",
+        never=("callback-exception", "message-type"),
+    ),
+    "wrong_message": Case(
+        "self.create_timer(0.05, self.tick)\n",
+        "def tick(self):\n    self.out.publish('x')\n",
+        THREADS.format(2),
+        says="message-type",
+        because="'x' (str)",
+        never=("callback-exception", "message-field"),
+    ),
+    # Silence.
+    "long_period": Case(
+        "self.create_timer(500.0, lambda: None)\n", says="timer-period", because="every 500 s", never=("silent",)
+    ),
+    "two_periods": Case(
+        "self.create_timer(500.0, lambda: None)\nself.create_timer(0.05, lambda: None)\n",
+        says="silent",
+        because="every 0.05 s) fired",
+        never=("timer-period",),
+    ),
+    # Together.
+    "one_thread": Case(
+        TWO.format("", ""), SLOW, says="single-threaded-executor", because="one callback at a time", ask=together()
+    ),
+    "no_groups": Case(
+        TWO.format("", ""),
+        SLOW,
+        THREADS.format(4),
+        says="no-callback-groups",
+        ask=together(),
+        never=("single-threaded-executor", "few-threads", "one-group"),
+    ),
+    "one_group": Case(
+        "group = Exclusive()\n" + TWO.format(", callback_group=group", ", callback_group=group"),
+        SLOW,
+        THREADS.format(4),
+        says="one-group",
+        ask=together(),
+        never=("no-callback-groups",),
+    ),
+    "two_threads": Case(
+        TWO.format(OWN, OWN),
+        SLOW,
+        THREADS.format(2),
+        says="few-threads",
+        because="2 threads, and 3",
+        ask=together(3),
+        never=("one-group", "machine-threads"),
+    ),
+    "any_threads": Case(
+        TWO.format(OWN, OWN),
+        SLOW,
+        THREADS.format(2).replace("num_threads=2", ""),
+        says="machine-threads",
+        ask=together(8),
+        never=("few-threads",),
+    ),
+    "groups": Case(
+        TWO.format(OWN, OWN),
+        SLOW,
+        THREADS.format(4),
+        ask=together(),
+        never=(
+            "single-threaded-executor",
+            "few-threads",
+            "machine-threads",
+            "one-group",
+            "exclusive-group",
+            "no-callback-groups",
+        ),
+    ),
+    "exclusive": Case(
+        "self.create_timer(0.05, self.slow)\n",
+        SLOW,
+        THREADS.format(4),
+        says="exclusive-group",
+        ask=together(itself=True),
+    ),
+    "reentrant": Case(
+        "self.create_timer(0.05, self.slow, callback_group=Reentrant())\n",
+        SLOW,
+        THREADS.format(4),
+        ask=together(itself=True),
+        never=("exclusive-group", "no-callback-groups"),
+    ),
+    "starves": Case(
+        "group = Exclusive()\n" + TWO.format(", callback_group=group", ", callback_group=group"),
+        SLOW,
+        THREADS.format(4),
+        says="starved",
+        because="made in line",
+        ask=starved,
+    ),
+    "shares": Case(
+        "group = Exclusive()\n" + TWO.format(", callback_group=group", ", callback_group=group"),
+        SLOW.replace("0.1", "0.001"),
+        THREADS.format(4),
+        ask=starved,
+        never=("starved", "single-threaded-executor", "few-threads"),
+    ),
+    "timer_waits": Case(
+        ASKER.format(OWN) + "self.create_timer(0.05, lambda: None)\n",
+        CALL,
+        THREADS.format(4),
+        says="",
+        ask=lambda scene, name: diagnosis.waits_for_its_group(scene),
+        never=("timer-same-group",),
+    ),
+    "timer_waits_for_a_subscription": Case(
+        SERVER + CLIENT.format(OWN) + "self.create_subscription(String, '~/out', self.ask, 10)\n" + TALK,
+        CALL.replace("self)", "self, message)"),
+        THREADS.format(4),
+        says="timer-same-group",
+        ask=lambda scene, name: diagnosis.waits_for_its_group(scene),
+    ),
+    # Programs that end. (A near miss of an end is a program that runs.)
+    "syntax": Case(main="if True print()", says="syntax-error", never=("crashed",), ask=trouble),
+    "crashes": Case(
+        main="raise ValueError('no')",
+        says="crashed",
+        because="ValueError: no",
+        ask=trouble,
+        never=("syntax-error", "exited", "not-spinning"),
+    ),
+    "exits": Case(
+        main="rclpy.spin_once(node, timeout_sec=0.1)\nprint('bye')",
+        says="exited",
+        because="`bye`",
+        ask=trouble,
+        never=("crashed", "not-spinning"),
+    ),
+    "exits_unspun": Case(main="pass", says="not-spinning", ask=trouble, never=("exited",)),
+    "undeclared": Case(
+        "self.get_parameter('rate')\n", says="parameter-not-declared", ask=trouble, never=("parameter-type", "crashed")
+    ),
+    "wrong_parameter": Case(
+        main="given = [rclpy.Parameter('rate', value='x')]\n"
+        "rclpy.create_node('other', parameter_overrides=given).declare_parameter('rate', 1)",
+        says="parameter-type",
+        ask=trouble,
+        never=("parameter-not-declared", "crashed"),
+    ),
+    "declared": Case(
+        "self.declare_parameter('rate', 1)\nself.get_parameter('rate')\n" + TALK,
+        ask=trouble,
+        never=(
+            "parameter-not-declared",
+            "parameter-type",
+            "crashed",
+            "exited",
+            "refused-call",
+            "used-after-destroy",
+            "shutdown-in-callback",
+            "syntax-error",
+        ),
+    ),
+    "starts_processes": Case("import subprocess\nsubprocess.run(['true'])\n", says="refused-call", ask=trouble),
+    "destroys": Case(
+        "self.destroy_publisher(self.out)\nself.out.publish(String())\n",
+        says="used-after-destroy",
+        ask=trouble,
+        never=("crashed",),
+    ),
+    "shuts_down": Case(
+        "self.create_timer(0.05, self.tick)\n",
+        "def tick(self):\n    rclpy.shutdown()\n",
+        "rclpy.spin(node)\nrclpy.shutdown()",
+        says="shutdown-in-callback",
+        because="done already",
+        ask=lambda scene, name: None if scene.programs[0].running() else diagnosis.shut_down_inside(scene),
+    ),
+    # More errors in callbacks.
+    "awaits_asyncio": Case(
+        "self.create_timer(0.05, self.tick)\n",
+        "async def tick(self):\n    import asyncio\n    await asyncio.sleep(0.1)\n",
+        THREADS.format(2),
+        says="asyncio-in-callback",
+        never=("callback-exception",),
+    ),
+    "declares_twice": Case(
+        "self.create_timer(0.05, self.tick)\n",
+        "def tick(self):\n    self.declare_parameter('x', 1)\n",
+        THREADS.format(2),
+        says="declared-twice",
+        never=("callback-exception",),
+    ),
+    "service_raises": Case(
+        SERVER.replace("lambda request, response: response", "self.answer") + CLIENT.format("") + ONCE,
+        ANSWER.format("raise KeyError('key')"),
+        THREADS.format(2),
+        says="service-exception",
+        because="KeyError",
+        never=("callback-exception", "service-no-return"),
+    ),
+    "service_returns_nothing": Case(
+        SERVER.replace("lambda request, response: response", "self.answer") + CLIENT.format("") + ONCE,
+        ANSWER.format("response.success = True"),
+        THREADS.format(2),
+        says="service-no-return",
+        never=("service-exception", "bad-return"),
+    ),
+    "service_answers_a_number": Case(
+        SERVER.replace("lambda request, response: response", "self.answer") + CLIENT.format("") + ONCE,
+        ANSWER.format("response.message = 5\n    return response"),
+        THREADS.format(2),
+        says="message-field",
+        because="`message` is of type string",
+        never=("service-exception",),
+    ),
+    "service_answers": Case(
+        SERVER.replace("lambda request, response: response", "self.answer") + CLIENT.format("") + ONCE + TALK,
+        ANSWER.format("return response"),
+        says="silent",
+        never=("service-exception", "service-no-return", "message-field", "asyncio-in-callback", "declared-twice"),
+    ),
+    "parameter_returns_nothing": Case(
+        "self.declare_parameter('x', 1)\nself.add_on_set_parameters_callback(lambda new: None)\n"
+        "self.set_parameters([rclpy.Parameter('x', value=2)])\n",
+        says="bad-return",
+        because="None instead of",
+    ),
+    "parameter_returns": Case(
+        "from rcl_interfaces.msg import SetParametersResult\nself.declare_parameter('x', 1)\n"
+        "self.add_on_set_parameters_callback(lambda new: SetParametersResult(successful=True))\n"
+        "self.set_parameters([rclpy.Parameter('x', value=2)])\n" + TALK,
+        says="silent",
+        never=("bad-return",),
+    ),
+    # Lifecycle.
+    "configure_raises": Case(
+        base="LifecycleNode",
+        methods=CONFIGURE.format("raise ValueError('no')"),
+        main=TRIGGER,
+        says="lifecycle-exception",
+        never=("lifecycle-return",),
+    ),
+    "configure_returns_nothing": Case(
+        base="LifecycleNode",
+        methods=CONFIGURE.format("pass"),
+        main=TRIGGER,
+        says="lifecycle-return",
+        never=("lifecycle-exception",),
+    ),
+    "no_super": Case(
+        "self.managed = self.create_lifecycle_publisher(String, '~/managed', 10)\n" + MANAGED,
+        CONFIGURE.format("return TransitionCallbackReturn.SUCCESS")
+        + "\ndef on_activate(self, state):\n    return TransitionCallbackReturn.SUCCESS\n",
+        "node.trigger_configure()\nnode.trigger_activate()\nrclpy.spin(node)",
+        base="LifecycleNode",
+        says="no-super-on-activate",
+        never=("lifecycle-inactive",),
+        ask=lambda scene, name: diagnosis.lifecycle_silence(scene, f"/{name}/managed"),
+    ),
+    "inactive": Case(
+        "self.managed = self.create_lifecycle_publisher(String, '~/managed', 10)\n" + MANAGED,
+        main="rclpy.spin(node)",
+        base="LifecycleNode",
+        says="lifecycle-inactive",
+        because="unconfigured",
+        never=("no-super-on-activate",),
+        ask=lambda scene, name: diagnosis.lifecycle_silence(scene, f"/{name}/managed"),
+    ),
+    "active": Case(
+        "self.managed = self.create_lifecycle_publisher(String, '~/managed', 10)\n",
+        CONFIGURE.format("return TransitionCallbackReturn.SUCCESS"),
+        "node.trigger_configure()\nnode.trigger_activate()\n"
+        "node.create_timer(0.05, lambda: node.managed.publish(String()))\nrclpy.spin(node)",
+        base="LifecycleNode",
+        never=("no-super-on-activate", "lifecycle-inactive", "lifecycle-return", "lifecycle-exception"),
+        ask=lambda scene, name: diagnosis.lifecycle_silence(scene, f"/{name}/managed"),
+    ),
+    # Names. The near miss of each is a program with the name, or with another reason.
+    "absolute": Case(
+        "self.create_publisher(String, '/picture', 10)\n",
+        says="absolute-name",
+        because="`/picture`",
+        ask=lambda scene, name: diagnosis.why_no_endpoint(scene, f"/{name}/picture", String, "publisher"),
+        never=("topic-name",),
+    ),
+    "relative": Case(
+        "self.create_publisher(String, 'painting', 10)\n",
+        says="topic-name",
+        because="`painting` in the code",
+        ask=lambda scene, name: diagnosis.why_no_endpoint(scene, f"/{name}/painting", String, "publisher"),
+        never=("absolute-name", "no-topic"),
+    ),
+    "other_type": Case(
+        says="wrong-type",
+        never=("topic-name", "wrong-end"),
+        ask=lambda scene, name: diagnosis.why_no_endpoint(scene, f"/{name}/out", Int64, "publisher"),
+    ),
+    "other_end": Case(
+        says="wrong-end",
+        never=("no-topic", "wrong-type"),
+        ask=lambda scene, name: diagnosis.why_no_endpoint(scene, f"/{name}/out", String, "subscription"),
+    ),
+    "other_node": Case(
+        says="wrong-node",
+        never=("wrong-type",),
+        ask=lambda scene, name: diagnosis.why_no_endpoint(scene, f"/{name}/out", String, "publisher", "/somebody"),
+    ),
+    "no_topic": Case(
+        says="no-topic",
+        never=("wrong-node", "topic-name"),
+        ask=lambda scene, name: diagnosis.why_no_endpoint(scene, "/zzz", Int64, "publisher"),
+    ),
+    "outside": Case(
+        main="other = rclpy.create_node('other', namespace='/outside')\n"
+        "other.create_publisher(String, '/elsewhere', 10)\nrclpy.spin(node)",
+        says="absolute-name",
+        never=("topic-present",),
+        ask=lambda scene, name: diagnosis.why_topic_present(scene, "/elsewhere"),
+    ),
+    "used_topic": Case(
+        says="topic-present",
+        never=("absolute-name",),
+        ask=lambda scene, name: diagnosis.why_topic_present(scene, f"/{name}/out"),
+    ),
+    "other_node_name": Case(
+        says="node-name",
+        because="other_node_name",
+        never=("namespace", "no-node", "duplicate-node"),
+        ask=lambda scene, name: diagnosis.why_no_node(scene, f"/x_{name}"),
+    ),
+    "other_namespace": Case(
+        says="namespace",
+        because="`/other_namespace`",
+        never=("node-name",),
+        ask=lambda scene, name: diagnosis.why_no_node(scene, f"/front/{name}"),
+    ),
+    "other_service": Case(
+        SERVER,
+        says="service-name",
+        because="/gate",
+        never=("no-service",),
+        ask=lambda scene, name: diagnosis.why_no_service(scene, f"/{name}/gat", Trigger),
+    ),
+    "no_service": Case(
+        says="no-service",
+        never=("service-name",),
+        ask=lambda scene, name: diagnosis.why_no_service(scene, "/zzz", Trigger),
+    ),
+    "hears_nobody": Case(
+        TALK,
+        says="no-answer",
+        because="but no answer came",
+        never=("not-spinning",),
+        ask=lambda scene, name: diagnosis.why_no_answer(scene, f"/{name}/out"),
+    ),
+    "cannot_answer": Case(
+        main="threading.Event().wait()",
+        says="not-spinning",
+        never=("no-answer",),
+        ask=lambda scene, name: diagnosis.why_no_answer(scene, f"/{name}/get_parameters"),
+    ),
+    **{
+        f"qos_{policy}": Case(
+            f"self.create_publisher(String, '~/offer', QoSProfile(depth=1{offer}))\n" + TALK,
+            says=f"qos-{policy}",
+            never=tuple(f"qos-{other}" for other in OFFERS if other != policy),
+            ask=lambda scene, name: diagnosis.why_not_matched(scene, f"/{name}/offer", STRICT, "publisher"),
+        )
+        for policy, offer in OFFERS.items()
+    },
+}
