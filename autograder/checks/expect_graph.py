@@ -244,7 +244,7 @@ class GraphExpectations(ExpectationBase):
             wrong += [
                 (
                     policy,
-                    f"The {policy} of `{owner}`'s {of} is {qos.in_words(have[policy])}, not {qos.in_words(value)}.",
+                    f"The {of} of `{owner}`: its {policy} is {qos.in_words(have[policy])}, not {qos.in_words(value)}.",
                 )
                 for policy, value in policies.items()
                 if not _same(have[policy], value)
