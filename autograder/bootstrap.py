@@ -246,13 +246,19 @@ def finish(locks: "List[str]", version: "Tuple[int, ...]") -> None:
 
 
 def lead_jupyter() -> None:
-    """Let nbgrader and nbconvert of this environment use the course's configuration, whatever folder they start in.
+    """Let nbgrader, nbconvert and kernels of this environment use the course's configuration, wherever they start.
 
     Started elsewhere than in the course, nbgrader would go on with its own stages, which run what students wrote.
-    nbconvert would write reports into Markdown as HTML, though they have a plain text.
+    nbconvert would write reports into Markdown as HTML, though they have a plain text. Kernels would not know what to
+    say when a notebook's first cell was not run.
     """
-    for config in (ROOT / "nbgrader_config.py", ROOT / "autograder" / "jupyter" / "jupyter_nbconvert_config.json"):
-        link = VENV / "etc" / "jupyter" / config.name
+    ours = ROOT / "autograder" / "jupyter"
+    for folder, config in (
+        ("jupyter", ROOT / "nbgrader_config.py"),
+        ("jupyter", ours / "jupyter_nbconvert_config.json"),
+        ("ipython", ours / "ipython_kernel_config.json"),
+    ):
+        link = VENV / "etc" / folder / config.name
         if not link.exists() or link.resolve() != config:
             with contextlib.suppress(OSError):
                 link.unlink()

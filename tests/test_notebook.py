@@ -493,6 +493,35 @@ def test_after_a_restart_a_program_counts_only_once_its_cell_was_run(tmp_path: P
         made.close()
 
 
+def test_without_the_set_up_cell_it_is_named(tmp_path: Path) -> None:
+    made = Notebook(tmp_path)
+    try:
+        for cell in (CHECK, TALKER):
+            shown = made.run(cell)
+            assert "Run the first code cell of the notebook" in shown.text, shown
+        assert "Run the first" not in made.run("unknown").text
+        assert "NameError" in made.run("unknown").error
+        made.run(SET_UP)
+        write(made)
+        assert "✓ passed" in made.run(CHECK).text
+    finally:
+        made.close()
+
+
+def test_in_markdown_a_report_is_text(notebook: Notebook, tmp_path: Path) -> None:
+    from nbformat.v4 import new_code_cell, new_notebook, new_output
+
+    write(notebook)
+    shown = notebook.run(CHECK)
+    data = {"text/plain": shown.text, "text/html": shown.html}
+    output = new_output("execute_result", data, execution_count=1)
+    path = tmp_path / "report.ipynb"
+    path.write_text(json.dumps(new_notebook(cells=[new_code_cell(CHECK, outputs=[output])])))
+    subprocess.run([sys.executable, "-m", "nbconvert", "--to", "markdown", path], check=True, timeout=START)
+    text = (tmp_path / "report.md").read_text()
+    assert "✓ passed  2 of 2 points" in text and "<div" not in text
+
+
 def test_an_unused_extension_does_no_harm(tmp_path: Path) -> None:
     code = (
         "import sys\nfrom IPython.core.interactiveshell import InteractiveShell\nshell = InteractiveShell.instance()\n"

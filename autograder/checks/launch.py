@@ -246,10 +246,14 @@ class Launch(MessageExpectations, ServiceExpectations, LifecycleExpectations, Pr
         """Let the programs run for so many seconds, and show what they print: for experiments, not for checks."""
         self.observer.pause(seconds)
 
+    def __repr__(self) -> str:
+        names = ", ".join(f'"{node.program}"' for node in self.nodes) or "…"
+        return f"launch({names}): begin a block with it, `with launch({names}) as ros:`"
+
     def _ipython_display_(self) -> None:
         """As the last line of a cell: run for a moment and show what happens."""
         if self.programs or session.current.kernel is None:
-            print(repr(self))
+            print(self)
         else:
             try_out(self)
 

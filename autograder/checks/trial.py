@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from autograder.checks.watch import NotLaunchedError
 from autograder.graph.names import full_name
 from autograder.report.output import tidy
 
@@ -34,9 +35,13 @@ def log_of(launch: Launch, name: str) -> Log:
 
 def try_out(launch: Launch) -> None:
     """Run the launch for a few seconds, show what its programs print, and say what was on the graph."""
-    with launch:
-        launch.observer.wait(launch.all_ended, TRIAL)
-        seen = _seen(launch)
+    try:
+        with launch:
+            launch.observer.wait(launch.all_ended, TRIAL)
+            seen = _seen(launch)
+    except NotLaunchedError as reason:
+        print(reason)
+        return
     names = ", ".join(f'"{node.program}"' for node in launch.nodes)
     print(f"{seen}\nTo look closer: with launch({names}) as ros: …")
 

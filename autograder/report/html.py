@@ -97,12 +97,8 @@ def check_html(
         points=words.points(shown),
         not_attempted=words.not_attempted(shown),
         remarks=remarks,
-        bad=Markup(render("findings.html", bad=found.bad, not_looked_at=found.not_looked_at)),
-        folded=verdict is Verdict.NOT_ATTEMPTED and bool(found.bad),
-        parts=[
-            {"verdict": words.part_verdict(part), "title": part.title, "points": words.part_points(part)}
-            for part in shown.parts
-        ],
+        findings=Markup(render("findings.html", **vars(found))),
+        folded=verdict is Verdict.NOT_ATTEMPTED,
         passed=found.passed,
         holding=words.holding(len(found.passed)),
         logs=printed if shown.status is not Status.PASSED else [],

@@ -81,19 +81,24 @@ def check_view(
     lines += [Text(f"  {plain(text)}") for text in (words.not_attempted(check),) if text]
     lines += [Text(f"  ! {plain(remark)}", "bold") for remark in [*remarks, *check.flags]]
     if verdict is not Verdict.NOT_ATTEMPTED:
-        for outcome in found.bad:
-            lines.append(Text("  ") + _outcome_line(outcome))
-            lines.extend(_details(outcome))
-        lines += [Text(f"  {text}", "dim") for text in (found.not_looked_at,) if text]
-    for part in check.parts:
-        mark = words.part_verdict(part)
-        words_of = f"{plain(part.title)}: {words.part_points(part)}"
-        lines.append(Text.assemble("  ", (f"{words.SYMBOL[mark]} ", _VERDICT_STYLE[mark]), words_of))
+        lines += _findings(found)
     if verdict in (Verdict.FAILED, Verdict.PARTLY, Verdict.UNKNOWN):
         lines += [Text(f"  {words.holding(len(found.passed))}", "dim")] if found.passed else []
         lines += [_output(log) for log in logs if log.text.strip()]
     lines += [Text(f"  {plain(origin)}", "dim")] if origin else []
     return Group(*lines)
+
+
+def _findings(found: words.Findings) -> list[RenderableType]:
+    lines: list[RenderableType] = []
+    for outcome in found.bad:
+        lines += [Text("  ") + _outcome_line(outcome), *_details(outcome)]
+    for part in found.parts:
+        mark = (f"{words.SYMBOL[part.verdict]} ", _VERDICT_STYLE[part.verdict])
+        lines.append(Text.assemble("  ", mark, f"{plain(part.title)}: {part.points}"))
+        for outcome in part.bad:
+            lines += [Text("    ") + _outcome_line(outcome), *_details(outcome)]
+    return lines + [Text(f"  {text}", "dim") for text in (found.not_looked_at,) if text]
 
 
 def check_text(check: CheckResult, logs: Sequence[NodeLog], remarks: Sequence[str], origin: str) -> str:

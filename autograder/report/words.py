@@ -78,11 +78,23 @@ def not_attempted(check: CheckResult) -> str:
 
 
 @dataclass(frozen=True)
+class PartFindings:
+    """A part of a check, and what failed in it or could not be found out."""
+
+    title: str
+    verdict: Verdict
+    points: str
+    bad: list[Outcome]
+
+
+@dataclass(frozen=True)
 class Findings:
     """A check's outcomes in the order in which they matter."""
 
     bad: list[Outcome]
-    """What failed or could not be found out, with what follows from it."""
+    """What failed or could not be found out, outside of any part."""
+    parts: list[PartFindings]
+    """The parts, those that were lost first."""
     passed: list[Outcome]
     not_looked_at: str
     """How many were not looked at, as a sentence; empty if none."""
@@ -96,7 +108,13 @@ def findings(check: CheckResult) -> Findings:
         f"{left} more expectation{' was' if left == 1 else 's were'} not looked at because of that." if left else ""
     )
     bad = [o for o in check.outcomes if o.status in (Status.FAILED, Status.UNKNOWN)]
-    return Findings(bad, by_status[Status.PASSED], sentence)
+    parts = [
+        PartFindings(part.title, part_verdict(part), part_points(part), [o for o in bad if o.part == part.title])
+        for part in check.parts
+    ]
+    parts.sort(key=lambda part: not part.bad and part.verdict is not Verdict.FAILED)
+    titles = {part.title for part in check.parts}
+    return Findings([o for o in bad if o.part not in titles], parts, by_status[Status.PASSED], sentence)
 
 
 def holding(count: int) -> str:
