@@ -11,6 +11,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 from pathlib import Path
 
@@ -20,6 +21,8 @@ import toy
 from junitparser import JUnitXml
 
 from autograder.files import write_beside
+from autograder.sandbox.isolation import preflight
+from autograder.sandbox.scratch import Scratch
 from autograder.submission.lab import load_lab
 
 KIT = Path(__file__).resolve().parent.parent
@@ -223,6 +226,31 @@ def test_an_interrupt_keeps_finished_results_and_leaves_nothing_running(root: Pa
     assert [path.name for path in (course / "build" / "results" / "toy").iterdir()] == ["ann.json"]
     _, alive = psutil.wait_procs(family, timeout=10)
     assert alive == []
+
+
+@pytest.mark.parametrize("isolation", ["full", "none"])
+def test_a_killed_command_leaves_nothing(
+    root: Path, tmp_path: Path, isolation: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if isolation == "full" and not preflight().full:
+        pytest.skip(preflight().why_not_full)
+    course, scratch = toy.make_course(tmp_path / "course"), tmp_path / "tmp"
+    scratch.mkdir()
+    for number in range(3):
+        hand_in(course, f"stuck{number}", STUCK)
+    shared = {path.name for path in Path("/dev/shm").glob("*mp-*")}
+    monkeypatch.setenv("TMPDIR", str(scratch))
+    monkeypatch.setattr(tempfile, "tempdir", str(scratch))
+    process = start(course, "grade", "toy", "class", "--isolation", isolation, start_new_session=True)
+    family = family_with_a_worker(process)
+    process.kill()
+    process.communicate()
+    _, alive = psutil.wait_procs(family, timeout=5)
+    assert alive == []
+    Scratch().remove()  # as the next start does
+    left = [path.name for path in scratch.iterdir() if not path.name.startswith("autograder-log-")]
+    assert left == []
+    assert {path.name for path in Path("/dev/shm").glob("*mp-*")} <= shared
 
 
 def test_an_interrupted_check_says_so(root: Path, tmp_path: Path) -> None:

@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+import tempfile
 import threading
 import time
 from pathlib import Path
@@ -199,6 +200,89 @@ def test_a_program_that_takes_too_long_is_ended(tmp_path: Path) -> None:
         program = sandbox.group().start("sleeps")
         assert program.wait(10)
         assert program.stopped_by() == "time limit"
+
+
+def test_a_program_that_only_computes_is_ended_and_says_so(tmp_path: Path) -> None:
+    (tmp_path / "burns.py").write_text("while True:\n    pass\n")
+    with NodeSandbox(tmp_path, Isolation.NONE, limits=Limits(cpu_seconds=1)) as sandbox, sandbox.group() as group:
+        program = group.start("burns")
+        assert program.wait(30)
+        assert program.stopped_by() == "CPU time limit"
+
+
+@needs_full
+def test_a_submission_that_only_computes_has_little_left_for_its_later_launches() -> None:
+    run = in_sandbox(
+        "import time, tempfile\nfrom pathlib import Path\nfrom autograder.results import Isolation\n"
+        "from autograder.sandbox.nodes import Limits, NodeSandbox\n"
+        "folder = Path(tempfile.mkdtemp()); (folder / 'burns.py').write_text('while True: pass')\n"
+        "(folder / 'asks.py').write_text('import resource; print(resource.getrlimit(resource.RLIMIT_CPU)[0])')\n"
+        "limits = Limits(cpu_seconds=3, cpu_together=4, cpu_last=1)\n"
+        "with NodeSandbox(folder, Isolation.FULL, limits=limits) as sandbox:\n"
+        "    for name in ('asks', 'burns', 'asks'):\n"
+        "        with sandbox.group() as group:\n"
+        "            program = group.start(name)\n"
+        "            program.wait(60)\n"
+        "            print(name, program.output(), program.stopped_by())\n"
+    )
+    assert run.stdout.split()[:8] == ["asks", "3", "burns", "CPU", "time", "limit", "asks", "1"], run
+
+
+def test_one_launch_ends_its_own_programs_only(local: NodeSandbox) -> None:
+    (local.folder / "stays.py").write_text("import time\nprint('here', flush=True)\ntime.sleep(600)\n")
+    with local.group() as outer, local.group() as inner:
+        kept, ended = outer.start("stays"), inner.start("stays")
+        inner.end()
+        assert not ended.running() and kept.running()
+        assert outer.start("stays").running()
+    assert not kept.running()
+
+
+def test_a_launch_keeps_what_its_programs_said_before_the_end(local: NodeSandbox) -> None:
+    (local.folder / "says.py").write_text("print('a word')\nraise SystemExit(3)\n")
+    with local.group() as group:
+        program = group.start("says")
+        program.wait(10)
+    assert (program.exit_status(), program.output()) == (3, "a word\n")
+
+
+def test_a_sandbox_that_cannot_start_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    monkeypatch.setattr(sys, "executable", str(tmp_path / "no-python"))
+    threads = threading.active_count()
+    with pytest.raises(OSError, match="no-python"):
+        NodeSandbox(tmp_path, Isolation.NONE)
+    assert threading.active_count() == threads
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_killed_notebook_leaves_nothing(tmp_path: Path) -> None:
+    programs, scratch = tmp_path / "programs", tmp_path / "tmp"
+    programs.mkdir()
+    scratch.mkdir()
+    (programs / "stays.py").write_text(
+        "import ctypes, os, signal, time\nctypes.CDLL(None).prctl(1, 0)\n"
+        "signal.signal(signal.SIGTERM, signal.SIG_IGN)\nprint('here', flush=True)\ntime.sleep(600)\n"
+    )
+    source = (
+        "import time\nfrom pathlib import Path\nfrom autograder.results import Isolation\n"
+        "from autograder.sandbox.nodes import NodeSandbox\n"
+        f"sandbox = NodeSandbox(Path({str(programs)!r}), Isolation.NONE)\ngroup = sandbox.group()\n"
+        "program = group.start('stays')\nwhile not program.output(): time.sleep(0.01)\n"
+        "print('ready', flush=True)\ntime.sleep(600)\n"
+    )
+    environment = {**os.environ, "TMPDIR": str(scratch)}
+    notebook = subprocess.Popen([sys.executable, "-c", source], cwd=ROOT, env=environment, stdout=subprocess.PIPE)
+    try:
+        assert notebook.stdout is not None
+        assert notebook.stdout.readline() == b"ready\n"
+        family = descendants(notebook.pid)
+        assert len(family) >= 3 and list(scratch.iterdir())
+    finally:
+        notebook.kill()
+        notebook.wait()
+    _wait_for(lambda: not [pid for pid in family if Path(f"/proc/{pid}").exists()], 5)
+    assert not list(scratch.iterdir())
 
 
 def test_reduced_isolation_hides_files_and_processes(tmp_path: Path) -> None:

@@ -157,7 +157,7 @@ def start_bwrap(
             os.close(descriptor)
 
 
-def rlimits(limits: Limits) -> dict[str, int]:
+def rlimits(limits: Limits, cpu_seconds: int) -> dict[str, int]:
     """Return the limits of one program by the names of the `resource` module."""
     return {
         "RLIMIT_AS": limits.address_space,
@@ -165,7 +165,7 @@ def rlimits(limits: Limits) -> dict[str, int]:
         "RLIMIT_NPROC": limits.processes,
         "RLIMIT_NOFILE": limits.open_files,
         "RLIMIT_FSIZE": limits.file_size,
-        "RLIMIT_CPU": limits.cpu_seconds,
+        "RLIMIT_CPU": cpu_seconds,
         "RLIMIT_SIGPENDING": limits.signals,
         "RLIMIT_CORE": 0,
         "RLIMIT_MSGQUEUE": 0,

@@ -18,7 +18,7 @@ from autograder.errors import KitError
 from autograder.sandbox import watch
 from autograder.sandbox.limits import Limits
 from autograder.sandbox.loop import Loop
-from autograder.sandbox.processes import memory, pid_of
+from autograder.sandbox.processes import cpu_time, memory, pid_of
 from autograder.sandbox.program import Program
 
 _ANSWER = 10.0
@@ -67,6 +67,8 @@ class ProgramGroup:
         """The first process as this process sees it."""
         self._base = 0
         """Bytes of memory that it had before it started anything."""
+        self.cpu = 0.0
+        """Seconds of CPU that all its programs have had, once it has ended."""
         self._ready = False
         self._broken = ""
         self._over = False
@@ -235,6 +237,7 @@ class ProgramGroup:
         if self._over:
             return
         self._over = True
+        self.cpu = sum(cpu_time(pid) for pid in (self.pid, *(one.pid for one in self._programs.values())) if pid > 0)
         try:
             self._kill()
         finally:

@@ -25,8 +25,11 @@ class Limits:
     """What may lie in /tmp, and again in /dev/shm."""
     inodes: int = 1024
     """Files and folders there, again in each: an empty file costs the kernel a kilobyte that no limit counts."""
-    cpu_seconds: int = 30
-    """Of one process."""
+    cpu_seconds: int = 10
+    """Of one process. A whole node takes a third of a second."""
+    cpu_together: int = 100
+    """Of all launches of a submission: what it has left when that is used up is `cpu_last`."""
+    cpu_last: int = 2
     wall_seconds: float = 180.0
     """Of one program."""
     output_kept: int = 256 * 1024

@@ -53,6 +53,8 @@ class NodeSandbox:
         self.limits = limits or Limits()
         self._lock = threading.Lock()
         self._groups: list[ProgramGroup] = []
+        self._cpu = 0.0
+        """Seconds of CPU that ended groups have had."""
         self._launcher: subprocess.Popen[bytes] | None = None
         self._channel: socket.socket | None = None
         self._said = -1
@@ -117,7 +119,7 @@ class NodeSandbox:
                 "namespaces": full,
                 "disk": self.limits.disk,
                 "inodes": self.limits.inodes,
-                "limits": bubblewrap.rlimits(self.limits),
+                "limits": bubblewrap.rlimits(self.limits, self._cpu_seconds()),
                 # With reduced isolation the launcher is under this filter already; nobody is kept from himself.
                 "filter": seccomp.filter_program().hex() if full else "",
                 "program_filter": seccomp.no_processes().hex(),
@@ -132,8 +134,17 @@ class NodeSandbox:
                 raise
             finally:
                 theirs.close()
-            self._groups = [*(one for one in self._groups if not one.over), group]
+            self._groups.append(group)
             return group
+
+    def _cpu_seconds(self) -> int:
+        """What a program may still use. A submission full of programs that only compute must not take the machine."""
+        self._cpu += sum(group.cpu for group in self._groups if group.over)
+        self._groups = [group for group in self._groups if not group.over]
+        if self.isolation is Isolation.NONE:
+            return self.limits.cpu_seconds
+        left = int(self.limits.cpu_together - self._cpu)
+        return max(self.limits.cpu_last, min(self.limits.cpu_seconds, left))
 
     def _environment(self) -> dict[str, str]:
         variables = python_environment()

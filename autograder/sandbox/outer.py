@@ -33,7 +33,8 @@ _DROP = (
 )
 
 _RUN_LEASHED = (
-    "import ctypes,runpy,sys;ctypes.CDLL(None).prctl(1,9);sys.argv=sys.argv[1:];"
+    "import ctypes,os,runpy,sys;ctypes.CDLL(None).prctl(1,9);"
+    "os.getppid()==int(sys.argv[1]) or sys.exit('nobody waits for this');sys.argv=sys.argv[2:];"
     "runpy.run_module(sys.argv[0],run_name='__main__',alter_sys=True)"
 )
 """Without bwrap's `--die-with-parent`: `python -m` that is killed with the thread that started it."""
@@ -104,7 +105,7 @@ def start_in_sandbox(module_args: list[str], isolation: Isolation) -> subprocess
     command = [sys.executable, "-m", *module_args]
     pipe = subprocess.PIPE
     if isolation is not Isolation.FULL:
-        command = [sys.executable, "-c", _RUN_LEASHED, *module_args]
+        command = [sys.executable, "-c", _RUN_LEASHED, str(os.getpid()), *module_args]
         return subprocess.Popen(
             command, env=variables, start_new_session=True, stdin=pipe, stdout=pipe, stderr=pipe, cwd="/"
         )

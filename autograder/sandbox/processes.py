@@ -68,6 +68,14 @@ def proportional_memory(pid: int) -> int:
     return total
 
 
+def cpu_time(pid: int) -> float:
+    """Return the seconds of CPU that a process has had, with those of its children that have ended; 0 if it is gone."""
+    with contextlib.suppress(OSError):
+        fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+        return sum(map(int, fields[11:15])) / os.sysconf("SC_CLK_TCK")
+    return 0.0
+
+
 def pid_of(handle: int) -> int:
     """Return the process id, as this process sees it, behind a pidfd; -1 if it has been reaped."""
     for line in Path(f"/proc/self/fdinfo/{handle}").read_text().splitlines():
