@@ -15,7 +15,7 @@ class Caller(Node):
         self.reply = self.create_publisher(String, "reply", 10)
         self.create_timer(self.get_parameter("tick_period").value, self.tick)
         self.create_subscription(Empty, "request", self.on_request, 10, callback_group=MutuallyExclusiveCallbackGroup())
-        self.gate = self.create_client(Trigger, "gate", callback_group=MutuallyExclusiveCallbackGroup())
+        self.gate = self.create_client(Trigger, "gate")
 
     def tick(self):
         self.count += 1
@@ -28,7 +28,7 @@ class Caller(Node):
 
 def spin(node):
     """Run the node's callbacks until the program is told to end."""
-    executor = MultiThreadedExecutor(num_threads=4)
+    executor = MultiThreadedExecutor(num_threads=2)
     executor.add_node(node)
     executor.spin()
 

@@ -17,10 +17,10 @@ class TwoMutex(Node):
         self.activity = self.create_publisher(String, "activity", 10)
         self.group_a = MutuallyExclusiveCallbackGroup()
         self.group_b = MutuallyExclusiveCallbackGroup()
-        self.create_timer(0.4, self.a1, callback_group=self.group_a)
-        self.create_timer(0.4, self.a2, callback_group=self.group_a)
-        self.create_timer(0.4, self.b1, callback_group=self.group_b)
-        self.create_timer(0.4, self.b2, callback_group=self.group_b)
+        self.create_timer(0.6, self.a1, callback_group=self.group_a)
+        self.create_timer(0.6, self.a2, callback_group=self.group_a)
+        self.create_timer(0.6, self.b1, callback_group=self.group_b)
+        self.create_timer(0.6, self.b2, callback_group=self.group_b)
 
     def run(self, name):
         self.activity.publish(String(data=f"{name} begin"))
