@@ -641,3 +641,31 @@ def test_what_comes_late_is_waited_for(grade: Grade, body: str, expectation: str
     check = f'with launch("late") as ros:\n    ros.expect_node("/late")\n    {expectation}\nros.score(2)'
     result = grade(check, late__py=LATE.replace("BODY", body))
     assert result.points == 2, result.first_failure
+
+
+ECHO = """
+import rclpy
+from rclpy.node import Node
+from std_msgs.msg import String
+
+rclpy.init()
+node = Node("echo")
+out = node.create_publisher(String, "heard", 1)
+node.create_subscription(String, "say", out.publish, 10)
+rclpy.spin(node)
+"""
+
+
+def test_what_a_message_sets_off_is_heard_from_the_first_one_on(grade: Grade) -> None:
+    result = grade(
+        """\
+        for _ in range(4):
+            with launch("echo") as ros:
+                ros.listen("/heard", String)
+                ros.publish("/say", String(data="once"))
+                ros.expect_messages("/heard", String, exactly=1, window=0.05, within=3)
+        ros.score(2)
+        """,
+        echo__py=ECHO,
+    )
+    assert result.points == 2.0, result

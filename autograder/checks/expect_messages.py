@@ -28,6 +28,9 @@ RELIABLE_DEEP = 1000
 _RATE_DECIDED = 4
 """A rate is judged after so many times the messages that were asked for, if it is not right before."""
 
+MATCHES_WITHIN = 1.0
+"""Seconds to wait for the observer's recordings before it sends something that may be answered at once."""
+
 DECISIVE_RUNS = 6
 """Complete runs of each callback after which "they never overlapped" is a finding, not bad luck."""
 
@@ -226,8 +229,9 @@ class MessageExpectations(GraphExpectations):
         within: float = WITHIN,
         hint: str = "",
     ) -> None:
-        """Send messages to the student's node, after its subscription has matched.
+        """Send messages to the student's node, after its subscription has matched, and the recordings what answers.
 
+        What the messages set off is heard from the first one on if its topic is recorded: `listen` before.
         A missing or incompatible subscription is a failed outcome with its reason.
         """
         msg_type = type(messages[0])
@@ -237,6 +241,7 @@ class MessageExpectations(GraphExpectations):
             self._publishers[key] = self.observer.publisher(topic, msg_type, profile)
         publisher = self._publishers[key]
         self._wait_until_heard(publisher.get_subscription_count, topic, msg_type, profile, within, hint)
+        self.observer.wait(self.observer.hears_all, MATCHES_WITHIN)
         for message in messages:
             publisher.publish(message)
 

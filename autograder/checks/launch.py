@@ -269,7 +269,9 @@ class Launch(MessageExpectations, ServiceExpectations, LifecycleExpectations, Pr
         # What still runs is ended here: how is no fact about the program.
         ended = {id(program): program.exit_status() for _, program in self.programs}
         if session.current.kernel is None:
-            varied = [bool(node.parameters or node.params_file) for node, _ in self.programs]
+            varied = [
+                bool(node.parameters or node.params_file or node.arguments_of_its_own) for node, _ in self.programs
+            ]
             session.current.flags += contradictions.flags(self.scene(), self.overlaps, varied)
         try:
             if self._group is not None:

@@ -193,6 +193,15 @@ class Observer:
             self._recordings[key] = Recording(self, topic, msg_type, profile)
         return self._recordings[key]
 
+    def hears_all(self) -> bool:
+        """Whether every recording that accepts any QoS has matched all publishers that are on its topic by now."""
+        everything = str(quiet_profile())
+        return all(
+            recording.matched >= len(self.publishers(topic))
+            for (topic, profile), recording in list(self._recordings.items())
+            if profile == everything
+        )
+
     def publisher(self, topic: str, msg_type: type, qos: QoSProfile) -> Any:
         """Make a publisher of the observer's; rclpy's own warnings about subscriptions that do not match are off."""
         quiet = PublisherEventCallbacks(use_default_callbacks=False)
