@@ -44,7 +44,8 @@ def why_no_node(scene: Scene, wanted: str) -> Diagnosis:
             return Diagnosis(
                 f"The node `{base}` exists, but in another namespace: `{name}`.",
                 "namespace",
-                "A namespace given at the start (`-r __ns:=/name`) reaches every node that does not fix its own.",
+                "A namespace is given at the start (`-r __ns:=/name`, in a launch file `namespace` or "
+                "`push_ros_namespace` above it in the same group), and reaches every node that does not fix its own.",
             )
     close = nearest(wanted, names) or names[0]
     return Diagnosis(
@@ -126,7 +127,17 @@ def why_no_endpoint(scene: Scene, topic: str, msg_type: type | None, kind: str, 
     if node and node not in observer.nodes():
         return why_no_node(scene, node)
     used = [name for name in observer.topics() if name not in _EVERY_NODES and not name.endswith("/transition_event")]
-    found = _idle_rule(scene, topic, node) or _elsewhere(scene, topic, kind, [n for n in used if reach(n)])
+    # The nearest name is looked for among those of the node and type in question first.
+    meant = {
+        name
+        for name in used
+        for end in reach(name)
+        if end.topic_type == (wanted or end.topic_type)
+        and full_name(end.node_namespace, end.node_name) == (node or full_name(end.node_namespace, end.node_name))
+    }
+    found = _idle_rule(scene, topic, node) or _elsewhere(
+        scene, topic, kind, [name for name in used if (name in meant if meant else reach(name))]
+    )
     if found:
         return found
     opposite = observer.subscriptions(topic) if kind == "publisher" else observer.publishers(topic)
