@@ -1,0 +1,85 @@
+"""What a submission can make the grading worker take in, keep and say is limited, and fails its own check alone."""
+
+from __future__ import annotations
+
+import pytest
+
+from autograder.grading import worker
+from autograder.grading.job import Cell, Job
+from autograder.grading.stage_a import run_in_worker
+from autograder.results import Isolation, NodeLog
+
+PASS = "from autograder.checks import outcomes\nfrom autograder.checks.scoring import score\n"
+
+
+def job(*sources: str, files: dict[str, str] | None = None) -> Job:
+    cells = [Cell(grade_id=f"check{number}", points=1.0, source=PASS + text) for number, text in enumerate(sources)]
+    what = {"files": files or {}, "cells": cells, "problems": []}
+    return Job(student="ann", lab="toy", digest="0", isolation=Isolation.NONE, seed=1, **what)
+
+
+def test_a_check_that_takes_all_memory_is_undecided_and_the_next_is_not() -> None:
+    result = run_in_worker(
+        job(
+            "hoard = []\nwhile True:\n    hoard.append(bytearray(1 << 26))",
+            "outcomes.passed('it goes on')\nscore(1)",
+        )
+    )
+    assert [check.points for check in result.checks] == [None, 1.0]
+    assert "MemoryError" in result.checks[0].outcomes[-1].because
+
+
+def test_a_text_that_explodes_is_cut_and_costs_no_other_check() -> None:
+    result = run_in_worker(
+        job(
+            "outcomes.passed('long', observed='x' * 200_000_000)\nscore(1)",
+            "for _ in range(10_000): outcomes.passed('many', observed='y' * 1000)\nscore(1)",
+            "outcomes.passed('it goes on')\nscore(1)",
+        )
+    )
+    assert [check.points for check in result.checks] == [1.0, 1.0, 1.0]
+    assert len(result.checks[0].outcomes[0].observed) < 2 * worker.TEXT_KEPT
+    assert len(result.checks[1].outcomes) == worker.OUTCOMES_KEPT
+
+
+def test_a_check_that_never_ends_is_ended(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(worker, "CELL_SECONDS", 0.2)
+    error, value = worker._run_cell(Cell(grade_id="slow", points=1.0, source="while True: pass"), 0, {})
+    assert "TimeoutError" in error and value is None
+    assert worker._run_cell(Cell(grade_id="next", points=1.0, source="1 + 1"), 1, {}) == ("", 2)
+
+
+def test_logs_share_the_room_there_is() -> None:
+    logs = [
+        NodeLog(program=name, text=text, truncated=False, exit_status=0, stopped_by="")
+        for name, text in (
+            ("short", "a word"),
+            ("long", "x" * 1_000_000),
+            ("longer", "begin" + "y" * 2_000_000 + "end"),
+        )
+    ]
+    kept = worker._within(logs, 10_000)
+    assert kept[0] == logs[0]
+    assert sum(len(log.text) for log in kept) < 10_100
+    assert [log.truncated for log in kept] == [False, True, True]
+    assert kept[2].text.startswith("begin") and kept[2].text.endswith("end")
+    assert worker._within(logs[:1], 10_000) == logs[:1]
+
+
+def test_an_observer_keeps_what_it_has_room_for_and_lets_the_rest_go_by() -> None:
+    flood = (
+        "import rclpy\nfrom std_msgs.msg import String\nrclpy.init()\nnode = rclpy.create_node('flood')\n"
+        "publisher = node.create_publisher(String, '/flood', 10)\n"
+        "while True:\n    publisher.publish(b'no message')\n    publisher.publish(String(data='x' * 60_000))\n"
+    )
+    check = (
+        "from autograder.checks import launch\nfrom autograder.graph import observer\nfrom std_msgs.msg import String\n"
+        "observer.RECORDED = 600_000\n"
+        "with launch('flood', listen=[('/flood', String)]) as ros:\n"
+        "    full = ros.observer.wait(lambda: not ros.observer.room_for(0), 20)\n"
+        "    texts = [len(one.msg.data) for one in ros.observer.record('/flood', String).messages]\n"
+        "    outcomes.passed(f'{full} {0 < len(texts) < 11} {set(texts)}')\n"
+        "score(1)"
+    )
+    result = run_in_worker(job(check, files={"flood.py": flood}))
+    assert result.checks[0].outcomes[0].title == "True True {60000}", result
