@@ -100,6 +100,7 @@ def check(
     from autograder.course import trusted_course
     from autograder.grading.stage_a import Settings, run_submission
     from autograder.report.audience import Audience, result_for
+    from autograder.report.terminal import working
     from autograder.results import Status
     from autograder.sandbox.isolation import choose
     from autograder.submission.reader import lab_of
@@ -109,7 +110,8 @@ def check(
         note = "This notebook is the course's own copy of the lab: its checks are run as they stand in it."
         print(f"note: {note}", file=sys.stderr)
     settings = Settings(isolation=choose(isolation), seed=seed)
-    result = run_submission(notebook, notebook.parent.resolve().name, found, settings)
+    with working(f"Running the {len(found.checks)} checks of {found.name}: each waits until its evidence has come"):
+        result = run_submission(notebook, notebook.parent.resolve().name, found, settings)
     audience: Audience = "instructor" if instructor else "student"
     if junit is not None:
         from autograder.files import write_beside

@@ -493,6 +493,13 @@ def test_after_a_restart_a_program_counts_only_once_its_cell_was_run(tmp_path: P
         made.close()
 
 
+def test_launches_leave_no_logs_behind(notebook: Notebook) -> None:
+    write(notebook)
+    notebook.run(CHECK)
+    count = "import os, pathlib\nlen([*pathlib.Path(os.environ['ROS_LOG_DIR']).glob(f'*_{os.getpid()}_*')])"
+    assert notebook.run(count).text.strip() == "0"
+
+
 def test_without_the_set_up_cell_it_is_named(tmp_path: Path) -> None:
     made = Notebook(tmp_path)
     try:

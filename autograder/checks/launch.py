@@ -31,7 +31,7 @@ from autograder.graph import params_file, remap_rules
 from autograder.graph.observer import Observer
 from autograder.launch_files import LaunchFileError, read_launch_file, remove_written
 from autograder.results import NodeLog
-from autograder.sandbox.environment import profile_environment
+from autograder.sandbox.environment import profile_environment, remove_logs
 from autograder.sandbox.nodes import Program, ProgramGroup
 
 
@@ -281,6 +281,7 @@ class Launch(MessageExpectations, ServiceExpectations, LifecycleExpectations, Pr
         finally:
             self.observer.close()
             remove_written(session.current.folder)
+            remove_logs()
         for launched, program in self.programs:
             session.current.logs.append(
                 NodeLog(

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import io
 import unicodedata
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 from rich.console import Console, Group, RenderableType
 from rich.panel import Panel
+from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 from rich.text import Text
 
@@ -232,3 +234,21 @@ def console() -> Console:
     if not made.is_terminal:
         made.width = 120
     return made
+
+
+@contextlib.contextmanager
+def working(sentence: str) -> Iterator[None]:
+    """Say on the terminal what takes so long, and for how long; a pipe or a log gets nothing of it."""
+    progress = Progress(
+        SpinnerColumn(),
+        TextColumn("{task.description}"),
+        TimeElapsedColumn(),
+        console=Console(stderr=True),
+        transient=True,
+    )
+    if not progress.console.is_terminal:
+        yield
+        return
+    with progress:
+        progress.add_task(plain(sentence), total=None)
+        yield

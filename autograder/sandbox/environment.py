@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import sys
 import sysconfig
@@ -21,9 +22,22 @@ def profile_environment() -> dict[str, str]:
     return {
         "RMW_IMPLEMENTATION": "rmw_fastrtps_cpp",
         "FASTRTPS_DEFAULT_PROFILES_FILE": str(FASTDDS_PROFILE),
-        "ROS_LOG_DIR": str(Path(tempfile.gettempdir()) / f"autograder-log-{os.getuid()}"),
+        "ROS_LOG_DIR": str(_log_folder()),
         "RCUTILS_COLORIZED_OUTPUT": "0",
     }
+
+
+def _log_folder() -> Path:
+    return Path(tempfile.gettempdir()) / f"autograder-log-{os.getuid()}"
+
+
+def remove_logs() -> None:
+    """Remove the log files of this process and of those that have ended: ROS begins one each time it is initialized."""
+    for path in _log_folder().glob("*_*_*.log"):
+        pid = path.stem.split("_")[-2]
+        if pid == str(os.getpid()) or not Path(f"/proc/{pid}").exists():
+            with contextlib.suppress(OSError):
+                path.unlink()
 
 
 def python_environment() -> dict[str, str]:
