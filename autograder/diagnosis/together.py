@@ -11,6 +11,9 @@ from autograder.diagnosis.inside import Inside, called, listed
 MOST_OF_THE_TIME = 0.6
 """Share of the time that others must have taken for a callback to count as kept waiting by them."""
 
+TAKES_TIME = 0.05
+"""Seconds from which on one run of a callback keeps others waiting."""
+
 FAR_FEWER = 0.6
 """Share of the due runs below which a timer counts as kept waiting."""
 
@@ -25,8 +28,12 @@ def _active(inside: Inside) -> list[Thing]:
 
 
 def single_threaded(inside: Inside) -> Diagnosis | None:
-    """Must have seen: callbacks run, and every executor that ran one has one thread and is no MultiThreadedExecutor."""
+    """Must have seen: callbacks run, one of which takes time, and every executor that ran one has one thread and is no
+    MultiThreadedExecutor.
+    """
     used = _used(inside)
+    if not any(thing.running or thing.spent > TAKES_TIME * thing.done for thing in _active(inside)):
+        return None  # nothing keeps the thread, so it is not the thread that is missing
     if not used or len(used) > 1 or used[0].threads is not None:
         return None
     unused = [e for e in inside.executors if e.threads is not None and not e.most]
