@@ -242,3 +242,32 @@ def test_a_name_or_none_is_read_as_it_is_meant(
 def test_any_answer_can_be_read_and_compared(answer: Any) -> None:
     assert plain(plain(answer)) == plain(answer) or answer != answer or isinstance(answer, (str, list, float))
     assert isinstance(same(answer, "reliable"), bool) and len(seal("q", str(answer))) == 12
+
+
+HELPERS = """\
+def must(ros, fact):
+    ros.require(fact, "It holds", because="It does not.")
+
+with launch("talker") as ros:
+    def inner(fact):
+        ros.require(fact, "It holds", because="It does not.")
+    with ros.part("first"):
+        inner({first})
+    with ros.part("second"):
+        ros.expect_node("/talker")
+    must(ros, {second})
+    with ros.part("third"):
+        ros.expect_node("/talker")
+ros.score({{"first": 0.5, "second": 0.5, "third": 1}})
+"""
+
+
+def test_a_helper_of_the_cell_fails_for_the_part_that_called_it(grade: Grade) -> None:  # noqa: F811
+    result = grade(HELPERS.format(first=False, second=True), talker__py=TALKER)
+    assert earned(result) == {"first": 0.0, "second": 0.5, "third": 1.0}
+
+
+def test_a_helper_that_fails_outside_the_parts_takes_all_of_its_launch(grade: Grade) -> None:  # noqa: F811
+    result = grade(HELPERS.format(first=True, second=False), talker__py=TALKER)
+    assert earned(result) == {"first": 0.0, "second": 0.0, "third": 0.0}
+    assert [o.part for o in result.outcomes if o.status is Status.NOT_CHECKED] == ["third"]

@@ -173,9 +173,10 @@ class ProgramExpectations(GraphExpectations):
             outcomes.passed(title, expected=expected, observed=observed)
             return
         self.settle_programs()
-        trouble = diagnosis.program_trouble(self.scene())
-        if because and trouble and trouble.code in ("exited", "not-spinning"):
-            trouble = None
-        trouble = trouble or diagnosis.inside_reason(self.scene())
+        scene = self.scene()
+        found = (diagnosis.program_trouble(scene), diagnosis.inside_reason(scene))
+        # Where the check has a reason, these say less: they are what a program looks like that does nothing more.
+        vague = ("exited", "not-spinning", "spinning-ended") if because else ()
+        trouble = next((one for one in found if one and one.code not in vague), None)
         reason = trouble or (Diagnosis(because, code or "required") if because else None)
         self.fail(title, reason, expected=expected, observed=observed, hint=hint)

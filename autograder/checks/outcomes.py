@@ -158,19 +158,24 @@ def _indent(line: str) -> int:
     return len(line) - len(line.lstrip())
 
 
-def _blocks() -> tuple[FrameType | None, list[ast.With]]:
-    """The check cell's frame, and the `with` blocks that it is in, the innermost first."""
+def _block_of(part: str) -> tuple[FrameType | None, ast.With | None]:
+    """The `with` block of a part, or the launch's if there is no part, and the frame that is in it.
+
+    A cell's own helper function may be where an expectation fails: the block is that of the line that called it.
+    """
     frame = _check_frame()
-    if frame is None:
-        return None, []
-    try:
-        tree = ast.parse("".join(_lines(frame)))
-    except SyntaxError:  # only the shell knows this source (IPython syntax around it): nothing to list
-        return frame, []
-    blocks = [
-        n for n in ast.walk(tree) if isinstance(n, ast.With) and n.lineno <= frame.f_lineno <= (n.end_lineno or 0)
-    ]
-    return frame, sorted(blocks, key=lambda node: (node.end_lineno or 0) - node.lineno)
+    while frame is not None:
+        try:
+            tree = ast.parse("".join(_lines(frame)))
+        except SyntaxError:  # only the shell knows this source (IPython syntax around it): nothing to list
+            return frame, None
+        line = frame.f_lineno
+        blocks = [n for n in ast.walk(tree) if isinstance(n, ast.With) and n.lineno <= line <= (n.end_lineno or 0)]
+        blocks = [block for block in blocks if _part_title(block) == part]
+        if blocks or frame.f_code.co_name == "<module>":
+            return frame, min(blocks, key=lambda n: (n.end_lineno or 0) - n.lineno, default=None)
+        frame = frame.f_back
+    return None, None
 
 
 def _part_title(block: ast.With) -> str:
@@ -183,13 +188,11 @@ def _part_title(block: ast.With) -> str:
 
 def _rest_not_checked(whole: bool = False) -> None:
     """Record what the source still wanted to check in the same block, or all that it wanted in the launch."""
-    frame, blocks = _blocks()
-    if whole or not session.current.part:
-        blocks = [block for block in blocks if not _part_title(block)]
-    if frame is None or not blocks:
+    frame, block = _block_of("" if whole else session.current.part)
+    if frame is None or block is None:
         return
     hidden = hidden_lines(_lines(frame))
-    for node, part in _expectations(blocks[0], session.current.part):
+    for node, part in _expectations(block, session.current.part):
         if whole or node.lineno > frame.f_lineno:
             text = " ".join(ast.unparse(node).split(".", 1)[-1].split())
             session.current.outcomes.append(
