@@ -228,6 +228,19 @@ def test_an_interrupt_keeps_finished_results_and_leaves_nothing_running(root: Pa
     assert alive == []
 
 
+def test_killing_what_grades_costs_one_more_run_and_hangs_nothing(root: Path, tmp_path: Path) -> None:
+    course = toy.make_course(tmp_path / "course")
+    for number in range(2):
+        hand_in(course, f"student{number}", "print('hello')")
+    process = start(course, "grade", "toy", "class", start_new_session=True)
+    for member in family_with_a_worker(process):
+        with contextlib.suppress(psutil.NoSuchProcess):
+            member.kill()
+    out, err = process.communicate(timeout=180)
+    assert process.returncode == 0 and "Traceback" not in err, err
+    assert len(list((course / "build" / "results" / "toy").iterdir())) == 2, out
+
+
 @pytest.mark.parametrize("isolation", ["full", "none"])
 def test_a_killed_command_leaves_nothing(
     root: Path, tmp_path: Path, isolation: str, monkeypatch: pytest.MonkeyPatch

@@ -48,7 +48,7 @@ def test_when_the_parent_is_killed_nothing_remains(kind: Isolation, processes: i
     mounts = Path("/proc/self/mounts").read_text()
     parent = subprocess.Popen([sys.executable, "-c", outer], cwd=ROOT)
     try:
-        # python, bwrap (outer, its first process), worker, bwrap (inner, first), launcher, two programs
+        # python, bwrap (outer, its first process), worker, bwrap, launcher, the launch's first process, two programs
         family = _wait_for(lambda: found if len(found := descendants(parent.pid)) >= processes else None, 20)
     finally:
         parent.kill()
