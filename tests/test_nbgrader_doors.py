@@ -64,7 +64,7 @@ def test_validate_says_what_check_says_and_runs_nothing_here(root: Path, mark: P
     status, told = nbgrader(root, "validate", root / "build" / "submitted" / "ann" / "toy" / "toy.ipynb")
     assert status == 0 and "Success! Your notebook passes all the tests." in told
     status, told = nbgrader(root, "validate", root / "build" / "submitted" / "bob" / "toy" / "toy.ipynb")
-    assert "1 part(s) did not pass" in told and "The talker: 0/3 points" in told and "A hidden check failed" in told
+    assert "1 part(s) did not pass" in told and "The talker: 0 of 3 points" in told and "A hidden check failed" in told
     assert "Partial credit" not in told and "secret" not in told
     status, told = nbgrader(root, "validate", "--invert", "build/submitted/bob/toy/toy.ipynb")
     assert "PASSED ON 1 CELL(S)" in told and "The table" in told
@@ -142,7 +142,7 @@ def test_buttons_in_jupyterlab_take_the_same_way(root: Path, mark: Path) -> None
         assert fine == {"success": True, "value": {}}
         answer = post(address, "assignments/validate", path="build/submitted/bob/toy/toy.ipynb")
         graded = post(address, "formgrader/api/submission/toy/ann/autograde")
-    assert answer["success"] and [entry["source"] for entry in answer["value"]["failed"]] == ["The talker: 0/3 points"]
+    assert answer["success"] and [entry["source"] for entry in answer["value"]["failed"]] == ["The talker: 0 of 3 points"]
     assert "A hidden check failed" in answer["value"]["failed"][0]["error"]
     assert graded["success"], graded
     assert points(root) == {"ann": 5.0}
