@@ -142,7 +142,8 @@ def test_buttons_in_jupyterlab_take_the_same_way(root: Path, mark: Path) -> None
         assert fine == {"success": True, "value": {}}
         answer = post(address, "assignments/validate", path="build/submitted/bob/toy/toy.ipynb")
         graded = post(address, "formgrader/api/submission/toy/ann/autograde")
-    assert answer["success"] and [entry["source"] for entry in answer["value"]["failed"]] == ["The talker: 0 of 3 points"]
+    assert answer["success"]
+    assert [entry["source"] for entry in answer["value"]["failed"]] == ["The talker: 0 of 3 points"]
     assert "A hidden check failed" in answer["value"]["failed"][0]["error"]
     assert graded["success"], graded
     assert points(root) == {"ann": 5.0}
