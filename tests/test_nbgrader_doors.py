@@ -92,7 +92,7 @@ def test_other_folders_are_no_way_around_the_course(root: Path, mark: Path) -> N
 
 def test_a_module_beside_a_submission_is_not_imported(root: Path, mark: Path) -> None:
     folder = root.parent / "class" / "ann"
-    for name in ("autograder", "nbconvert_extra", "pydantic", "pebble"):
+    for name in ("autograder", "nbconvert_extra", "pydantic", "typer"):
         (folder / f"{name}.py").write_text(f"from pathlib import Path\nPath({str(mark)!r}).touch()\n")
     _, told = nbgrader(folder, "validate", "toy.ipynb")
     assert "was not checked" in told and not mark.exists()
