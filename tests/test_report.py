@@ -17,7 +17,7 @@ from autograder.report.export import to_csv, to_gradescope
 from autograder.report.html import check_html, submission_html
 from autograder.report.junit import junit_xml
 from autograder.report.terminal import check_text, check_view, class_view, submission_view, undecided_view
-from autograder.results import CheckResult, Isolation, NodeLog, Outcome, Status, SubmissionResult
+from autograder.results import CheckResult, Isolation, NodeLog, Outcome, Part, Status, SubmissionResult
 
 NASTY = "<img src=x onerror=alert(1)>\x1b[31m\x00 `code` & [link](javascript:alert(2))"
 
@@ -131,6 +131,18 @@ def test_the_finding_comes_first_and_what_holds_is_folded() -> None:
     shown = check(0, outcome(Status.PASSED, title="it holds"), outcome(Status.FAILED, title="it fails"))
     page = check_html(shown)
     assert page.index("it fails") < page.index("<details") < page.index("it holds")
+
+
+def test_a_lost_part_stands_with_its_finding_and_held_parts_are_folded() -> None:
+    parts = [Part(title="the name", max_points=1, points=1), Part(title="the rate", max_points=2, points=0)]
+    outcomes = [
+        outcome(Status.PASSED, part="the name"), outcome(Status.FAILED, title="too slow", part="the rate")
+    ]  # fmt: skip
+    shown = check(1, *outcomes).model_copy(update={"parts": parts})
+    page, text = check_html(shown), text_of(check_view(shown))
+    assert page.index("the rate") < page.index("too slow") < page.index("<details") < page.index("the name")
+    assert "✗ the rate: 0 of 2 points" in text and "1 part and 1 expectation hold" in text
+    assert "partly passed" in text and "1 of 3 points" in text
 
 
 def test_an_untouched_answer_is_named_and_is_no_failure() -> None:

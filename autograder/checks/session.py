@@ -144,11 +144,7 @@ class Score:
     ) -> None:
         """Wrap a result for display."""
         self.result = result
-        self._logs, self._remarks, self._origin = list(logs), list(remarks), origin
-
-    def without_logs(self) -> Score:
-        """The same without what the programs printed."""
-        return Score(self.result, (), self._remarks, self._origin)
+        self.logs, self.remarks, self.origin = list(logs), list(remarks), origin
 
     def __repr__(self) -> str:
         """The points as a number, as nbgrader reads them, or None when nobody could find out."""
@@ -161,8 +157,8 @@ class Score:
         # nbgrader takes the points from the plain text, and all of them where that is no number.
         graded = "NBGRADER_EXECUTION" in os.environ
         return {
-            "text/plain": repr(self) if graded else check_text(self.result, self._logs, self._remarks, self._origin),
-            "text/html": check_html(self.result, "student", self._logs, self._remarks, self._origin),
+            "text/plain": repr(self) if graded else check_text(self.result, self.logs, self.remarks, self.origin),
+            "text/html": check_html(self.result, "student", self.logs, self.remarks, self.origin),
         }
 
 

@@ -100,7 +100,8 @@ def check_html(
         findings=Markup(render("findings.html", **vars(found))),
         folded=verdict is Verdict.NOT_ATTEMPTED,
         passed=found.passed,
-        holding=words.holding(len(found.passed)),
+        held=found.held,
+        holding=words.holding(found),
         logs=printed if shown.status is not Status.PASSED else [],
         origin=origin,
     )

@@ -85,7 +85,7 @@ def check_view(
     if verdict is not Verdict.NOT_ATTEMPTED:
         lines += _findings(found)
     if verdict in (Verdict.FAILED, Verdict.PARTLY, Verdict.UNKNOWN):
-        lines += [Text(f"  {words.holding(len(found.passed))}", "dim")] if found.passed else []
+        lines += [Text(f"  {text}", "dim") for text in (words.holding(found),) if text]
         lines += [_output(log) for log in logs if log.text.strip()]
     lines += [Text(f"  {plain(origin)}", "dim")] if origin else []
     return Group(*lines)
@@ -95,7 +95,7 @@ def _findings(found: words.Findings) -> list[RenderableType]:
     lines: list[RenderableType] = []
     for outcome in found.bad:
         lines += [Text("  ") + _outcome_line(outcome), *_details(outcome)]
-    for part in found.parts:
+    for part in found.lost:
         mark = (f"{words.SYMBOL[part.verdict]} ", _VERDICT_STYLE[part.verdict])
         lines.append(Text.assemble("  ", mark, f"{plain(part.title)}: {part.points}"))
         for outcome in part.bad:

@@ -55,8 +55,8 @@ def points(check: CheckResult) -> str:
 
 def part_points(part: Part) -> str:
     """Return a part's points in words."""
-    full = f"{part.max_points:g} point{'' if part.max_points == 1 else 's'}"
-    return f"up to {full}, decided at grading" if part.more_at_grading else f"{part.points:g} of {full}"
+    full = f"{round(part.max_points, 2):g} point{'' if part.max_points == 1 else 's'}"
+    return f"up to {full}, decided at grading" if part.more_at_grading else f"{round(part.points, 2):g} of {full}"
 
 
 def part_verdict(part: Part) -> Verdict:
@@ -93,8 +93,9 @@ class Findings:
 
     bad: list[Outcome]
     """What failed or could not be found out, outside of any part."""
-    parts: list[PartFindings]
-    """The parts, those that were lost first."""
+    lost: list[PartFindings]
+    """The parts in which something failed, or could not be found out."""
+    held: list[PartFindings]
     passed: list[Outcome]
     not_looked_at: str
     """How many were not looked at, as a sentence; empty if none."""
@@ -112,11 +113,14 @@ def findings(check: CheckResult) -> Findings:
         PartFindings(part.title, part_verdict(part), part_points(part), [o for o in bad if o.part == part.title])
         for part in check.parts
     ]
-    parts.sort(key=lambda part: not part.bad and part.verdict is not Verdict.FAILED)
+    lost = [part for part in parts if part.bad or part.verdict is Verdict.FAILED]
+    held = [part for part in parts if part not in lost]
     titles = {part.title for part in check.parts}
-    return Findings([o for o in bad if o.part not in titles], parts, by_status[Status.PASSED], sentence)
+    return Findings([o for o in bad if o.part not in titles], lost, held, by_status[Status.PASSED], sentence)
 
 
-def holding(count: int) -> str:
-    """Say how many expectations hold."""
-    return f"{count} expectation{' holds' if count == 1 else 's hold'}"
+def holding(found: Findings) -> str:
+    """Say how many parts and expectations hold; empty if none."""
+    counts = [(len(found.held), "part"), (len(found.passed), "expectation")]
+    told = [f"{count} {what}{'' if count == 1 else 's'}" for count, what in counts if count]
+    return f"{' and '.join(told)} {'holds' if sum(count for count, _ in counts) == 1 else 'hold'}" if told else ""
