@@ -154,6 +154,15 @@ CASES = {
         because="`/gate`",
         never=("stuck-in-init",),
     ),
+    "waits_for_the_second": Case(
+        SERVER + "self.clients_ = [self.create_client(Trigger, name) for name in ('~/gate', '~/door')]\n",
+        main="for client in node.clients_:\n"
+        "    client.wait_for_service()\n"
+        "    rclpy.spin_until_future_complete(node, client.call_async(Trigger.Request()))",
+        says="waits-for-service",
+        because="/door`",
+        never=("spinning-ended",),
+    ),
     "waits_well": Case(
         SERVER + CLIENT.format("") + "self.client.wait_for_service()\n" + TALK,
         says="silent",

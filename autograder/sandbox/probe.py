@@ -642,13 +642,13 @@ def _wrap_blocking(
 
 
 def _call(what: str, target: Any) -> _Call:
-    where = _own_line()
-    key = (what, where["line"], _here.callback.number if _here.callback else 0)
+    where, thing = _own_line(), None
+    with _quiet():
+        thing = _ledger.known.get(target)
+    number = thing.number if isinstance(thing, _Thing) else 0
+    key = (what, number, where["line"], _here.callback.number if _here.callback else 0)
     if key not in _ledger.calls:
-        thing = None
-        with _quiet():
-            thing = _ledger.known.get(target)
-        made = _Call(what, thing.number if isinstance(thing, _Thing) else 0, where, _here.callback)
+        made = _Call(what, number, where, _here.callback)
         _ledger.calls[key] = made
         _ledger.add(made)
     return _ledger.calls[key]
