@@ -281,7 +281,7 @@ CASES = {
     ),
     # Silence.
     "long_period": Case(
-        "self.create_timer(500.0, lambda: None)\n", says="timer-period", because="every 500 s", never=("silent",)
+        "self.create_timer(500.0, lambda: None)\n", says="timer-period", because="every 500 s)", never=("silent",)
     ),
     "two_periods": Case(
         "self.create_timer(500.0, lambda: None)\nself.create_timer(0.05, lambda: None)\n",
@@ -359,7 +359,7 @@ CASES = {
         SLOW,
         THREADS.format(4),
         says="starved",
-        because="made in line",
+        because="the timer of `slow` (line",
         ask=starved,
     ),
     "shares": Case(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import time
 from collections.abc import Sequence
 from functools import cached_property
@@ -82,10 +83,11 @@ class Inside:
 
 
 def called(thing: Thing) -> str:
-    """A callback as a student knows it: `the timer of line 12 (every 0.5 s)`."""
-    at = f" made in line {thing.made.rpartition(':')[2]}" if thing.made else ""
+    """A callback as a student knows it: `the timer of `tick` (line 12, every 0.5 s)`."""
+    function = re.match(r"(?:async )?def (\w+)", thing.code)
     if thing.kind == "timer":
-        return f"the timer{at} (every {thing.period:g} s)"
+        of = f" of `{function[1]}`" if function else ""
+        return f"the timer{of} (line {thing.made.rpartition(':')[2]}, every {thing.period:g} s)"
     if thing.name:
         return f"the {thing.kind} `{thing.name}`"
     return f"the {thing.kind or 'other'} callback{f' in {thing.line}' if thing.line else ''}"

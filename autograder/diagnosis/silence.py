@@ -92,7 +92,7 @@ def account(scene: Scene, topic: str) -> str:
         return f"The publisher on `{topic}` is on the graph, and nothing (more) came from it."
     inside, publisher = found[0]
     said = [f"The publisher on `{topic}` is on the graph", f"its node `{publisher.node}` is spun"]
-    runs = []
+    runs: list[str] = []
     for thing in inside.callbacks:
         if thing.node == publisher.node:
             verb = {"timer": "fired", "subscription": "got a message", "service": "was asked"}[thing.kind]
