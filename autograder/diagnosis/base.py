@@ -13,7 +13,7 @@ from autograder.graph.observer import Observer
 if TYPE_CHECKING:
     from autograder.diagnosis.inside import Inside
 
-RECORDS_FOLLOW = 0.15
+RECORDS_FOLLOW = 0.3
 """Seconds after which what the probes have counted is written."""
 
 

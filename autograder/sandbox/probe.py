@@ -30,7 +30,10 @@ from typing import Any
 _MOST = 500
 """Events of one program; what it repeats is noted once. Records of things: no more either."""
 
-_PAUSE = 0.1
+_MOST_EXECUTORS = 8
+"""Those that are written whenever anything is."""
+
+_PAUSE = 0.25
 """Seconds between two writings of the records that have changed."""
 
 _WRITE = 4000
@@ -117,6 +120,8 @@ class _Ledger:
         self.things: list[Any] = []
         self.calls: dict[tuple[Any, ...], _Call] = {}
         self.by_line: dict[tuple[str, ...], _Thing] = {}
+        self.executors: list[_Executor] = []
+        """They change with every callback, and are written whenever anything is."""
         self.wake = _thread.allocate_lock()
         self.wake.acquire()
         self.started = False
@@ -131,8 +136,9 @@ class _Ledger:
 
     def touch(self, thing: Any) -> None:
         """Say that a thing has changed."""
-        if _State.fd < 0:
+        if thing.dirty or _State.fd < 0:
             return
+        thing.dirty = True
         with self.lock:
             self.changed[thing.key] = thing
             start, self.started = not self.started, True
@@ -152,9 +158,11 @@ class _Ledger:
         """Write what has changed, in pieces that the pipe takes whole."""
         with self.lock:
             changed, self.changed = self.changed, {}
+        changed.update({executor.key: executor for executor in self.executors})
         piece = b""
         for thing in changed.values():
             with _quiet():
+                thing.dirty = False  # before it is read: what changes from here on is written the next time
                 line = _line_of({"key": thing.key, **thing.event()})
                 if len(piece) + len(line) > _WRITE:
                     os.write(_State.fd, piece)
@@ -167,6 +175,8 @@ class _Ledger:
 
 class _Thing:
     """A timer, subscription, service, client, publisher or action server, or another kind of callback."""
+
+    dirty = False
 
     def __init__(self, about: dict[str, Any]) -> None:
         self.number = next(_ledger.numbers)
@@ -228,6 +238,8 @@ class _Thing:
 class _Call:
     """A call that may block, by its line: how often it was begun and how often it came back."""
 
+    dirty = False
+
     def __init__(self, what: str, target: int, where: dict[str, str], callback: "_Thing | None") -> None:
         self.key = f"call{next(_ledger.numbers)}"
         self.what, self.target, self.where, self.callback = what, target, where, callback
@@ -264,6 +276,8 @@ class _Call:
 class _Executor:
     """An executor: which nodes it holds, whether it is spun, how many callbacks it ran at once."""
 
+    dirty = False
+
     def __init__(self, executor: Any) -> None:
         self.number = next(_ledger.numbers)
         self.key = f"executor{self.number}"
@@ -297,13 +311,12 @@ class _Executor:
             known.spun = time.monotonic()
             _ledger.touch(known)
 
-    def step(self, change: int, again: bool) -> None:
-        """A callback came onto a thread of it (1), or left it (-1). `again`: only to see whether it can go on."""
+    def step(self, change: int) -> None:
+        """A callback came onto a thread of it (1), or left it (-1)."""
         with _ledger.lock:
             self.busy += change
-            self.most = max(self.most, self.busy)
-        if not again:
-            _ledger.touch(self)
+            if self.busy > self.most:
+                self.most = self.busy
 
     def spin(self, change: int, long: bool = False) -> None:
         """Something began to spin it (1), or ended that (-1), or its nodes have changed (0)."""
@@ -321,6 +334,8 @@ class _Executor:
 
 class _Node:
     """A node, from the end of `Node.__init__` on."""
+
+    dirty = False
 
     def __init__(self, node: Any) -> None:
         self.key = f"node{next(_ledger.numbers)}"
@@ -346,6 +361,8 @@ class _Node:
 
 class _Parameter:
     """A parameter of a node: declared, read and set how often, and what came last."""
+
+    dirty = False
 
     def __init__(self, node: str, name: str) -> None:
         self.key = f"parameter{next(_ledger.numbers)}"
@@ -375,6 +392,8 @@ def _executor(executor: Any) -> _Executor:
     if known is None:
         known = _Executor(executor)
         _ledger.add(known, executor)
+        if len(_ledger.executors) < _MOST_EXECUTORS:
+            _ledger.executors.append(known)
     return known
 
 
@@ -425,24 +444,23 @@ def _node_name(node: Any) -> str:
 class _Callback:
     """While a callback is on a thread; an error that leaves it is noted."""
 
-    def __init__(self, thing: _Thing, executor: _Executor | None, again: bool = False) -> None:
-        self.thing, self.executor, self.again = thing, executor, again
+    def __init__(self, thing: _Thing, executor: _Executor | None) -> None:
+        self.thing, self.executor = thing, executor
         self.before: tuple[_Thing | None, int] = (None, 0)
 
     def __enter__(self) -> None:
         self.before = _here.callback, _here.depth
         _here.callback, _here.depth = self.thing, 0
         if self.executor is not None:
-            with _quiet():
-                self.executor.step(1, self.again)
+            self.executor.step(1)
 
     def __exit__(self, kind: Any, error: BaseException | None, trace: Any) -> None:
         _here.callback, _here.depth = self.before
+        if self.executor is not None:
+            self.executor.step(-1)
+        if not isinstance(error, Exception) or isinstance(error, StopIteration):
+            return
         with _quiet():
-            if self.executor is not None:
-                self.executor.step(-1, self.again)
-            if not isinstance(error, Exception) or isinstance(error, StopIteration):
-                return
             if type(error).__name__ != "ExternalShutdownException":
                 about = self.thing.about
                 emit(
@@ -463,7 +481,7 @@ class _Steps:
         steps, sent, thing, look = self.coroutine.__await__(), None, self.thing, 0.0
         while True:
             try:
-                with _Callback(thing, self.executor, again=look > 0):
+                with _Callback(thing, self.executor):
                     wanted = steps.send(sent)
             except StopIteration as end:
                 return end.value
