@@ -39,6 +39,7 @@ def main():
         pass
     finally:
         rclpy.try_shutdown()
+        print("ended")
 
 
 main()

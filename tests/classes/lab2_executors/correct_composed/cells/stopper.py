@@ -37,6 +37,7 @@ def main():
     thread.join()
     node.destroy_node()
     rclpy.try_shutdown()
+    print("ended")
 
 
 if __name__ == "__main__":

@@ -21,6 +21,7 @@ def main():
     finally:
         node.destroy_node()
         rclpy.try_shutdown()
+        print("ended")
 
 
 main()

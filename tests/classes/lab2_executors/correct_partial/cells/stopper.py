@@ -34,6 +34,7 @@ def main():
         pass
     finally:
         rclpy.try_shutdown()
+        print("ended")
 
 
 main()

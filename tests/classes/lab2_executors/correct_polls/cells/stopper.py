@@ -38,6 +38,7 @@ def main():
         pass
     finally:
         rclpy.try_shutdown()
+        print("ended")
 
 
 main()

@@ -40,6 +40,7 @@ def main():
         pass
     finally:
         rclpy.try_shutdown()
+        print("ended")
 
 
 main()

@@ -38,6 +38,7 @@ def main():
         pass
     finally:
         rclpy.shutdown()
+        print("ended")
 
 
 main()
