@@ -398,6 +398,15 @@ def test_a_missing_program_is_said_at_once(notebook: Notebook) -> None:
     assert "Traceback" not in unknown.error and not unknown.text
 
 
+def test_a_table_that_was_not_written_is_said_as_well(notebook: Notebook) -> None:
+    notebook.save(answer("%%file table.yaml\na: 1", "table"))
+    shown = notebook.run(
+        "from autograder.checks import answers\n"
+        'with answers("table.yaml") as table:\n    table.expect_answer("a", 1)\ntable.score(1)'
+    )
+    assert "Run the cell `%%file table.yaml` first" in shown.text and "0 of 1 point" in shown.text
+
+
 @pytest.mark.parametrize(
     ("line", "error"),
     [("1 / 0", "ZeroDivisionError"), ('ros.lisen("/chatter", String)', "AttributeError"), ("Int32", "NameError")],

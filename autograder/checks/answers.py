@@ -39,6 +39,10 @@ class Answers:
         if self._table:
             return
         title = f"`{self.file}` is a table of answers"
+        here = session.current.kernel
+        if here is not None and not here.has(self.file):
+            because, hint = here.why_missing("file", self.file)
+            outcomes.failed(title, because=because, hint=hint, code="file-missing")
         try:
             table = student_yaml.read(session.current.use(self.file))
         except student_yaml.StudentFileError as error:
