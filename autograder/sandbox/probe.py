@@ -132,7 +132,11 @@ class _Ledger:
             self.things.append(thing)
             if of is not None:
                 self.known[of] = thing
-            self.touch(thing)
+            # At once: what the graph shows of a thing must find it known here.
+            try:
+                os.write(_State.fd, _line_of({"key": thing.key, **thing.event()}))
+            except OSError:
+                self.touch(thing)
 
     def touch(self, thing: Any) -> None:
         """Say that a thing has changed."""
