@@ -17,6 +17,7 @@ import autograder.diagnosis
 from autograder.checks import launch, session
 from autograder.diagnosis import Diagnosis, Scene
 from autograder.diagnosis.codes import CODES
+from autograder.diagnosis.events import read
 from autograder.results import Isolation
 
 TOGETHER = 8
@@ -90,3 +91,17 @@ def test_every_reason_is_listed_with_what_it_must_have_seen_and_has_both_kinds_o
     missed = {code for case in CASES.values() for code in case.never}
     assert CODES.keys() - spoken - ELSEWHERE.keys() == set()
     assert CODES.keys() - missed - ELSEWHERE.keys() == set()
+
+
+def test_what_a_probe_does_not_write_is_ignored_and_a_probe_that_failed_is_not_believed() -> None:
+    forged = [
+        {},
+        {"e": "thing"},
+        {"e": "thing", "id": 1, "kind": []},
+        {"e": 7},
+        {"e": "spin"},
+        {"e": "call", "what": "x"},
+    ]
+    assert [event.e for event in read([*forged, {"e": "attached"}])] == ["attached"]
+    failed = {"e": "probe_failed", "what": "_prepare_node: AttributeError"}
+    assert [event.e for event in read([failed, {"e": "attached", "more": 1}])] == ["probe_failed", "attached"]
