@@ -1,0 +1,32 @@
+%%node recorder
+import time
+
+import rclpy
+from rclpy.executors import ExternalShutdownException
+from rclpy.node import Node
+from rclpy.qos import HistoryPolicy, QoSProfile
+from std_msgs.msg import Int32
+
+
+class Recorder(Node):
+    def __init__(self):
+        super().__init__("recorder")
+        self.work = self.declare_parameter("work", 0.02).value
+        self.publisher = self.create_publisher(Int32, "recorded", 100)
+        self.create_subscription(Int32, "frames", self.record, QoSProfile(depth=100))
+
+    def record(self, frame):
+        self.publisher.publish(frame)
+        time.sleep(self.work)
+
+
+def main():
+    rclpy.init()
+    try:
+        rclpy.spin(Recorder())
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    rclpy.try_shutdown()
+
+
+main()
