@@ -7,13 +7,23 @@ from __future__ import annotations
 
 from enum import StrEnum
 from pathlib import Path
+from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 from autograder import __version__
 from autograder.files import write_beside
 
 SCHEMA_VERSION = 1
+
+
+def encodable(text: str) -> str:
+    """Replace what JSON can spell but UTF-8 cannot: halves of surrogate pairs."""
+    return text.encode("utf-8", "replace").decode("utf-8")
+
+
+Text = Annotated[str, AfterValidator(encodable)]
+"""A text that may quote a student's program, whose notes can hold anything: a result must always be writable."""
 
 
 class Status(StrEnum):
@@ -46,13 +56,13 @@ class Outcome(_Model):
     """One expectation and what came of it, worded for a student."""
 
     status: Status
-    title: str
+    title: Text
     """The expectation as a short sentence: `node /talker is on the graph`."""
-    expected: str = ""
-    observed: str = ""
-    because: str = ""
+    expected: Text = ""
+    observed: Text = ""
+    because: Text = ""
     """The first broken link of the chain, as a sentence."""
-    hint: str = ""
+    hint: Text = ""
     """What to look at next, and where to read on."""
     code: str = ""
     """A short stable word for the reason, such as `qos-reliability`; tests and statistics use it."""
@@ -87,7 +97,7 @@ class CheckResult(_Model):
     more_at_grading: bool = False
     """Hidden tests were taken out of this copy of the check: what is passed here is not yet earned."""
 
-    flags: list[str] = Field(default_factory=list)
+    flags: list[Text] = Field(default_factory=list)
     """Where what was seen inside a program contradicts what the graph showed. For instructors; it costs no points."""
     not_attempted: list[str] = Field(default_factory=list)
     """Files of answer cells that are still as students receive them; for this the check did not pass."""

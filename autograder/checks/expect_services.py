@@ -124,10 +124,12 @@ class ServiceExpectations(GraphExpectations):
         title = f"Parameter `{name}` of `{node}` is {value!r}"
         try:
             have = parameters.get_parameters(self.observer, node, [name], within, self.without_node(node))
+            declared = []
+            if name not in have:
+                declared = parameters.list_parameters(self.observer, node, within, self.without_node(node))
         except (ServiceMissing, parameters.NoAnswer) as error:
             self._no_parameters(title, node, error, hint)
         if name not in have:
-            declared = parameters.list_parameters(self.observer, node, within, self.without_node(node))
             own = [p for p in declared if p != "use_sim_time" and "qos_overrides" not in p]
             self.fail(
                 title,

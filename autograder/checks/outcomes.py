@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import contextlib
 import linecache
 import re
 import sys
@@ -12,10 +13,14 @@ from types import FrameType
 from typing import NoReturn
 
 from autograder.checks import session
+from autograder.graph.observer import ForgedGraph
 from autograder.results import Outcome, Status
 from autograder.submission.markers import MORE_AT_GRADING, hidden_lines
 
 _PACKAGE = str(Path(__file__).resolve().parent.parent)
+
+
+_FORGED = "A program has announced a node or a topic whose name is no text, below ROS, which allows no such name."
 
 
 class CheckEnded(Exception):
@@ -33,6 +38,10 @@ def ends_block(error: BaseException | None) -> bool:
     the student's to see.
     """
     if error is None or isinstance(error, CheckEnded):
+        return True
+    if isinstance(error, ForgedGraph):
+        with contextlib.suppress(LaunchEnded):
+            failed_as_a_whole("The ROS graph can be read", because=_FORGED, code="forged-graph")
         return True
     if session.current.kernel is not None or not isinstance(error, Exception):
         return False

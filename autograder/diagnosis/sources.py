@@ -20,7 +20,7 @@ Stacks = dict[int, list[Frame]]
 """By thread: its frames, newest call first. The main thread comes last."""
 
 _THREAD = re.compile(r"(?:Current thread|Thread) 0x([0-9a-f]+)")
-_FRAME = re.compile(r'\s+File "(.*)", line (\d+) in (.*)')
+_FRAME = re.compile(r'\s+File "(.*)", line (\d{1,9}) in (.*)')
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ from collections.abc import Callable
 from typing import Any
 
 import rclpy
+from rclpy._rclpy_pybind11 import RCLError
 from rclpy.context import Context
 from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
@@ -41,6 +42,10 @@ _EACH = 1024
 """Bytes that a message takes besides its own, about."""
 
 OBSERVER_NAME = "grading_observer"
+
+
+class ForgedGraph(Exception):
+    """A program has told DDS of a node or topic whose name is no text, past ROS: the graph cannot be read any more."""
 
 
 class Observer:
@@ -146,33 +151,43 @@ class Observer:
 
     def nodes(self) -> list[str]:
         """Full names of all nodes but the observer, one entry per node: two nodes of one name are listed twice."""
-        found = self.node.get_node_names_and_namespaces()
+        found = self._names()
         if (self.name, "/") in found:
             found.remove((self.name, "/"))  # once: another node of this very name stays
         return sorted(full_name(namespace, name) for name, namespace in found)
+
+    def _names(self) -> list[tuple[str, str]]:
+        """Names and namespaces of all nodes."""
+        try:
+            found: list[tuple[str, str]] = _read(self.node.get_node_names_and_namespaces)
+        except RCLError as error:
+            if "empty node name" in str(error):  # rcl lets no program make such a node
+                raise ForgedGraph from error
+            raise
+        return found
 
     def topics(self) -> dict[str, list[str]]:
         """Topics and their type names, those that only the observer uses left out."""
         return {
             name: types
-            for name, types in self.node.get_topic_names_and_types()
+            for name, types in _read(self.node.get_topic_names_and_types)
             if self.publishers(name) or self.subscriptions(name)
         }
 
     def publishers(self, topic: str) -> list[TopicEndpointInfo]:
         """Publishers of a topic, the observer's own left out."""
-        ends = self.node.get_publishers_info_by_topic(topic)
+        ends = _read(self.node.get_publishers_info_by_topic, topic)
         return [end for end in ends if _participant(end) != self._participant]
 
     def subscriptions(self, topic: str) -> list[TopicEndpointInfo]:
         """Subscriptions to a topic, the observer's own left out."""
-        ends = self.node.get_subscriptions_info_by_topic(topic)
+        ends = _read(self.node.get_subscriptions_info_by_topic, topic)
         return [end for end in ends if _participant(end) != self._participant]
 
     def services(self) -> dict[str, list[str]]:
         """Services of all nodes, with their type names; the observer itself offers none."""
         found: dict[str, list[str]] = {}
-        for name, namespace in self.node.get_node_names_and_namespaces():
+        for name, namespace in self._names():
             # A node may go away between the two questions (rclpy raises NodeNameNonExistentError).
             with contextlib.suppress(Exception):
                 found.update(self.node.get_service_names_and_types_by_node(name, namespace))
@@ -206,6 +221,18 @@ class Observer:
         """Make a publisher of the observer's; rclpy's own warnings about subscriptions that do not match are off."""
         quiet = PublisherEventCallbacks(use_default_callbacks=False)
         return self.node.create_publisher(msg_type, topic, qos, event_callbacks=quiet)
+
+
+def _read(ask: Callable[..., Any], *about: str) -> Any:
+    """What rclpy tells of the graph.
+
+    Raises:
+        ForgedGraph: a name in it is no UTF-8, which ROS refuses and DDS does not.
+    """
+    try:
+        return ask(*about)
+    except UnicodeDecodeError as error:
+        raise ForgedGraph from error
 
 
 def _participant(end: TopicEndpointInfo) -> bytes:

@@ -46,7 +46,8 @@ def get_parameters(
         # One by one: rclpy answers a request that names an undeclared parameter with an empty list for all.
         request = GetParameters.Request(names=[name])
         values = _call(observer, node, "get_parameters", GetParameters, request, within, give_up).values
-        if values and values[0].type != ParameterType.PARAMETER_NOT_SET:
+        # A service that a program offers in place of its node's can tell of types that do not exist.
+        if values and ParameterType.PARAMETER_NOT_SET < values[0].type <= ParameterType.PARAMETER_STRING_ARRAY:
             found[name] = parameter_value_to_python(values[0])
     return found
 

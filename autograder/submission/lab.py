@@ -17,6 +17,7 @@ from typing import Any
 
 from autograder.errors import KitError
 from autograder.grading.job import Cell
+from autograder.results import encodable
 from autograder.submission.magics import BadNameError, CellFile, parse
 from autograder.submission.markers import without_hidden_tests, without_region
 
@@ -139,11 +140,6 @@ def blank_mark_of(cell: dict[str, Any]) -> str:
     metadata = cell.get("metadata")
     mark = metadata.get("autograder") if isinstance(metadata, dict) else None
     return str(mark.get("blank", "")) if isinstance(mark, dict) else ""
-
-
-def encodable(text: str) -> str:
-    """Replace what JSON can spell but UTF-8 cannot: halves of surrogate pairs."""
-    return text.encode("utf-8", "replace").decode("utf-8")
 
 
 def source_of(cell: dict[str, Any]) -> str:
