@@ -180,13 +180,21 @@ class InertAnswers(NbGraderPreprocessor):  # type: ignore[misc]
         return cell, resources
 
 
+_BLANKS = 200
+"""Longer rows of blanks in an answer are shortened to this many."""
+
+
 def inert(markdown: str) -> str:
     """Return Markdown in which nothing can become a tag, a script link or a picture from elsewhere."""
     return inert_text(re.sub(r"<(?=[A-Za-z/!?])", "<\u2060", markdown))
 
 
 def inert_text(markdown: str) -> str:
-    """Return Markdown in which nothing but tags can become a script link or a picture from elsewhere."""
+    """Return Markdown in which nothing but tags can become a script link, a drawing or a picture from elsewhere."""
+    # nbconvert hands such a block to a drawing program in the browser, as it stands: it fetches pictures, too.
+    markdown = markdown.replace("mermaid", "m\u2060ermaid")
+    # For each of many blanks the Markdown reader looks at all that follow: 60000 take it a quarter of a minute.
+    markdown = re.sub(f" {{{_BLANKS},}}", " " * _BLANKS, markdown)
     # What a browser fetches by itself would tell its owner who reads the page.
     parted = markdown.replace("![", "!\u2060[")
     # Only links that plainly begin with http stay links: there are too many ways to spell the other schemes.
