@@ -19,7 +19,7 @@ from autograder.submission.reader import read_submission
 
 _IMPORT = re.compile(r"^\s*(?:from|import)\s+([a-z]\w*)", re.MULTILINE)
 _ROS_PACKAGE = re.compile(r"rclpy|\w+_msgs|\w+_interfaces|\w+_srvs|tf2_ros")
-_PACKAGE_OF_CHECKS = re.compile(r"""package=["']([a-z][a-z0-9_]*)["']""")
+_PACKAGE_OF_CHECKS = re.compile(r"""package["']?\s*[=:]\s*["']([a-z][a-z0-9_]*)["']""")
 
 _PACKAGE_XML = """\
 <?xml version="1.0"?>
