@@ -39,7 +39,8 @@ def test_a_student_differs_from_the_base_in_the_cells_given(lab: Lab, tmp_path: 
 
 def test_without_a_base_the_lab_is_blank(lab: Lab, tmp_path: Path) -> None:
     submission = build(lab, tmp_path, {}, talker="%%node talker\nprint('mine')\n")
-    assert submission.files["talker.py"] == "# %%node talker\nprint('mine')\n" and "42" not in submission.files["answers.yaml"]
+    assert submission.files["talker.py"] == "# %%node talker\nprint('mine')\n"
+    assert "42" not in submission.files["answers.yaml"]
 
 
 def test_the_notebook_is_changed_as_described(lab: Lab, tmp_path: Path) -> None:
