@@ -183,6 +183,12 @@ def test_a_command_line_is_split_as_a_shell_does(table: Path, text: str) -> None
     assert command_line("rules.yaml", "front", then=["-r", "x:=y"]).words()[-2:] == ["-r", "x:=y"]
 
 
+def test_arguments_about_logs_and_enclaves_are_ros_arguments(table: Path) -> None:
+    words = "--log-level warn --disable-stdout-logs -r a:=b --enclave /x --log-config-file a.conf --enable-rosout-logs"
+    table.write_text(f"front: {words}\n")
+    assert command_line("rules.yaml", "front").words() == words.split()
+
+
 @pytest.mark.parametrize(
     ("text", "code"),
     [
@@ -194,6 +200,8 @@ def test_a_command_line_is_split_as_a_shell_does(table: Path, text: str) -> None
         ("front: -r\n", "command-line"),
         ("front: -r a:=b c:=d\n", "command-line"),
         ("front: --enable-stdout-logs x\n", "command-line"),
+        ("front: --log-level\n", "command-line"),
+        ("front: -r --disable-rosout-logs\n", "command-line"),
         ('front: "-r \'a"\n', "command-line"),
         ("front: -r a: b\n", "not-yaml"),
         ("- front\n", "unanswered"),

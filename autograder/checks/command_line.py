@@ -9,7 +9,11 @@ from dataclasses import dataclass
 from autograder import student_yaml
 from autograder.checks import session
 
-_OPTIONS = {"-r", "--remap", "-p", "--param", "--params-file"}
+_WITH_A_WORD = {
+    "-r", "--remap", "-p", "--param", "--params-file", "-e", "--enclave",
+    "--log-level", "--log-config-file", "--log-file-name",
+}  # fmt: skip
+_ALONE = {f"--{how}-{which}-logs" for how in ("enable", "disable") for which in ("rosout", "stdout", "external-lib")}
 _LONGEST = 2000
 
 
@@ -47,14 +51,16 @@ class CommandLine:
             words = words[1:]
         if not words:
             raise CommandLineError(f"`{self.entry}` in `{self.file}` has no words.", "unanswered", f"Write {example}.")
-        for number, word in enumerate(words):
-            if (word in _OPTIONS) != (number % 2 == 0):
+        option = ""  # the one that the next word belongs to
+        for word in words:
+            if (word in _WITH_A_WORD or word in _ALONE) == bool(option):
                 raise CommandLineError(
                     f"`{self.entry}` in `{self.file}` is not a list of ROS arguments: `{word}` is not expected there.",
                     "command-line",
                     f"Every rule has its own `-r`, every parameter its own `-p`: {example}.",
                 )
-        if len(words) % 2:
+            option = "" if option or word in _ALONE else word
+        if option:
             raise CommandLineError(f"`{self.entry}` in `{self.file}` ends with `{words[-1]}`.", "command-line")
         return [*words, *self.then]
 

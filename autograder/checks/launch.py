@@ -161,7 +161,7 @@ class Launch(MessageExpectations, ServiceExpectations, LifecycleExpectations, Pr
             return folder
 
         folder = session.current.folder.resolve()
-        programs = {path.stem for path in folder.glob("*.py")} | set(self._stand_ins)
+        programs = set(self._stand_ins) or {path.stem for path in folder.glob("*.py")}
         session.current.use(name)
         try:
             found = read_launch_file(folder / name, arguments, find, programs)

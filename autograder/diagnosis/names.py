@@ -82,8 +82,8 @@ def _made_as(scene: Scene, kind: str, name: str) -> list[Thing]:
     ]
 
 
-def absolute_name(scene: Scene, kind: str, name: str) -> Diagnosis | None:
-    """Must have seen: the code make this end with a name that begins with a slash."""
+def absolute_name(scene: Scene, kind: str, name: str, wanted: str = "") -> Diagnosis | None:
+    """Must have seen: the code make this end with a name that begins with a slash; `wanted` should be there instead."""
     for thing in _made_as(scene, kind, name):
         if thing.given.startswith("/"):
             at = f" in {thing.made}" if thing.made else ""
@@ -91,9 +91,17 @@ def absolute_name(scene: Scene, kind: str, name: str) -> Diagnosis | None:
                 f"The {kind} is on `{name}`: the code{at} gives the absolute name `{thing.given}`, which does not "
                 "follow the namespace.",
                 "absolute-name",
-                "A topic name with a leading slash is absolute: no namespace reaches it. Write it without the slash.",
+                "A topic name with a leading slash is absolute: no namespace reaches it. "
+                + _not_absolute(thing, wanted),
             )
     return None
+
+
+def _not_absolute(thing: Thing, wanted: str) -> str:
+    """What to write so that the name becomes the wanted one."""
+    if thing.node and wanted.startswith(f"{thing.node}/"):
+        return f"Write `~{wanted.removeprefix(thing.node)}`: that is below the node's own name."
+    return "Write it without the slash."
 
 
 def why_topic_present(scene: Scene, topic: str) -> Diagnosis:
@@ -184,7 +192,7 @@ def _elsewhere(scene: Scene, topic: str, kind: str, names: list[str]) -> Diagnos
     base = topic.rsplit("/", 1)[-1]
     for name in names:
         if name != topic and name.rsplit("/", 1)[-1] == base and topic.endswith(name):
-            absolute = absolute_name(scene, kind, name)
+            absolute = absolute_name(scene, kind, name, topic)
             if absolute:
                 return absolute
     close = nearest(topic, [name for name in names if name != topic])

@@ -61,10 +61,10 @@ class _Reader:
                 asks = f"`{path.name}` has" if depth > 1 else "it has"
                 raise place.error(
                     f"the launch argument `{name}` has no value: {asks} no default for it, and none was given.",
-                    f"Give it in the include's own `arg`: `- {{name: {name}, value: …}}`. A `let` or an argument of "
-                    "the file around it does not count."
+                    f"Give it in the include's own `arg`, `- {{name: {name}, value: …}}`, or give it a `default` in "
+                    f"`{path.name}`. A `let` or an argument of the file around it does not count."
                     if depth > 1
-                    else f"Give it: `{name}:=value`.",
+                    else f"Give it a `default` in the file, or a value at the start: `{name}:=value`.",
                 )
         self.run(actions, context, depth)
 
@@ -83,7 +83,7 @@ class _Reader:
             if "default" not in do.given:
                 raise do.place.error(
                     f"the launch argument `{name}` has no value: it has no default and none was given.",
-                    f"Give it: `{name}:=value`.",
+                    f"Give it a `default` in the file, or a value at the start: `{name}:=value`.",
                 )
             configurations[name] = do.text("default")
         choices = [choice["value"] for choice in do.given.get("choice", [])]

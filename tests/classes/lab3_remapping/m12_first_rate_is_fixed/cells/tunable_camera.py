@@ -19,7 +19,7 @@ class TunableCamera(Node):
     def validate(self, parameters):
         for parameter in parameters:
             if parameter.name == "camera_rate" and not 1 <= parameter.value <= 60:
-                return SetParametersResult(successful=False, reason="camera_rate must be from 1 to 60 images per second")
+                return SetParametersResult(successful=False, reason="not allowed")
         return SetParametersResult(successful=True)
 
     def update(self, parameters):

@@ -25,7 +25,7 @@ class TunableCamera(Node):
     def update(self, parameters):
         for parameter in parameters:
             if parameter.name == "camera_rate":
-                self.timer.timer_period_ns = int(1e9 / parameter.value)
+                self.timer.timer_period_ns = max(self.timer.timer_period_ns, int(1e9 / parameter.value))
 
     def shoot(self):
         image = Image()

@@ -26,6 +26,7 @@ class TunableCamera(Node):
         for parameter in parameters:
             if parameter.name == "camera_rate":
                 self.timer.timer_period_ns = int(1e9 / parameter.value)
+                self.remove_post_set_parameters_callback(self.update)
 
     def shoot(self):
         image = Image()
