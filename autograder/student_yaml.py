@@ -88,8 +88,9 @@ def load(text: str, name: str = "the file") -> Any:
         raise _error(text, name, refused.index, f": {refused}", "yaml-refused") from None
     except yaml.MarkedYAMLError as error:
         problem = error.problem or error.context or ""
-        # Of what is never closed the beginning helps, not the end of the file.
-        mark = (error.context_mark if "end of stream" in problem else None) or error.problem_mark or error.context_mark
+        # Of what is never closed, and of a key without its colon, the beginning helps: the end is noticed lines later.
+        begun = "end of stream" in problem or "could not find expected ':'" in problem
+        mark = (error.context_mark if begun else None) or error.problem_mark or error.context_mark
         raise _error(text, name, mark.index if mark else None, f" is not YAML: {_in_plain_words(problem)}") from None
     except yaml.reader.ReaderError as error:
         raise _error(text, name, error.position, f" is not YAML: {_in_plain_words(error.reason)}") from None

@@ -41,7 +41,7 @@ def inside(scene: Scene, name: str) -> Diagnosis | None:
 
 
 def together(at_once: int = 2, itself: bool = False) -> Ask:
-    return lambda scene, name: diagnosis.why_not_together(scene, at_once, itself)
+    return lambda scene, name: diagnosis.why_not_together(scene, "", at_once, itself)
 
 
 def starved(scene: Scene, name: str) -> Diagnosis | None:

@@ -37,6 +37,7 @@ def test_plain_yaml_is_read_as_pyyaml_reads_it(text: str) -> None:
     ("text", "line", "words"),
     [
         ("a: 1\nb: c: d", 3, "a `:` is not expected"),
+        ("a: 1\nb:0\nc: 2\nd: 3", 3, "a space after the key"),
         ("a:\n\t- b", 3, "tab"),
         ("a: 1\nb: @x", 3, "quotes"),
         ("a: 'x\nb: 1\n", 2, "never closed"),

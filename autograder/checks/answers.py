@@ -14,6 +14,7 @@ from autograder.checks.forms import NAME_OR_NONE, allowed, begins_with_slash, on
 from autograder.checks.parts import part
 from autograder.checks.scoring import score
 from autograder.checks.session import Score
+from autograder.graph.names import nearest
 from autograder.results import Status
 
 
@@ -74,11 +75,21 @@ class Answers:
         form = self._forms.get(question, ())
         if answer is None or answer == "?":
             expected = one_of(form) if form else ""
-            outcomes.failed(title, expected=expected, because=f"`{question}` has no answer yet.", code="unanswered")
+            because = f"`{question}` has no answer yet." + self._misspelt(question)
+            outcomes.failed(title, expected=expected, because=because, code="unanswered")
         if form and not allowed(answer, form):
             because = f"`{question}` is `{_spelt(answer)}`, which is none of the allowed answers: {one_of(form)}."
             outcomes.failed(title, expected=one_of(form), observed=_spelt(answer), because=because, code="answer-form")
         return answer
+
+    def _misspelt(self, question: str) -> str:
+        """A sentence about a line of the table that is no question but looks like this one; empty if there is none."""
+        if question in self._table:
+            return ""
+        line = nearest(question, self._table.keys() - self._questions.keys())
+        if line is None or nearest(line, self._questions.keys() - self._table.keys()) != question:
+            return ""
+        return f" `{line[:60]}` is no question of this table; did you mean `{question}`?"
 
     def expect_answer(self, question: str, *right: Any, hint: str = "") -> None:
         """The answer to one question says the same as one of the right ones."""

@@ -430,16 +430,17 @@ class MessageExpectations(GraphExpectations):
             self._wait_for_runs(topic, [*names, *others], 1, title, 0.1, hint)
         found = self.activity(topic)
         most = max(found.overlap([name]) for name in names) if itself else found.distinct_overlap([*names, *others])
+        at_most = f"There were never more than {most} at once."
+        apart = f"None of {', '.join(names)} ran beside one of {', '.join(others)}."
+        scene = self.scene()
         self.fail(
             title,
-            diagnosis.program_trouble(self.scene())
-            or diagnosis.inside_reason(self.scene())
-            or diagnosis.why_not_together(self.scene(), 2 if others else at_least, itself)
-            or Diagnosis(
-                f"There were never more than {most} at once. {diagnosis.layout(self.scene())}".strip(), "no-overlap"
-            ),
-            expected=f"{at_least} at once",
-            observed=f"{most} at once" if most > 1 else "one at a time",
+            diagnosis.program_trouble(scene)
+            or diagnosis.inside_reason(scene)
+            or diagnosis.why_not_together(scene, topic, 2 if others else at_least, itself)
+            or Diagnosis(f"{apart if others else at_most} {diagnosis.layout(scene, topic)}".strip(), "no-overlap"),
+            expected="one of each at once" if others else f"{at_least} at once",
+            observed="never one of each" if others else f"{most} at once" if most > 1 else "one at a time",
             hint=hint,
         )
 
@@ -531,9 +532,10 @@ class MessageExpectations(GraphExpectations):
                 diagnosis.program_trouble(scene)
                 or diagnosis.inside_reason(scene)
                 or diagnosis.waits_for_its_group(scene)
-                or diagnosis.why_not_together(scene)
+                or diagnosis.why_not_together(scene, activity or topic)
                 or Diagnosis(
-                    f"At most {max(seen, default=0)} messages came on `{topic}` in one run. {diagnosis.layout(scene)}",
+                    f"At most {max(seen, default=0)} messages came on `{topic}` in one run. "
+                    + diagnosis.layout(scene, activity or topic),
                     "paused",
                 ),
                 expected=f"at least {at_least} messages in one run",

@@ -61,7 +61,7 @@ def few_threads(inside: Inside, at_once: int) -> Diagnosis | None:
                 f"`{inside.name}` leaves the number of threads to the machine: MultiThreadedExecutor() took {have} "
                 f"here, as many as there are CPUs, and {at_once} callbacks have to run at once.",
                 "machine-threads",
-                "Name it: MultiThreadedExecutor(num_threads=8).",
+                "Name the number that the task asks for: MultiThreadedExecutor(num_threads=...).",
             )
         return Diagnosis(
             f"`{inside.name}`: its MultiThreadedExecutor has {have}, and {at_once} callbacks have to run at once.",
@@ -105,15 +105,26 @@ def exclusive_itself(inside: Inside) -> Diagnosis | None:
     )
 
 
-def why_not_together(scene: Scene, at_once: int = 2, itself: bool = False) -> Diagnosis | None:
+def _publishing(scene: Scene, topic: str) -> list[Inside]:
+    """The programs that publish on a topic, by what their probes say; all of them where no probe knows one."""
+    publishing = [
+        inside
+        for inside in scene.insides
+        if any(thing.kind == "publisher" and thing.name == topic for thing in inside.things.values())
+    ]
+    return publishing or scene.insides
+
+
+def why_not_together(scene: Scene, topic: str, at_once: int = 2, itself: bool = False) -> Diagnosis | None:
     """Why callbacks did not overlap; None where what was seen excludes none of the ways in which that happens.
 
     Args:
         scene: the launch.
+        topic: where the callbacks publish their begins and ends.
         at_once: how many should have run at the same time.
         itself: they should have been runs of one callback.
     """
-    for inside in scene.insides:
+    for inside in _publishing(scene, topic):
         if not inside.attached or not _used(inside):
             continue
         found = single_threaded(inside) or few_threads(inside, 2)
@@ -202,10 +213,10 @@ def _times(number: int) -> str:
     return {0: "never", 1: "once"}.get(number, f"{number} times only")
 
 
-def layout(scene: Scene) -> str:
-    """What was seen of executors, groups and runs, where no reason is established."""
+def layout(scene: Scene, topic: str) -> str:
+    """What was seen of executors, groups and runs of those who publish on a topic, where no reason is established."""
     said = []
-    for inside in scene.insides:
+    for inside in _publishing(scene, topic):
         if not inside.attached or not _used(inside):
             continue
         executor = _used(inside)[0]

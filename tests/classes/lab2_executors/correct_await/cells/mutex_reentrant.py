@@ -11,7 +11,7 @@ class MutexReentrant(Node):
     def __init__(self):
         super().__init__("mutex_reentrant")
         self.declare_parameter("period", 0.5)  # seconds, of all five timers
-        self.declare_parameter("work", 0.2)  # seconds, of r1, r2 and r3; m1 and m2 take a third of it
+        self.declare_parameter("work", 0.15)  # seconds, of r1, r2 and r3; m1 and m2 take half as long again
         self.period = self.get_parameter("period").value
         self.work = self.get_parameter("work").value
         self.activity = self.create_publisher(String, "activity", 10)
@@ -37,10 +37,10 @@ class MutexReentrant(Node):
         self.run("r3", self.work)
 
     def m1(self):
-        self.run("m1", self.work / 3)
+        self.run("m1", 1.5 * self.work)
 
     def m2(self):
-        self.run("m2", self.work / 3)
+        self.run("m2", 1.5 * self.work)
 
 
 def spin(node):

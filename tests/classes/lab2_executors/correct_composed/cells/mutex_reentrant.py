@@ -15,7 +15,7 @@ class MutexReentrant(Node):
         group = ReentrantCallbackGroup()
         super().__init__("mutex_reentrant")
         self.declare_parameter("period", 0.5)
-        self.declare_parameter("work", 0.2)
+        self.declare_parameter("work", 0.15)
         self.activity = self.create_publisher(String, "activity", 10)
         self.motor = threading.Lock()
         for name in ("r1", "r2", "r3"):
@@ -25,7 +25,7 @@ class MutexReentrant(Node):
 
     def alone(self, name):
         with self.motor:
-            self.run(name, 1 / 3)
+            self.run(name, 1.5)
 
     def run(self, name, share):
         self.activity.publish(String(data=f"{name} begin"))

@@ -10,7 +10,7 @@ def main():
     rclpy.init()
     node = rclpy.create_node("mutex_reentrant")
     period = node.declare_parameter("period", 0.5).value
-    work = node.declare_parameter("work", 0.2).value
+    work = node.declare_parameter("work", 0.15).value
     activity = node.create_publisher(String, "activity", 10)
 
     def add(name, seconds, group):
@@ -25,7 +25,7 @@ def main():
     for name in ("r1", "r2", "r3"):
         add(name, work, MutuallyExclusiveCallbackGroup())
     for name in ("m1", "m2"):
-        add(name, work / 3, node.default_callback_group)
+        add(name, 1.5 * work, node.default_callback_group)
     executor = MultiThreadedExecutor(num_threads=4)
     executor.add_node(node)
     try:

@@ -11,7 +11,7 @@ from std_msgs.msg import String
 class MutexReentrant(Node):
     def __init__(self, **arguments):
         super().__init__("mutex_reentrant", **arguments)
-        self.declare_parameters("", [("period", 0.5), ("work", 0.2)])
+        self.declare_parameters("", [("period", 0.5), ("work", 0.15)])
         self.activity = self.create_publisher(String, "activity", 10)
         shared = ReentrantCallbackGroup(), MutuallyExclusiveCallbackGroup()
         self.kept = [
@@ -20,12 +20,12 @@ class MutexReentrant(Node):
                 functools.partial(self.run, name, part),
                 callback_group=shared[name.startswith("m")],
             )
-            for name, part in [("m1", 3), ("m2", 3), ("r1", 1), ("r2", 1), ("r3", 1)]
+            for name, part in [("m1", 1.5), ("m2", 1.5), ("r1", 1), ("r2", 1), ("r3", 1)]
         ]
 
     def run(self, name, part):
         self.activity.publish(String(data=name + " begin"))
-        time.sleep(self.get_parameter("work").value / part)
+        time.sleep(self.get_parameter("work").value * part)
         self.activity.publish(String(data=name + " end"))
 
 

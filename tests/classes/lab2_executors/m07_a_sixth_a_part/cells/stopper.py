@@ -18,7 +18,7 @@ class Stopper(Node):
     def tick(self):
         self.count += 1
         self.ticks.publish(Int64(data=self.count))
-        if self.count == 2:
+        if self.count == 60:
             self.stopped.set_result(True)
 
     def on_stop(self, _):
