@@ -157,6 +157,7 @@ def test_an_answer_counts_however_it_is_spelt(grade: Grade, text: str) -> None: 
         ("reliability: best_effort\nlate: five\nheard: yes", "late", "answer-form", "a whole number from 0 to 98"),
         ("reliability: best_effort\nlate: 5\nheard: maybe", "heard", "answer-form", "yes or no"),
         ("reliability: best_effort\nlate: 5\nheard: '?'", "heard", "unanswered", "has no answer yet"),
+        ("reliability: best_effort\nlate: 5\nherd: yes", "heard", "unanswered", "did you mean `heard`?"),
         ("reliability: best_effort\nlate: 5\nheard: no", "heard", "wrong-answer", "`no` is not what happens"),
         ("reliability: best_effort\nlate: 5\nheard: 1", "heard", "answer-form", "yes or no"),
         ("reliability: best_effort\nlate: yes\nheard: yes", "late", "answer-form", "a whole number"),
