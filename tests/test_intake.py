@@ -290,3 +290,11 @@ def test_no_name_in_a_zip_stops_a_class(names: list[str], tmp_path: Path) -> Non
     taken = taken_from(content.getvalue(), tmp_path)
     if not any(name.startswith("bob") for name in names):
         assert taken["bob"].read_text() == "bob's work"
+
+
+@pytest.mark.parametrize("source", ["\n \t" * 20_000 + '"', "a." * 30_000, '"' + "x" * 500])
+def test_code_that_would_take_the_colouring_long_is_shown_plain(source: str) -> None:
+    from autograder.grading.stages import ColouredCode
+
+    assert "<span class=" not in ColouredCode(pygments_lexer="ipython3")(source).replace("<span></span>", "")
+    assert "<span class=" in ColouredCode(pygments_lexer="ipython3")("import rclpy")

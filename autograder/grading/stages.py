@@ -278,6 +278,18 @@ class _CompiledTemplates(BytecodeCache):
 _COMPILED = _CompiledTemplates()
 
 
+_TOO_LONG_TO_COLOUR = re.compile(r"\s{200}|\S{400}")
+"""No program looks like that, and the time that Pygments takes for it grows with the square of its length."""
+
+
+class ColouredCode(Highlight2HTML):  # type: ignore[misc]
+    """nbconvert's colouring of code, for what a person wrote; the rest is shown as plain text."""
+
+    def __call__(self, source: str, language: str | None = None, metadata: Any = None) -> Any:
+        """Return the HTML of a code cell."""
+        return super().__call__(source, "text" if _TOO_LONG_TO_COLOUR.search(source) else language, metadata)
+
+
 class FeedbackExporter(HTMLExporter):  # type: ignore[misc]
     """nbconvert's HTML in half the time, which is most of what a submission costs here.
 
@@ -293,7 +305,7 @@ class FeedbackExporter(HTMLExporter):  # type: ignore[misc]
     def from_notebook_node(self, nb: Any, resources: dict[str, Any] | None = None, **kwargs: Any) -> Any:
         """Convert a notebook as HTMLExporter does before it parses its own page."""
         resources = self._init_resources(resources)
-        self.register_filter("highlight_code", Highlight2HTML(pygments_lexer="ipython3", parent=self))
+        self.register_filter("highlight_code", ColouredCode(pygments_lexer="ipython3", parent=self))
         self.register_filter(
             "filter_data_type",
             WidgetsDataTypeFilter(notebook_metadata=self._nb_metadata, parent=self, resources=resources),
