@@ -46,7 +46,7 @@ def overlap_by_hand(insides: Sequence[Inside], topic: str, title: str) -> str:
     most = max((executor.most for executor in inside.executors), default=0)
     return (
         f"{title}: the messages on `{topic}` say so. But inside `{inside.name}` one thread published all "
-        f"{thing.runs} of them, and never were more than {most} callbacks running at once."
+        f"{thing.runs} of them. Callbacks that ran at once, as far as was seen: {most}."
     )
 
 
