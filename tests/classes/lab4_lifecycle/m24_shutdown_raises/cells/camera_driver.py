@@ -27,13 +27,12 @@ class CameraDriver(LifecycleNode):
         )
 
     def on_configure(self, state):
-        camera = CameraHardware(self, self.get_parameter("device").value)
+        self.camera = CameraHardware(self, self.get_parameter("device").value)
         try:
-            camera.open()
+            self.camera.open()
         except OSError as error:
             self.get_logger().warning(f"cannot open the camera: {error}")
             return TransitionCallbackReturn.FAILURE
-        self.camera = camera
         self.image_publisher = self.create_lifecycle_publisher(Image, "image", 10)
         return TransitionCallbackReturn.SUCCESS
 

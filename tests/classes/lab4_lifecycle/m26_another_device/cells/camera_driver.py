@@ -23,7 +23,7 @@ class CameraDriver(LifecycleNode):
 
     def publish_frame(self):
         self.image_publisher.publish(
-            Image(height=8, width=8, encoding="mono8", step=8, data=self.camera.read())
+            Image(height=8, width=8, encoding="mono8", step=8, data=self.picture)
         )
 
     def on_configure(self, state):
@@ -39,7 +39,7 @@ class CameraDriver(LifecycleNode):
 
     def on_activate(self, state):
         try:
-            self.camera.read()
+            self.picture = self.camera.read()
         except OSError as error:
             self.get_logger().error(f"the camera is broken: {error}")
             return TransitionCallbackReturn.ERROR
