@@ -177,7 +177,7 @@ def test_tables_of_answers(tmp_path: Path) -> None:
             *(Cell(grade_id=name, points=2, source=check.format(name)) for name in cases),
         ],
     )  # fmt: skip
-    results = {result.grade_id: result for result in run_job(job, tmp_path).checks}
+    results = {check.grade_id: check for part in run_job(job, tmp_path) for check in part.checks}
     assert results.keys() == cases.keys()
     for name, case in cases.items():
         assert (results[name].status, results[name].points) == (Status.FAILED, 0.0), name

@@ -16,7 +16,7 @@ import pytest
 import toy
 
 from autograder.errors import KitError
-from autograder.grading import stage_a, stage_b
+from autograder.grading import stage_a, stage_b, supervisor
 from autograder.grading.stage_a import Settings, result_path
 from autograder.submission.lab import Lab, grade_id_of, load_lab
 
@@ -92,7 +92,7 @@ class Course:
 def course(tmp_path_factory: pytest.TempPathFactory) -> Any:
     """One course for the module, for a fresh gradebook takes seconds."""
     patch = pytest.MonkeyPatch()
-    patch.setattr(stage_a, "run_in_worker", lambda job, _=None: stage_a.believed(job, toy.judge(job)))
+    patch.setattr(stage_a, "run_in_worker", lambda job, _=None: supervisor.believed(job, toy.judge(job)))
     yield Course(tmp_path_factory.mktemp("nbgrader") / "course")
     patch.undo()
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
-from autograder.grading import worker
+from autograder.grading import supervisor, worker
 from autograder.grading.job import Cell, Job
 from autograder.grading.stage_a import run_in_worker
 from autograder.results import Isolation, NodeLog
@@ -47,6 +49,55 @@ def test_a_check_that_never_ends_is_ended(monkeypatch: pytest.MonkeyPatch) -> No
     error, value = worker._run_cell(Cell(grade_id="slow", points=1.0, source="while True: pass"), 0, {})
     assert "TimeoutError" in error and value is None
     assert worker._run_cell(Cell(grade_id="next", points=1.0, source="1 + 1"), 1, {}) == ("", 2)
+
+
+IN_A_CALL_FOR_EVER = """
+import ctypes, sys
+sys.modules["__main__"].CELL_SECONDS = sys.modules["__main__"].STUCK_SECONDS = 3
+"""
+LOCKS_TWICE = """
+lock, libc = ctypes.create_string_buffer(64), ctypes.PyDLL(None)
+libc.pthread_mutex_lock(lock)
+libc.pthread_mutex_lock(lock)
+"""
+
+
+def test_a_check_that_gets_stuck_below_python_costs_no_other_check_and_is_not_tried_again(tmp_path: Path) -> None:
+    seen = tmp_path / "seen"
+    once = f"open({str(seen)!r}, 'a').write('{{}}')\n"
+    given = job(
+        once.format("a") + "outcomes.passed('before')\nscore(1)",
+        once.format("b") + LOCKS_TWICE,
+        once.format("c") + "outcomes.passed('after')\nscore(1)",
+    )
+    given.cells.insert(0, Cell(grade_id="set_up", source=IN_A_CALL_FOR_EVER))
+    result = run_in_worker(given)
+    assert [check.points for check in result.checks] == [1.0, None, 1.0]
+    assert seen.read_text() == "abc"
+    stuck = result.checks[1]
+    assert stuck.outcomes[0].code == supervisor.STUCK
+    assert "<check 2 check1>" in stuck.outcomes[0].observed
+    assert stuck.flags
+
+
+def test_a_submission_that_gets_every_check_stuck_is_given_up(tmp_path: Path) -> None:
+    given = job(*[f"open({str(tmp_path / 'seen')!r}, 'a').write('x')\n" + LOCKS_TWICE] * 4)
+    given.cells.insert(0, Cell(grade_id="set_up", source=IN_A_CALL_FOR_EVER))
+    result = run_in_worker(given)
+    assert [check.points for check in result.checks] == [None] * 4
+    assert (tmp_path / "seen").read_text() == "x" * supervisor.LOST
+
+
+@pytest.mark.parametrize(("deaths", "points"), [(1, 1.0), (2, None)])
+def test_a_check_at_which_the_worker_dies_is_tried_once_more(tmp_path: Path, deaths: int, points: float | None) -> None:
+    seen = tmp_path / "seen"
+    seen.write_text("")
+    note = f"import os\nopen({str(seen)!r}, 'a').write('x')\n"
+    dies = note + f"if len(open({str(seen)!r}).read()) <= {deaths}: os._exit(1)\n"
+    good = "outcomes.passed('good')\nscore(1)"
+    result = run_in_worker(job(good, dies + good, good))
+    assert [check.points for check in result.checks] == [1.0, points, 1.0]
+    assert seen.read_text() == "xx"
 
 
 def test_logs_share_the_room_there_is() -> None:

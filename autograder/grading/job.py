@@ -6,6 +6,11 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from autograder.results import Isolation, Outcome
 
+CELL_SECONDS = 120.0
+"""Seconds after which a check cell is ended; all of them together have a limit too (`supervisor.SECONDS_PER_CHECK`)."""
+STUCK_SECONDS = 30.0
+"""Seconds more after which a cell that did not end is stuck in a call that no exception reaches: the worker ends."""
+
 
 class Cell(BaseModel):
     """One trusted code cell of a lab, in the notebook's order."""

@@ -15,20 +15,12 @@ from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass
 from pathlib import Path
 
-from pydantic import ValidationError
-
 from autograder.errors import KitError
-from autograder.grading.job import Cell, Job
-from autograder.results import SCHEMA_VERSION, CheckResult, Isolation, Outcome, Status, SubmissionResult
+from autograder.grading.job import Job
+from autograder.grading.supervisor import NO_RESULT, all_checks, run_in_worker, unknown
+from autograder.results import SCHEMA_VERSION, Isolation, Outcome, SubmissionResult
 from autograder.submission.lab import Lab
 from autograder.submission.reader import Submission, read_submission
-
-SECONDS_PER_CHECK = 30.0
-"""After this long for each check cell, in seconds, the worker itself is stuck: its own deadlines are shorter."""
-ATTEMPTS = 2
-"""A worker that dies is the grader's fault, so it gets a second chance before an instructor is asked."""
-_NO_RESULT = "no-result"
-"""The reason code of a check that the worker said nothing about."""
 
 
 @dataclass(frozen=True)
@@ -113,17 +105,13 @@ def _run(
 ) -> SubmissionResult:
     job = _job(submission, student, lab, settings)
     if not submission.readable:
-        return _all_checks(job, [_refused(submission.problems)] * len(lab.checks), points=0.0)
-    for _ in range(ATTEMPTS):
-        result = run_in_worker(job, stop)
-        if not _to_be_repeated(result):
-            break
-    return result
+        return all_checks(job, _refused(submission.problems), points=0.0)
+    return run_in_worker(job, stop)
 
 
 def _to_be_repeated(result: SubmissionResult) -> bool:
-    """Whether the worker kept back a check's result. What it decided, undecided checks included, stands."""
-    return any(outcome.code == _NO_RESULT for check in result.checks for outcome in check.outcomes)
+    """Whether a worker died and kept back a result. What was decided, and a check that gets stuck, stands."""
+    return any(outcome.code == NO_RESULT for check in result.checks for outcome in check.outcomes)
 
 
 def _job(submission: Submission, student: str, lab: Lab, settings: Settings) -> Job:
@@ -148,85 +136,6 @@ def _refused(problems: list[Outcome]) -> Outcome:
     """What every check says of a submission that could not be read."""
     problem = problems[-1]
     return problem.model_copy(update={"title": "there is a notebook to check"})
-
-
-def run_in_worker(job: Job, stop: threading.Event | None = None) -> SubmissionResult:
-    """Run a job's checks in the sandbox. A worker that dies, hangs or talks nonsense means: could not find out."""
-    from autograder.sandbox.outer import run_in_sandbox
-
-    limit = _limit(len(_checks(job)))
-    run = run_in_sandbox(
-        ["autograder.grading.worker"], job.model_dump_json().encode("utf-8"), job.isolation, limit, stop
-    )
-    if run.timed_out:
-        return unknown(job, f"The grader took longer than {limit:.0f} s.", run.stderr)
-    try:
-        result = SubmissionResult.model_validate_json(run.stdout)
-    except ValidationError:
-        return unknown(job, f"The grader ended with status {run.status} and no result.", run.stderr)
-    return believed(job, result)
-
-
-def _limit(checks: int) -> float:
-    """Seconds after which a worker with so many checks is stuck."""
-    return 60.0 + SECONDS_PER_CHECK * checks
-
-
-def believed(job: Job, result: SubmissionResult) -> SubmissionResult:
-    """Keep of a worker's result what belongs to the job; a check that is missing or impossible is undecided."""
-    if (result.student, result.lab, result.digest) != (job.student, job.lab, job.digest):
-        return unknown(job, "The grader answered for another submission.", "")
-    by_id = {check.grade_id: check for check in result.checks}
-    checks = []
-    for cell in _checks(job):
-        check = by_id.get(cell.grade_id)
-        possible = check is not None and (check.points is None or 0.0 <= check.points <= check.max_points)
-        if check is None or not possible or check.max_points != cell.points:
-            check = _undecided(cell, "The grader returned no usable result for this check.", "")
-        checks.append(check.model_copy(update={"title": cell.title}))
-    return result.model_copy(update={"checks": checks, "isolation": job.isolation, "seed": job.seed})
-
-
-def unknown(job: Job, because: str, stderr: str) -> SubmissionResult:
-    """Return a result in which no check is decided, for an instructor to look at."""
-    outcome = _undecided(Cell(grade_id="", points=0.0, source=""), because, stderr).outcomes[0]
-    return _all_checks(job, [outcome] * len(_checks(job)), points=None)
-
-
-def _checks(job: Job) -> list[Cell]:
-    return [cell for cell in job.cells if cell.points is not None]
-
-
-def _undecided(cell: Cell, because: str, stderr: str) -> CheckResult:
-    outcome = Outcome(
-        status=Status.UNKNOWN,
-        title="the grader finished this check",
-        because=because,
-        observed="\n".join(stderr.strip().splitlines()[-5:])[-1000:],
-        hint="No points are taken. Your instructor decides.",
-        code=_NO_RESULT,
-    )
-    return CheckResult(
-        grade_id=cell.grade_id, title=cell.title, max_points=cell.points or 0.0, points=None, outcomes=[outcome]
-    )
-
-
-def _all_checks(job: Job, outcomes: list[Outcome], points: float | None) -> SubmissionResult:
-    checks = [
-        CheckResult(
-            grade_id=cell.grade_id, title=cell.title, max_points=cell.points or 0.0, points=points, outcomes=[outcome]
-        )
-        for cell, outcome in zip(_checks(job), outcomes, strict=True)
-    ]
-    return SubmissionResult(
-        student=job.student,
-        lab=job.lab,
-        digest=job.digest,
-        isolation=job.isolation,
-        seed=job.seed,
-        problems=job.problems,
-        checks=checks,
-    )
 
 
 def run_class(

@@ -1,12 +1,14 @@
 """Runs the trusted check cells of one submission, inside the grading sandbox.
 
-Reads a `Job` as JSON from standard input and writes a `SubmissionResult` as JSON to standard output. The student's
-programs are text until the node sandbox starts them; nothing of theirs is imported here.
+Reads a `Job` as JSON from standard input and writes to standard output, for each check as soon as it is decided, a line
+with a `SubmissionResult` as JSON that holds this one check. When it is stuck, its stacks are the last thing it writes.
+The student's programs are text until the node sandbox starts them; nothing of theirs is imported here.
 """
 
 from __future__ import annotations
 
 import ast
+import faulthandler
 import linecache
 import os
 import resource
@@ -14,20 +16,19 @@ import signal
 import sys
 import time
 import traceback
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, TextIO
 
 from autograder.checks import session
 from autograder.checks.session import Score
-from autograder.grading.job import Cell, Job
+from autograder.grading.job import CELL_SECONDS, STUCK_SECONDS, Cell, Job
 from autograder.results import CheckResult, NodeLog, Outcome, Status, SubmissionResult
 from autograder.sandbox.limits import MIB
 from autograder.sandbox.scratch import Scratch
 
 MEMORY = 2048 * MIB
 """Bytes that the worker may take for itself: what a student wrote may unfold in it, and then fails its own check."""
-CELL_SECONDS = 120.0
-"""Seconds after which a check cell is ended; all of them together have a limit too (`stage_a.SECONDS_PER_CHECK`)."""
 TEXT_KEPT = 8000
 """Characters of one text in an outcome."""
 OUTCOMES_KEPT = 400
@@ -35,45 +36,48 @@ LOGS_KEPT = 8 * MIB
 """Characters of all programs' output together."""
 
 
-def run_job(job: Job, folder: Path) -> SubmissionResult:
-    """Run every cell of the job, in order, and give the result.
+def run_job(job: Job, folder: Path, stacks: TextIO = sys.stderr) -> Iterator[SubmissionResult]:
+    """Run every cell of the job, in order, and give a result for each check, with its logs, once it is decided.
 
     Args:
         job: the submission and the cells.
         folder: an empty folder for the programs and files; it becomes the working directory of the programs.
+        stacks: where the stacks of all threads are written before a process that is stuck ends itself.
     """
-    started = time.monotonic()
     for name, text in job.files.items():
         (folder / name).write_text(text, encoding="utf-8")
     session.current.configure(folder, job.isolation, job.seed, job.answers)
     if job.files:
         _ = session.current.sandbox  # it warms up while the set-up cells import their messages
-    result = SubmissionResult(
-        student=job.student,
-        lab=job.lab,
-        digest=job.digest,
-        isolation=job.isolation,
-        seed=job.seed,
-        problems=job.problems,
-    )
     namespace: dict[str, Any] = {"__name__": "check_cells"}
+    logs_kept = LOGS_KEPT // max(1, sum(cell.points is not None for cell in job.cells))
     broken_set_up = ""
     try:
         for number, cell in enumerate(job.cells):
+            started = time.monotonic()
             session.reset()
+            faulthandler.dump_traceback_later(CELL_SECONDS + STUCK_SECONDS, exit=True, file=stacks)
             error, value = _run_cell(cell, number, namespace)
+            faulthandler.cancel_dump_traceback_later()
             if cell.points is None:
                 broken_set_up = broken_set_up or error
                 continue
-            check = _check_result(cell, value, error or broken_set_up)
-            result.checks.append(check)
-            for log in session.current.logs + session.current.scored_logs:
-                result.logs.append(log.model_copy(update={"grade_id": cell.grade_id}))
-        result.logs = _within(result.logs, LOGS_KEPT)
+            logs = [
+                log.model_copy(update={"grade_id": cell.grade_id})
+                for log in session.current.logs + session.current.scored_logs
+            ]
+            yield SubmissionResult(
+                student=job.student,
+                lab=job.lab,
+                digest=job.digest,
+                isolation=job.isolation,
+                checks=[_check_result(cell, value, error or broken_set_up)],
+                logs=_within(logs, logs_kept),
+                seconds={"checks": round(time.monotonic() - started, 3)},
+            )
     finally:
+        faulthandler.cancel_dump_traceback_later()
         session.current.close()
-    result.seconds["checks"] = round(time.monotonic() - started, 3)
-    return result
 
 
 def _check_result(cell: Cell, value: object, error: str) -> CheckResult:
@@ -157,8 +161,9 @@ def main() -> int:
         scratch.chmod(0o755)
         folder = scratch / "submission"
         folder.mkdir(mode=0o755)
-        result = run_job(job, folder)
-    out.write(result.model_dump_json())
+        for result in run_job(job, folder, out):
+            out.write(result.model_dump_json() + "\n")
+            out.flush()
     out.close()
     return 0
 
