@@ -14,7 +14,7 @@ import pytest
 from diagnosis_cases import CASES
 
 import autograder.diagnosis
-from autograder.checks import launch, session
+from autograder.checks import Node, launch, session
 from autograder.diagnosis import Diagnosis, Scene
 from autograder.diagnosis.codes import CODES
 from autograder.diagnosis.events import read
@@ -105,3 +105,25 @@ def test_what_a_probe_does_not_write_is_ignored_and_a_probe_that_failed_is_not_b
     assert [event.e for event in read([*forged, {"e": "attached"}])] == ["attached"]
     failed = {"e": "probe_failed", "what": "_prepare_node: AttributeError"}
     assert [event.e for event in read([failed, {"e": "attached", "more": 1}])] == ["probe_failed", "attached"]
+
+
+LATE = """\
+import sys, threading
+import rclpy
+rclpy.init()
+if "__ns:=/late" in sys.argv:
+    threading.Event().wait()
+rclpy.spin(rclpy.create_node("twin"))
+"""
+
+
+def test_where_a_program_runs_twice_the_node_of_one_is_not_the_misplaced_node_of_the_other(tmp_path: Path) -> None:
+    (tmp_path / "twin.py").write_text(LATE)
+    session.current.configure(tmp_path, Isolation.NONE, 7)
+    with launch(Node("twin", namespace="/first"), Node("twin", namespace="/late"), Node("twin")) as ros:
+        ros.observer.wait(lambda: {"/first/twin", "/twin"} <= set(ros.observer.nodes()), 20.0)
+        ros.observer.wait(lambda: all(inside.attached for inside in ros.scene().insides), 20.0)
+        late, astray = [autograder.diagnosis.why_no_node(ros.scene(), f"/{where}/twin") for where in ("late", "astray")]
+    session.current.close()
+    assert late.code == "no-node" and "runs, but" in late.because
+    assert astray.code == "namespace" and "namespace: `/twin`." in astray.because

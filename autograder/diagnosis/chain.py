@@ -7,7 +7,7 @@ blocked callback keeps others from running, and only where callbacks can run doe
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 from autograder.diagnosis import blocked, callbacks, spinning
@@ -43,5 +43,9 @@ SEEN: tuple[Link, ...] = (
 
 def inside_reason(scene: Scene, node: str = "") -> Diagnosis | None:
     """Why a program that lives does nothing: the first broken link inside the program of `node`, or inside any."""
-    insides = scene.inside_of(node) if node else scene.insides
+    return reason_inside(scene.inside_of(node) if node else scene.insides)
+
+
+def reason_inside(insides: Sequence[Inside]) -> Diagnosis | None:
+    """The first broken link inside one of these programs."""
     return first(SAID, insides) or first(SEEN, [inside for inside in insides if inside.alive])

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from autograder.diagnosis.base import Diagnosis, Scene
-from autograder.diagnosis.chain import inside_reason
+from autograder.diagnosis.chain import inside_reason, reason_inside
 from autograder.diagnosis.events import Thing
+from autograder.diagnosis.inside import Inside
 from autograder.diagnosis.programs import program_trouble
 from autograder.graph import remap_rules
 from autograder.graph.names import full_name, nearest, type_name
@@ -27,8 +30,35 @@ def _no_node_at_all(scene: Scene) -> Diagnosis:
     )
 
 
+def _namespace(rules: Sequence[str]) -> str:
+    """The namespace that a program was started in, without the slash at its end."""
+    named = [rule.right for rule in map(remap_rules.parse, rules) if rule and rule.left == "__ns" and not rule.prefix]
+    return named[0].rstrip("/") if named else ""
+
+
+def _around(scene: Scene, name: str) -> list[Inside]:
+    """The programs that were started in the namespace of a name, the innermost one; all where none was."""
+    started = [(_namespace(rules), inside) for inside, rules in zip(scene.insides, scene.rules, strict=False)]
+    depth = max((len(space) for space, _ in started if name.startswith(f"{space}/")), default=-1)
+    return [inside for space, inside in started if len(space) == depth and name.startswith(f"{space}/")] or (
+        scene.insides
+    )
+
+
+def _twins(scene: Scene, name: str) -> set[str]:
+    """The nodes of further runs, elsewhere, of the programs around a name: they are where they belong, not misnamed."""
+    around = _around(scene, name)
+    programs = {inside.name for inside in around}
+    return {
+        node for inside in scene.insides if inside not in around and inside.name in programs for node in inside.nodes
+    }
+
+
 def why_no_node(scene: Scene, wanted: str) -> Diagnosis:
-    """Why the node `wanted` is not on the graph."""
+    """Why the node `wanted` is not on the graph.
+
+    Another node is brought up only where each program that was started around this name shows one of its own.
+    """
     trouble = program_trouble(scene)
     if trouble:
         return trouble
@@ -38,16 +68,22 @@ def why_no_node(scene: Scene, wanted: str) -> Diagnosis:
     doubles = [name for name in names if names.count(name) > 1]
     if doubles:
         return why_doubled(scene, doubles[0])
+    around = _around(scene, wanted)
+    own = sorted(set(names) - _twins(scene, wanted))
+    silent = [inside for inside in around if inside.alive and inside.nodes.keys().isdisjoint(names)]
+    if silent or not own:
+        silent = silent or around
+        return reason_inside(silent) or Diagnosis(f"`{silent[0].name}` runs, but its node is not there.", "no-node")
     base = wanted.rsplit("/", 1)[-1]
-    for name in names:
-        if name.rsplit("/", 1)[-1] == base:
-            return Diagnosis(
-                f"The node `{base}` exists, but in another namespace: `{name}`.",
-                "namespace",
-                "A namespace is given at the start (`-r __ns:=/name`, in a launch file `namespace` or "
-                "`push_ros_namespace` above it in the same group), and reaches every node that does not fix its own.",
-            )
-    close = nearest(wanted, names) or names[0]
+    there = [name for name in own if name.rsplit("/", 1)[-1] == base]
+    if there:
+        return Diagnosis(
+            f"The node `{base}` exists, but in another namespace: {', '.join(f'`{name}`' for name in there)}.",
+            "namespace",
+            "A namespace is given at the start (`-r __ns:=/name`, in a launch file `namespace` or "
+            "`push_ros_namespace` above it in the same group), and reaches every node that does not fix its own.",
+        )
+    close = nearest(wanted, own) or own[0]
     return Diagnosis(
         f"There is no node `{wanted}`; the nearest name on the graph is `{close}`.",
         "node-name",
@@ -143,9 +179,13 @@ def why_no_endpoint(scene: Scene, topic: str, msg_type: type | None, kind: str, 
         if end.topic_type == (wanted or end.topic_type)
         and full_name(end.node_namespace, end.node_name) == (node or full_name(end.node_namespace, end.node_name))
     }
-    found = _idle_rule(scene, topic, node) or _elsewhere(
-        scene, topic, kind, [name for name in used if (name in meant if meant else reach(name))]
-    )
+    twins = _twins(scene, topic)
+    near = [
+        name
+        for name in (meant or used)
+        if not {full_name(end.node_namespace, end.node_name) for end in reach(name)} <= twins
+    ]
+    found = _idle_rule(scene, topic, node) or _elsewhere(scene, topic, kind, near)
     if found:
         return found
     opposite = observer.subscriptions(topic) if kind == "publisher" else observer.publishers(topic)
@@ -219,8 +259,10 @@ def why_no_service(scene: Scene, name: str, srv_type: type) -> Diagnosis:
         return Diagnosis(f"The service `{name}` has the type {services[name][0]}, not {wanted}.", "wrong-type")
     if not scene.observer.nodes():
         return _no_node_at_all(scene)
+    twins = _twins(scene, name)
+    elsewhere = {t.name for i in scene.insides for t in i.things.values() if t.kind == "service" and t.node in twins}
     names = [n for n, types in services.items() if not types[0].startswith(("rcl_interfaces/", "type_description"))]
-    close = nearest(name, names)
+    close = nearest(name, [n for n in names if n not in elsewhere])
     if close and close != name:
         made = _made_as(scene, "service", close)
         given = made[0].given if made else ""
