@@ -11,7 +11,7 @@ class TwoMutex(Node):
     def __init__(self):
         super().__init__("two_mutex")
         self.declare_parameter("period", 0.4)  # seconds, of all four timers
-        self.declare_parameter("work", 0.15)  # seconds, of all four callbacks
+        self.declare_parameter("work", 0.12)  # seconds, of a1 and b1; a2 and b2 take half as long again
         self.period = self.get_parameter("period").value
         self.work = self.get_parameter("work").value
         self.activity = self.create_publisher(String, "activity", 10)
@@ -22,22 +22,22 @@ class TwoMutex(Node):
         self.create_timer(self.period, self.b1, callback_group=self.group_b)
         self.create_timer(self.period, self.b2, callback_group=self.group_b)
 
-    def run(self, name):
+    def run(self, name, seconds):
         self.activity.publish(String(data=f"{name} begin"))
-        time.sleep(self.work)
+        time.sleep(seconds)
         self.activity.publish(String(data=f"{name} end"))
 
     def a1(self):
-        self.run("a1")
+        self.run("a1", self.work)
 
     def a2(self):
-        self.run("a2")
+        self.run("a2", 1.5 * self.work)
 
     def b1(self):
-        self.run("b1")
+        self.run("b1", self.work)
 
     def b2(self):
-        self.run("b2")
+        self.run("b2", 1.5 * self.work)
 
 
 def spin(node):
