@@ -286,7 +286,7 @@ CASES = {
     "two_periods": Case(
         "self.create_timer(500.0, lambda: None)\nself.create_timer(0.05, lambda: None)\n",
         says="silent",
-        because="every 0.05 s) fired",
+        because="every 500 s) has not fired, the timer (line",
         never=("timer-period",),
     ),
     # Together.

@@ -143,7 +143,7 @@ def test_a_right_node_earns_the_points_under_names_and_values_that_vary(grade: G
          "qos-reliability", "best effort"),
         ("", "", 'ros.expect_messages("/chatter", Int32, within=6)', "wrong-type", "std_msgs/msg/String"),
         ("", "", 'ros.expect_messages("/chatter", String, rate=5)', "rate", "instead of 5 Hz"),
-        ("", "", 'ros.expect_parameter("/talker", "wrd", 1)', "parameter-undeclared", "word"),
+        ("", "", 'ros.expect_parameter("/talker", "wrd", 1)', "parameter-undeclared", "; it has period, word."),
         ("", "", 'ros.expect_parameter("/talker", "period", 1.0)', "parameter-value", "0.05"),
         ("", "", 'ros.publish("/topic", String())', "no-topic", ""),
         ("", "", 'ros.expect_exit("talker", within=4)', "still-running", "still runs"),

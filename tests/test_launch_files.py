@@ -156,6 +156,26 @@ def test_conditions(tmp_path: Path, condition: str, starts: int) -> None:
     assert len(read(tmp_path, f"launch:\n{CAMERA}, {condition}}}\n", on="False")) == starts
 
 
+def test_the_courses_file_can_stand_in_for_an_included_one_and_names_its_own_program(tmp_path: Path) -> None:
+    (tmp_path / "inner.launch.yaml").write_text("a student's file that cannot be read")
+    (tmp_path / "course.launch.yaml").write_text(
+        'launch:\n- arg: {name: side}\n- node: {pkg: camera_lab, exec: course, args: "$(var side)"}\n'
+    )
+    outer = tmp_path / "outer.launch.yaml"
+    include = "launch:\n- include: {file: $(dirname)/inner.launch.yaml, arg: [{name: side, value: left}]}\n"
+
+    def started(text: str) -> list[tuple[str, list[str]]]:
+        outer.write_text(text)
+        found = read_launch_file(outer, {}, None, ["camera_demo"], {"inner.launch.yaml": "course.launch.yaml"})
+        return [(node.program, node.arguments) for node in found]
+
+    assert started(include) == [("course", ["left"])]
+    with pytest.raises(LaunchFileError, match=r"`inner\.launch\.yaml` has no default for it"):
+        started(include.replace("side, value", "other, value"))
+    with pytest.raises(LaunchFileError, match=r"has no program `course`\. It has `camera_demo`"):
+        started("launch:\n- node: {pkg: camera_lab, exec: course}\n")
+
+
 def test_what_an_included_file_sets_stays_set_unless_a_group_holds_it(tmp_path: Path) -> None:
     (tmp_path / "inner.launch.yaml").write_text(
         'launch:\n- arg: {name: "side"}\n- push_ros_namespace: {namespace: "$(var side)"}\n' + CAMERA + "}\n"

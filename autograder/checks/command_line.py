@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import shlex
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from autograder import student_yaml
@@ -34,6 +35,8 @@ class CommandLine:
     entry: str
     then: tuple[str, ...] = ()
     """Words that the course adds after the student's."""
+    keep: Callable[[str, str], bool] | None = None
+    """Which options with a word of theirs are kept, such as `-r` and its rule; all without it."""
 
     def words(self) -> list[str]:
         """The words after `--ros-args`.
@@ -62,7 +65,13 @@ class CommandLine:
             option = "" if option or word in _ALONE else word
         if option:
             raise CommandLineError(f"`{self.entry}` in `{self.file}` ends with `{words[-1]}`.", "command-line")
-        return [*words, *self.then]
+        return [*self._kept(words), *self.then]
+
+    def _kept(self, words: list[str]) -> list[str]:
+        if self.keep is None:
+            return words
+        pairs = [(option, word) for option, word in itertools.pairwise(words) if option in _WITH_A_WORD]
+        return [word for pair in pairs if self.keep(*pair) for word in pair]
 
     def _text(self) -> str:
         try:
@@ -79,12 +88,16 @@ class CommandLine:
         return text
 
 
-def command_line(file: str, entry: str, *, then: Sequence[str] = ()) -> CommandLine:
+def command_line(
+    file: str, entry: str, *, then: Sequence[str] = (), keep: Callable[[str, str], bool] | None = None
+) -> CommandLine:
     """The words that a student wants after `--ros-args`, for `launch(…, ros_arguments=…)`.
 
     Args:
         file: the student's `%%file` of `entry: words` lines.
         entry: which of them.
         then: words that follow the student's.
+        keep: asked for each option and its word, such as `-r` and `old:=new`, whether they are kept: what one mistake
+            ends can be looked at without it.
     """
-    return CommandLine(file, entry, tuple(then))
+    return CommandLine(file, entry, tuple(then), keep)

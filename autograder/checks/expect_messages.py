@@ -534,7 +534,7 @@ class MessageExpectations(GraphExpectations):
                 or diagnosis.waits_for_its_group(scene)
                 or diagnosis.why_not_together(scene, activity or topic)
                 or Diagnosis(
-                    f"At most {max(seen, default=0)} messages came on `{topic}` in one run. "
+                    f"The most that came on `{topic}` in one run is {max(seen, default=0)}. "
                     + diagnosis.layout(scene, activity or topic),
                     "paused",
                 ),

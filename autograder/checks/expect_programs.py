@@ -138,7 +138,10 @@ class ProgramExpectations(GraphExpectations):
                 diagnosis.program_trouble(self.scene())
                 or diagnosis.inside_reason(self.scene())
                 or Diagnosis(
-                    "No such message was logged." if not matching() else f"It came {len(matching())} times.", "no-log"
+                    {0: "No such message was logged.", 1: "It came once."}.get(
+                        len(matching()), f"It came {len(matching())} times."
+                    ),
+                    "no-log",
                 )
             ),
             expected=text,

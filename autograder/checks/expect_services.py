@@ -23,8 +23,25 @@ if TYPE_CHECKING:
 _NO_RESULT = "Callback returned an invalid type"
 """What rclpy says in place of a reason."""
 
+_EVERY_NODE = ("use_sim_time", "start_type_description_service")
+"""Parameters that rclpy declares for every node."""
+
+_KINDS = {bool: "a bool", int: "an integer", float: "a double", str: "a text", type(None): "without a value"}
+
 ANSWER_WITHIN = 5.0
-"""Seconds that an answer may take: a local round trip takes 1 to 4 ms, a stuck node takes for ever."""
+"""Seconds that an answer may take: a local round trip takes 1 to 4 ms, a stuck node does not answer."""
+
+
+def _other_value(found: Any, wanted: Any) -> Diagnosis:
+    """What a parameter is instead; where its type differs, that is said."""
+    kind, asked = _KINDS.get(type(found), "a list"), _KINDS.get(type(wanted), "a list")
+    if kind == asked:
+        return Diagnosis(f"It is {found!r}.", "parameter-value")
+    return Diagnosis(
+        f"It is {found!r}, {kind}, and not {asked}.",
+        "parameter-value",
+        "40 is an integer, 40.0 a double, '40' a text. Given another type than it declares, a node ends at its start.",
+    )
 
 
 class ServiceExpectations(GraphExpectations):
@@ -130,7 +147,7 @@ class ServiceExpectations(GraphExpectations):
         except (ServiceMissing, parameters.NoAnswer) as error:
             self._no_parameters(title, node, error, hint)
         if name not in have:
-            own = [p for p in declared if p != "use_sim_time" and "qos_overrides" not in p]
+            own = [one for one in declared if one not in _EVERY_NODE and "qos_overrides" not in one]
             self.fail(
                 title,
                 Diagnosis(
@@ -152,7 +169,7 @@ class ServiceExpectations(GraphExpectations):
             lambda: (
                 self._file_for_others(node)
                 or self._given_as_a_rule(name)
-                or Diagnosis(f"It is {have[name]!r} ({type(have[name]).__name__}).", "parameter-value")
+                or _other_value(have[name], value)
             ),
             expected=repr(value),
             observed=repr(have[name]),
@@ -164,7 +181,7 @@ class ServiceExpectations(GraphExpectations):
         for text in itertools.chain.from_iterable(self.scene().rules):
             rule = remap_rules.parse(text)
             if rule and rule.left == name:
-                because = f"`{text}` is given as a remap rule, and rules reach topics and services, no parameters."
+                because = f"`{text}` is given as a remap rule; such rules rename topics and services, not parameters."
                 return Diagnosis(because, "parameter-as-rule", f"Give it as a parameter: `-p {text}`.")
         return None
 

@@ -108,11 +108,13 @@ class Launch(MessageExpectations, ServiceExpectations, LifecycleExpectations, Pr
         lifecycle: Iterable[str],
         file: tuple[str, Mapping[str, str], str] | None = None,
         programs: Mapping[str, Node] | None = None,
+        includes: Mapping[str, str] | None = None,
     ) -> None:
         """Use `launch` or `launch_file`."""
         self.nodes = list(nodes)
         self._file = file
         self._stand_ins = dict(programs or {})
+        self._includes = dict(includes or {})
         self._listen, self._serve, self._lifecycle = list(listen), list(serve), list(lifecycle)
         self.programs: list[tuple[Node, Program]] = []
         self._missing: list[str] = []
@@ -164,7 +166,7 @@ class Launch(MessageExpectations, ServiceExpectations, LifecycleExpectations, Pr
         programs = set(self._stand_ins) or {path.stem for path in folder.glob("*.py")}
         session.current.use(name)
         try:
-            found = read_launch_file(folder / name, arguments, find, programs)
+            found = read_launch_file(folder / name, arguments, find, programs, self._includes)
         except LaunchFileError as error:
             self._trouble.append(Diagnosis(str(error), "launch-file", error.hint))
             return []
@@ -352,6 +354,7 @@ def launch_file(
     *,
     package: str,
     programs: Mapping[str, Node] | None = None,
+    includes: Mapping[str, str] | None = None,
     listen: Iterable[tuple[str, type]] = (),
     lifecycle: Iterable[str] = (),
 ) -> Launch:
@@ -362,7 +365,9 @@ def launch_file(
         arguments: launch arguments, as `name:=value` after `ros2 launch PACKAGE FILE`.
         package: the name of the package that the student's programs are said to be in.
         programs: the course's own program to start where the file says `exec: NAME`, by that name.
+        includes: the course's own launch file to read where the file includes NAME, by that name; it may start any
+            program of the lab.
         listen: (topic, message class) to record from before the start.
         lifecycle: full names of lifecycle nodes whose transition events are recorded from before the start.
     """
-    return Launch([], listen, (), lifecycle, (file, dict(arguments or {}), package), programs)
+    return Launch([], listen, (), lifecycle, (file, dict(arguments or {}), package), programs, includes)

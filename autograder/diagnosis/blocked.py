@@ -190,7 +190,7 @@ def stuck(inside: Inside) -> Diagnosis | None:
         return Diagnosis(
             f"`{inside.name}`: {called(thing)} has been running one callback for {since:.1f} s. It is in {place}.",
             "stuck-callback",
-            "A callback has to come to its end; what belongs to it waits for that.",
+            "A callback has to return: until then it holds its thread, and its group if that is mutually exclusive.",
         )
     return None
 

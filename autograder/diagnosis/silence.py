@@ -95,9 +95,7 @@ def account(scene: Scene, topic: str) -> str:
     runs: list[str] = []
     for thing in inside.callbacks:
         if thing.node == publisher.node:
-            verb = {"timer": "fired", "subscription": "got a message", "service": "was asked"}[thing.kind]
-            times = {0: "never", 1: "once"}.get(thing.runs, f"{thing.runs} times")
-            runs.append(f"{called(thing)} {verb} {times}")
+            runs.append(f"{called(thing)} {_ran(thing.kind, thing.runs)}")
     said += runs[:6]
     sent = {0: "nothing was published", 1: "one message was published"}.get(
         publisher.runs, f"{publisher.runs} messages were published"
@@ -105,6 +103,14 @@ def account(scene: Scene, topic: str) -> str:
     if publisher.runs:
         sent += f", the last of them {inside.now - publisher.last:.1f} s ago"
     return f"{', '.join(said)}, and {sent}."
+
+
+def _ran(kind: str, runs: int) -> str:
+    """How often a callback of this kind ran, as the end of a sentence."""
+    if kind == "timer":
+        return {0: "has not fired", 1: "fired once"}.get(runs, f"fired {runs} times")
+    came = "message" if kind == "subscription" else "request"
+    return {0: f"got no {came}", 1: f"got one {came}"}.get(runs, f"got {runs} {came}s")
 
 
 def why_no_answer(scene: Scene, name: str) -> Diagnosis:
@@ -119,10 +125,11 @@ def why_no_answer(scene: Scene, name: str) -> Diagnosis:
     for inside in insides:
         for thing in inside.things.values():
             if thing.kind == "service" and thing.name == name:
-                asked = {0: "has not run", 1: "ran once"}.get(thing.runs, f"ran {thing.runs} times")
+                ran = {0: "has not run", 1: "ran once"}.get(thing.runs, f"ran {thing.runs} times")
+                ended = "" if thing.done == thing.runs else f"; of these runs, {thing.runs - thing.done} did not end"
                 return Diagnosis(
                     f"The service `{name}` is on the graph and its node is spun, but no answer came; its callback "
-                    f"{asked} and ended {thing.done} times.",
+                    f"{ran}{ended}.",
                     "no-answer",
                 )
     return Diagnosis(f"The service `{name}` is on the graph, but no answer came.", "no-answer")

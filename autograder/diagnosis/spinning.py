@@ -26,9 +26,9 @@ def in_the_constructor(inside: Inside) -> Diagnosis | None:
     if place is None or place.function != "__init__":
         return None
     return Diagnosis(
-        f"`{inside.name}` is still in `__init__`, in {place}: it never comes to spinning, so no callback can run.",
+        f"`{inside.name}` is still in `__init__`, in {place}: it has not reached its spinning, so no callback can run.",
         "stuck-in-init",
-        "A constructor has to come to its end. What must happen again and again belongs into a timer.",
+        "A constructor has to end. What must happen again and again belongs in a timer.",
     )
 
 

@@ -184,7 +184,7 @@ def _starved(inside: Inside, timer: Thing) -> Diagnosis | None:
     if timer.exclusive and _taken(inside, others) > MOST_OF_THE_TIME * lasted:
         group = "the node's default group" if timer.default_group else "one mutually exclusive group"
         return Diagnosis(
-            f"`{inside.name}`: {called(timer)} ran {_times(timer.runs)}. It is in {group} with {listed(others)}; while "
+            f"`{inside.name}`: {called(timer)} {_ran(timer.runs)}. It is in {group} with {listed(others)}; while "
             "one of a mutually exclusive group runs, the others wait, and these took most of the time.",
             "starved",
             "Callbacks that must not wait for each other need different groups.",
@@ -193,7 +193,7 @@ def _starved(inside: Inside, timer: Thing) -> Diagnosis | None:
     if _taken(inside, others) > MOST_OF_THE_TIME * lasted * executor.size and executor.most >= executor.size:
         threads = "the only thread" if executor.size == 1 else f"all {executor.size} threads"
         return Diagnosis(
-            f"`{inside.name}`: {called(timer)} ran {_times(timer.runs)}: {listed(others)} kept {threads} of the "
+            f"`{inside.name}`: {called(timer)} {_ran(timer.runs)}: {listed(others)} kept {threads} of the "
             f"{executor.type} busy most of the time.",
             "single-threaded-executor" if executor.threads is None else "few-threads",
             "Callbacks that must not wait for each other need threads of their own."
@@ -209,8 +209,8 @@ def _taken(inside: Inside, things: Sequence[Thing]) -> float:
     return sum(thing.spent + sum(now - began for began, _ in thing.running) for thing in things)
 
 
-def _times(number: int) -> str:
-    return {0: "never", 1: "once"}.get(number, f"{number} times only")
+def _ran(number: int) -> str:
+    return {0: "did not run", 1: "ran only once"}.get(number, f"ran only {number} times")
 
 
 def layout(scene: Scene, topic: str) -> str:

@@ -66,4 +66,4 @@ def why_not_reached(text: str, node: str) -> str | None:
     if not keys or any(is_for(key, node) for key in keys):
         return None
     written = ", ".join(f"`{key[:60]}`" for key in keys[:4]) + (", …" if len(keys) > 4 else "")
-    return f"The file has values for {written}, and the node is `{node}`: they are left out without a word."
+    return f"The file has values for {written}, and the node is `{node}`: it gets none, and ROS 2 does not warn."

@@ -148,7 +148,7 @@ class Doing:
                 f"there is no package `{package}`.",
                 "`pkg` is the package's name and `exec` the program's: see the task.",
             ) from None
-        if program.endswith(".py") or (packages.programs is not None and program not in packages.programs):
+        if program.endswith(".py") or not packages.has(program, self.place.file):
             listed = ", ".join(f"`{name}`" for name in sorted(packages.programs or []))
             raise self.place.at("exec").error(
                 f"the package `{package}` has no program `{program}`.{f' It has {listed}.' if listed else ''}",

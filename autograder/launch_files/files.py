@@ -7,16 +7,28 @@ folder. `$(dirname)` is that folder, and `$(find-pkg-share PACKAGE)/launch` lead
 from __future__ import annotations
 
 import os.path
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
 
 
 class Packages:
     """The packages that a launch file may name."""
 
-    def __init__(self, find: Callable[[str], Path], programs: Collection[str] | None) -> None:
-        """Ask `find` for the folder of a package, KeyError if there is none; None: any program is taken to exist."""
+    def __init__(
+        self,
+        find: Callable[[str], Path],
+        programs: Collection[str] | None,
+        stand_ins: Mapping[str, str] | None = None,
+    ) -> None:
+        """Keep what the packages hold.
+
+        Args:
+            find: asked for the folder of a package, KeyError if there is none.
+            programs: names of a package's programs; None: any program is taken to exist.
+            stand_ins: names of launch files to read in place of others, by the names of those.
+        """
         self.programs = programs
+        self.stand_ins = dict(stand_ins or {})
         self._find = find
         self._folders: dict[str, Path] = {}
 
@@ -38,6 +50,14 @@ class Packages:
         """
         return f"{self.folder(name)}/share/{name}"
 
+    def called(self, path: Path) -> str:
+        """The name by which the launch files know a file: of a stand-in, the one that it stands for."""
+        return next((name for name, file in self.stand_ins.items() if file == path.name), path.name)
+
+    def has(self, program: str, file: str) -> bool:
+        """Whether a launch file may start a program; a stand-in may start any."""
+        return self.programs is None or program in self.programs or file in self.stand_ins.values()
+
     def file(self, text: str, folder: Path) -> Path | None:
         """The file that a path leads to once the package is installed; None if there is none, or not in the lab.
 
@@ -58,5 +78,5 @@ class Packages:
         parent, name = os.path.split(os.path.normpath(f"/r{installed[longest]}{text[len(longest) :]}"))
         places = {f"/r/share/{package}/launch": place for package, place in self._folders.items()}
         holder = {"/r/share/launch": folder.resolve(), **places}.get(parent)
-        path = holder / name if holder else None
+        path = holder / self.stand_ins.get(name, name) if holder else None
         return path if path and path.is_file() and path.resolve().parent == holder else None

@@ -21,6 +21,7 @@ def read_launch_file(
     arguments: Mapping[str, str],
     find: Callable[[str], Path] | None = None,
     programs: Collection[str] | None = None,
+    stand_ins: Mapping[str, str] | None = None,
 ) -> list[LaunchedNode]:
     """Read a launch file and say what it starts, in its order.
 
@@ -30,6 +31,7 @@ def read_launch_file(
         find: the folder with a package's files; KeyError if there is no such package. Without it every
             package is the folder of the launch file.
         programs: names of the programs that a package has; without it they are not looked at.
+        stand_ins: names of launch files to read in place of included ones, by the names of those.
 
     Raises:
         LaunchFileError: it is missing, is no launch file, is refused by `ros2 launch`, or uses what is not covered.
@@ -37,7 +39,8 @@ def read_launch_file(
     folder = path.resolve().parent
     reader = _Reader()
     context = Context(
-        Packages(find or (lambda package: folder), programs), {name: str(value) for name, value in arguments.items()}
+        Packages(find or (lambda package: folder), programs, stand_ins),
+        {name: str(value) for name, value in arguments.items()},
     )
     reader.file(path, context, set(arguments), Place(path.name, folder), depth=1)
     return reader.nodes
@@ -58,11 +61,12 @@ class _Reader:
         for action in _required(actions):
             name = action.given["name"]
             if name not in given:
-                asks = f"`{path.name}` has" if depth > 1 else "it has"
+                called = context.packages.called(path)
+                asks = f"`{called}` has" if depth > 1 else "it has"
                 raise place.error(
                     f"the launch argument `{name}` has no value: {asks} no default for it, and none was given.",
                     f"Give it in the include's own `arg`, `- {{name: {name}, value: …}}`, or give it a `default` in "
-                    f"`{path.name}`. A `let` or an argument of the file around it does not count."
+                    f"`{called}`. A `let` or an argument of the file around it does not count."
                     if depth > 1
                     else f"Give it a `default` in the file, or a value at the start: `{name}:=value`.",
                 )

@@ -19,7 +19,7 @@ class TunableCamera(Node):
     def validate(self, parameters):
         for parameter in parameters:
             if parameter.name == "camera_rate" and not 1 <= parameter.value <= 60:
-                return SetParametersResult(successful=False, reason="not allowed")
+                return SetParametersResult(successful=False, reason="that is wrong")
         return SetParametersResult(successful=True)
 
     def update(self, parameters):
