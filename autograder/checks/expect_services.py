@@ -166,11 +166,7 @@ class ServiceExpectations(GraphExpectations):
         self.expect_that(
             same,
             title,
-            lambda: (
-                self._file_for_others(node)
-                or self._given_as_a_rule(name)
-                or _other_value(have[name], value)
-            ),
+            lambda: self._file_for_others(node) or self._given_as_a_rule(name) or _other_value(have[name], value),
             expected=repr(value),
             observed=repr(have[name]),
             hint=hint,
