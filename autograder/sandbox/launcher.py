@@ -5,7 +5,8 @@ Three kinds of process come of this file, each a fork of the one before:
 - the launcher, which loads everything once and starts nothing of a student's;
 - for each launch a *first process*, with a process list, a /tmp and a /dev/shm of its own where the kernel gives them
   (`"namespaces"`), without privileges, and with the limits of a launch. When it ends, all its programs have ended;
-- the programs. They can neither see the launcher nor read, write, stop or end the first process.
+- the programs. They can neither see the launcher nor read, write, stop or end the first process, nor read or write
+  each other's memory.
 
 It stands alone: apart from `probe.py` in its folder it imports nothing of the kit.
 
@@ -99,6 +100,9 @@ class Start:
         self.cores: int = request["cores"]
         self.limits: dict[str, int] = launch["limits"]
         self.filter = bytes.fromhex(launch["program_filter"])
+        # From the other programs of the launch: its memory and its settings. Without namespaces the limits of memory
+        # could not be held: who counts it is no more than its equal there.
+        self.hidden: bool = launch["namespaces"]
         self.output, self.events, self.stacks = descriptors
 
 
@@ -350,7 +354,8 @@ def end_everything(scratch: str) -> None:
 def become(start: Start) -> None:
     """Turn this forked child into the process that the program expects: descriptors, limits, environment."""
     os.setsid()
-    _prctl(PR_SET_DUMPABLE, 1)
+    if not start.hidden:
+        _prctl(PR_SET_DUMPABLE, 1)
     spare = [os.dup(descriptor) for descriptor in (start.output, start.events, start.stacks)]
     nothing = os.open(os.devnull, os.O_RDONLY)
     moved = [_above(descriptor) for descriptor in (nothing, *spare)]

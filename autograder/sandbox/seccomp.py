@@ -31,9 +31,12 @@ _CALLS = {  # x86-64, the only architecture that the ROS wheels exist for
     "fanotify_init": 300, "modify_ldt": 154, "mbind": 237, "set_mempolicy": 238,
     "migrate_pages": 256, "move_pages": 279, "vmsplice": 278, "tee": 276,
 }  # fmt: skip
-_ON_THE_FIRST_PROCESS = [  # (call, argument, value): slowed down or limited, it would make failing look like our defect
+_WITH_ARGUMENT = [  # (call, argument, value)
+    # On the first process: slowed down or limited, it would make failing look like our defect.
     (302, 0, 1), (203, 0, 1), (142, 0, 1), (144, 0, 1), (314, 0, 1),  # prlimit64, sched_setaffinity, …param, …attr
     (141, 1, 1), (141, 0, 2), (251, 1, 1), (251, 0, 3),  # setpriority and ioprio_set, of it or of all of a user's
+    # fcntl's locks of parts of a file: each costs the kernel memory that no limit counts.
+    (72, 1, 6), (72, 1, 7), (72, 1, 37), (72, 1, 38),
 ]  # fmt: skip
 _CLONE, _FORK, _VFORK, _CLONE3, _SOCKET, _SOCKETPAIR = 56, 57, 58, 435, 41, 53
 _NAMESPACE_FLAGS = 0x7E020000  # every CLONE_NEW* that clone takes
@@ -67,7 +70,7 @@ def filter_program() -> bytes:
         program += [_step(_EQUAL, number, 0, 1), _REFUSE]
     program += [_step(_EQUAL, _CLONE, 0, 4), _step(_LOAD, _ARGUMENTS), _step(_SET, _NAMESPACE_FLAGS, 0, 1), _REFUSE]
     program += [_step(_RETURN, _ALLOW)]
-    for number, argument, value in _ON_THE_FIRST_PROCESS:
+    for number, argument, value in _WITH_ARGUMENT:
         program += [_step(_EQUAL, number, 0, 4), _step(_LOAD, _ARGUMENTS + 8 * argument), _step(_EQUAL, value, 0, 1)]
         program += [_REFUSE, _step(_LOAD, _NUMBER)]
     # Sockets keep the buffers they are born with, and are told otherwise: what lies in them is in no limit.

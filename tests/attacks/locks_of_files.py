@@ -1,0 +1,17 @@
+"""Locks single bytes of a file, each of which costs the kernel memory that no limit counts.
+
+Must: refused.
+"""
+
+import fcntl
+import os
+import struct
+
+from _tries import tries
+
+file = os.open("/tmp/locked", os.O_CREAT | os.O_RDWR)
+lock = struct.pack("hhqqi4x", fcntl.F_WRLCK, 0, 0, 1, 0)
+for command in (fcntl.F_SETLK, fcntl.F_SETLKW, 37, 38):  # the last two belong to the open file: F_OFD_SETLK, …LKW
+    tries(f"command {command}", lambda command=command: fcntl.fcntl(file, command, lock))
+tries("lockf", lambda: fcntl.lockf(file, fcntl.LOCK_EX, 1, 2))
+print("done")
