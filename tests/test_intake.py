@@ -7,6 +7,7 @@ import copy
 import io
 import json
 import os
+import re
 import socket
 import stat
 import zipfile
@@ -207,11 +208,12 @@ def test_markdown(case: dict[str, Any]) -> None:
     from autograder.grading.stages import inert
 
     page = BeautifulSoup(markdown2html(inert(written_out(case["text"]))), "html.parser")
-    assert {tag.name for tag in page.find_all()} <= {"p", "a", "code", "pre", "br", "em", "strong"}
+    assert {tag.name for tag in page.find_all()} <= {"p", "a", "code", "pre", "br", "em", "strong", "blockquote", "ol", "li"}
     for link in page.find_all("a"):
         # Whatever is left as a link plainly leads to a web page, and somebody has to click on it.
         assert link.attrs.keys() <= {"href", "class"} and str(link.get("href", "#"))[:4] in ("http", "#"), link
     assert page.get_text().strip() and " " * 1000 not in page.get_text()
+    assert len(re.findall(r"\\begin\{|\\\\[\[(]", page.get_text())) <= 100
 
 
 values = st.recursive(

@@ -182,6 +182,10 @@ class InertAnswers(NbGraderPreprocessor):  # type: ignore[misc]
 
 _BLANKS = 200
 """Longer rows of blanks in an answer are shortened to this many."""
+_FORMULAS = 100
+"""Formulas of LaTeX's longer spellings that are shown as such in an answer."""
+_FORMULA = re.compile(r"(\\begin(?=\{)|\\\\(?=[\[(]))")
+_FENCE = re.compile(r"^([ \t>*+\d.)-]*)(`{3,}|~{3,})[^`\n]*$", re.MULTILINE)
 
 
 def inert(markdown: str) -> str:
@@ -195,6 +199,11 @@ def inert_text(markdown: str) -> str:
     markdown = markdown.replace("mermaid", "m\u2060ermaid")
     # For each of many blanks the Markdown reader looks at all that follow: 60000 take it a quarter of a minute.
     markdown = re.sub(f" {{{_BLANKS},}}", " " * _BLANKS, markdown)
+    # So it does for the beginning of a formula that does not end: 20000 take it a quarter of a minute.
+    *first, rest = _FORMULA.split(markdown, _FORMULAS)
+    markdown = "".join(first) + _FORMULA.sub("\\1\u2060", rest)
+    # Without the name of a language code is not coloured, which takes half a minute for 20000 lines of a blank.
+    markdown = _FENCE.sub(r"\1\2", markdown)
     # What a browser fetches by itself would tell its owner who reads the page.
     parted = markdown.replace("![", "!\u2060[")
     # Only links that plainly begin with http stay links: there are too many ways to spell the other schemes.
