@@ -17,7 +17,7 @@ while time.monotonic() < end:
                     continue  # a program that has started another one itself lies open by its own wish
         except OSError:
             continue
-        for name in ("mem", "environ", "maps", "fd/1", "root/etc", "task/%d/mem" % pid):
+        for name in ("mem", "environ", "maps", "fd/1", "root/etc", f"task/{pid}/mem"):
             tries(f"reading {name} of {pid}", lambda path=f"/proc/{pid}/{name}": os.open(path, os.O_RDONLY))
         for name in ("mem", "clear_refs"):
             tries(f"writing {name} of {pid}", lambda path=f"/proc/{pid}/{name}": os.open(path, os.O_WRONLY))
