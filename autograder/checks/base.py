@@ -150,7 +150,9 @@ class ExpectationBase:
         self.settle_programs()
         gone = self.gone_program() or diagnosis.failed_in_a_callback(self.scene())
         if gone is not None:
-            trouble = diagnosis.program_trouble(self.scene())
+            scene = self.scene()
+            # An error in a callback is the reason whether or not it has ended the program by now.
+            trouble = diagnosis.program_trouble(scene) or diagnosis.inside_reason(scene)
             reason = trouble if trouble and trouble.code != "exited" else reason or trouble
         because = reason.because if reason else ""
         code = reason.code if reason else ""
