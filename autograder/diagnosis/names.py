@@ -54,6 +54,13 @@ def _twins(scene: Scene, name: str) -> set[str]:
     }
 
 
+def _nothing_of(silent: Sequence[Inside]) -> Diagnosis:
+    """Why programs that live show no node: what is wrong inside, or how far the first of them was seen to come."""
+    made = [name for name, node in silent[0].nodes.items() if not node.destroyed]
+    saw = f"it has made the node `{made[0]}`, which is not on this graph" if made else "it shows no node"
+    return reason_inside(silent) or Diagnosis(f"`{silent[0].name}` runs, but {saw}.", "no-node")
+
+
 def why_no_node(scene: Scene, wanted: str) -> Diagnosis:
     """Why the node `wanted` is not on the graph.
 
@@ -72,8 +79,7 @@ def why_no_node(scene: Scene, wanted: str) -> Diagnosis:
     own = sorted(set(names) - _twins(scene, wanted))
     silent = [inside for inside in around if inside.alive and inside.nodes.keys().isdisjoint(names)]
     if silent or not own:
-        silent = silent or around
-        return reason_inside(silent) or Diagnosis(f"`{silent[0].name}` runs, but its node is not there.", "no-node")
+        return _nothing_of(silent or around)
     base = wanted.rsplit("/", 1)[-1]
     there = [name for name in own if name.rsplit("/", 1)[-1] == base]
     if there:
