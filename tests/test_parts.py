@@ -239,6 +239,20 @@ def test_a_name_or_none_is_read_as_it_is_meant(
     assert (first.code if first else "") == code and because in (first.because if first else "")
 
 
+@pytest.mark.parametrize(
+    ("text", "because"),
+    [
+        ("- late: 5\n- heard: yes\n", "begin with dashes"),
+        ("late:5\nheard:yes\n", "a single value, which begins with `late:5 heard:yes`"),
+        ("# late: 5\n", "no answers yet"),
+        ("late:\t5\n", "Use spaces instead"),
+    ],
+)
+def test_a_file_that_is_no_table_is_told_what_it_is(grade: Grade, text: str, because: str) -> None:  # noqa: F811
+    failed = grade(TABLE, table__yaml=text).first_failure
+    assert failed and because in failed.because and "a space after the colon" in failed.hint
+
+
 @given(st.recursive(st.text() | st.integers() | st.booleans() | st.floats() | st.none(), st.lists, max_leaves=5))
 def test_any_answer_can_be_read_and_compared(answer: Any) -> None:
     assert plain(plain(answer)) == plain(answer) or answer != answer or isinstance(answer, (str, list, float))

@@ -17,6 +17,17 @@ from autograder.checks.session import Score
 from autograder.graph.names import nearest
 from autograder.results import Status
 
+_LINES = "Write one line for each question: `question: answer`, with a space after the colon."
+
+
+def _no_table(read: Any) -> str:
+    """What YAML made of a file that is no table."""
+    if read in (None, {}):
+        return "It has no answers yet."
+    if isinstance(read, list):
+        return "It is a list for YAML, because its lines begin with dashes. A table's lines begin with the question."
+    return f"It is no table for YAML, but a single value, which begins with `{str(read)[:30]}`."
+
 
 class Answers:
     """One table of answers; `with answers("predictions.yaml") as table:` like a launch."""
@@ -47,10 +58,10 @@ class Answers:
         try:
             table = student_yaml.read(session.current.use(self.file))
         except student_yaml.StudentFileError as error:
-            hint = error.hint or "Write one line for each question: `question: answer`."
+            hint = error.hint or _LINES
             outcomes.failed(title, because=error.because, hint=hint, code=error.code)
         if not isinstance(table, dict) or not table:
-            outcomes.failed(title, because="It has no `question: answer` lines.", code="not-yaml")
+            outcomes.failed(title, because=_no_table(table), hint=_LINES, code="not-yaml")
         self._table = {str(key).strip(): value for key, value in table.items()}
 
     def expect_filled(self, questions: Mapping[str, Sequence[Any]] | Sequence[str]) -> None:
