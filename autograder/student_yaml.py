@@ -35,6 +35,7 @@ _PROBLEMS = {
     "mapping values are not allowed": "a `:` is not expected there. Check the indentation of this line and the colon of"
     " the line above, or put a text that holds a colon in quotes",
     "found character '\\t'": "a tab is not expected there. Use spaces instead",
+    "mapping keys are not allowed": "a `?` is not expected there. Write the value in its place",
     "that cannot start any token": "a value cannot begin with this character. Put it in quotes",
     "could not find expected ':'": "a `key: value` is expected there, with a colon and a space after the key",
     "expected <block end>": "the line is indented differently from the lines it belongs to",

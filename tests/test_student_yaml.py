@@ -40,6 +40,7 @@ def test_plain_yaml_is_read_as_pyyaml_reads_it(text: str) -> None:
         ("a: 1\nb:0\nc: 2\nd: 3", 3, "a space after the key"),
         ("a:\n\t- b", 3, "tab"),
         ("a: 1\nb: @x", 3, "quotes"),
+        ("a: 1\nb: ?", 3, "a `?` is not expected"),
         ("a: 'x\nb: 1\n", 2, "never closed"),
         ("a: [1, 2\nb: 3", 3, "bracket"),
         ("a:\n  b: 1\n c: 2", 4, "indented"),

@@ -56,10 +56,13 @@ class ProgramExpectations(GraphExpectations):
         self.may_end.append(program)
         title = f"`{name}` ends by itself" + ("" if status is None else f" with exit status {status}")
         if not self.wait(lambda: not program.running(), within):
-            reason = diagnosis.inside_reason(self.scene())
+            scene = self.scene()
+            places = [inside.main_place() for inside in scene.insides if inside.program is program]
+            where = f"; it is in {places[0]}" if places and places[0] else ""
             self.fail(
                 title,
-                reason or Diagnosis(f"It still runs after {within:g} s.", "still-running"),
+                diagnosis.inside_reason(scene)
+                or Diagnosis(f"It still runs after {within:g} s{where}.", "still-running"),
                 expected="ended",
                 observed="still running",
                 hint=hint,
