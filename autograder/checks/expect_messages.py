@@ -221,6 +221,18 @@ class MessageExpectations(GraphExpectations):
             hint=hint,
         )
 
+    def open_publisher(self, topic: str, msg_type: type, *, qos: QoSProfile | int = RELIABLE_DEEP) -> Any:
+        """Make the publisher that a later `publish` uses, before the program subscribes.
+
+        A best-effort subscription hears only what comes after it has matched, and only the program can tell when that
+        is: one that is made after the publisher has matched it by the time its other messages arrive.
+        """
+        profile = qos if isinstance(qos, QoSProfile) else QoSProfile(depth=qos)
+        key = (topic, str(profile))  # its repr would tell objects apart, not policies
+        if key not in self._publishers:
+            self._publishers[key] = self.observer.publisher(topic, msg_type, profile)
+        return self._publishers[key]
+
     def publish(
         self,
         topic: str,
@@ -236,10 +248,7 @@ class MessageExpectations(GraphExpectations):
         """
         msg_type = type(messages[0])
         profile = qos if isinstance(qos, QoSProfile) else QoSProfile(depth=qos)
-        key = (topic, str(profile))  # its repr would tell objects apart, not policies
-        if key not in self._publishers:
-            self._publishers[key] = self.observer.publisher(topic, msg_type, profile)
-        publisher = self._publishers[key]
+        publisher = self.open_publisher(topic, msg_type, qos=profile)
         self._wait_until_heard(publisher.get_subscription_count, topic, msg_type, profile, within, hint)
         self.observer.wait(self.observer.hears_all, MATCHES_WITHIN)
         for message in messages:

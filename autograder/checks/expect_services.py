@@ -166,7 +166,12 @@ class ServiceExpectations(GraphExpectations):
         self.expect_that(
             same,
             title,
-            lambda: self._file_for_others(node) or self._given_as_a_rule(name) or _other_value(have[name], value),
+            lambda: (
+                self._file_for_others(node)
+                or self._given_as_a_rule(name)
+                or self._given_to_another(node, name)
+                or _other_value(have[name], value)
+            ),
             expected=repr(value),
             observed=repr(have[name]),
             hint=hint,
@@ -179,6 +184,17 @@ class ServiceExpectations(GraphExpectations):
             if rule and rule.left == name:
                 because = f"`{text}` is given as a remap rule; such rules rename topics and services, not parameters."
                 return Diagnosis(because, "parameter-as-rule", f"Give it as a parameter: `-p {text}`.")
+        return None
+
+    def _given_to_another(self, node: str, name: str) -> Diagnosis | None:
+        """Whether `-p NODE:name:=value` was meant for this node: a node's name there is one in the namespace `/`."""
+        for launched, _ in self.programs:
+            for option, text in itertools.pairwise(launched.arguments()):
+                meant, _, parameter = text.partition(":=")[0].rpartition(":")
+                if option in ("-p", "--param") and parameter == name and meant and f"/{meant}" != node:
+                    because = f"`-p {text}` is for the node `/{meant}`, and this one is `{node}`."
+                    hint = "Leave the node out: the value is for every node of the process then."
+                    return Diagnosis(because, "parameter-for-others", hint)
         return None
 
     def _file_for_others(self, node: str) -> Diagnosis | None:

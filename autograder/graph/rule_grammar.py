@@ -227,7 +227,7 @@ def _of_parameter(name: str) -> Reason:
         return (
             "before the `:` stands the name of a node, without slashes.",
             "rule-colon",
-            "Write `NODE:name:=value`, or leave the node out. A parameter file can name a node with its namespace.",
+            "Leave the node out: the value is for every node of the process then. A parameter file can name one node.",
         )
     if "*" in name:
         return "`*` is not implemented there.", "wildcard", "Write one rule for each parameter."

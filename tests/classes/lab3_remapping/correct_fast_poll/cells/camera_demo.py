@@ -3,6 +3,7 @@ import functools
 
 import rclpy
 from rclpy.executors import ExternalShutdownException
+from rclpy.qos import qos_profile_sensor_data
 from sensor_msgs.msg import Image
 from std_msgs.msg import Bool, String
 
@@ -25,7 +26,7 @@ def camera():
     node.declare_parameters("", [("camera_name", "camera"), ("camera_rate", 10), ("camera_frame", "camera_frame")])
     images = node.create_publisher(Image, topic="camera/image_color", qos_profile=1)
     status = node.create_publisher(String, "~/status", 100)
-    node.create_subscription(Bool, "/emergency_stop", functools.partial(obey, state), 10)
+    node.create_subscription(Bool, "/emergency_stop", functools.partial(obey, state), qos_profile_sensor_data)
     node.create_timer(1 / node.get_parameter("camera_rate").value, functools.partial(shoot, node, state, images, status))
     return node
 
