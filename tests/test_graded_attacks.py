@@ -1,6 +1,7 @@
 """Programs that would rather not be graded: each one of `attacks/graded` fails its check, and none stays undecided.
 
-The line `Must: …` of its docstring is the code of the reason.
+The line `Must: …` of its docstring is the code of the reason, or several, where it is for the program's own doing a
+matter of luck which one is found.
 """
 
 from __future__ import annotations
@@ -45,4 +46,4 @@ def test_the_check_fails_and_says_why(name: str) -> None:
     )
     (check,) = run_in_worker(job).checks
     assert check.status is Status.FAILED and check.points == 0, check
-    assert check.first_failure is not None and check.first_failure.code == must[1], check
+    assert check.first_failure is not None and check.first_failure.code in must[1].split(", "), check

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import os
+import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from types import SimpleNamespace
 
 import pytest
@@ -32,7 +33,7 @@ from autograder.graph.observer import Observer
 from autograder.graph.qos import first_mismatch
 from autograder.graph.recording import Received
 from autograder.sandbox.environment import profile_environment
-from autograder.sandbox.processes import cpu_waits, kept_waiting
+from autograder.sandbox.processes import CpuUse, cpu_uses, kept_waiting
 
 
 def profiles() -> st.SearchStrategy[QoSProfile]:
@@ -134,28 +135,77 @@ def observer() -> Iterator[Observer]:
     watching.close()
 
 
+ON_ONE_CPU = f"import os, time\nos.sched_setaffinity(0, {{{min(os.sched_getaffinity(0))}}})\n"
+COMPUTES = "while True: pass"
+WORKS_NOW_AND_THEN = """
+while True:
+    end = time.thread_time() + 0.2
+    while time.thread_time() < end: pass
+    time.sleep(0.4)
+"""
+
+
 @pytest.fixture
-def crowded_cpu() -> Iterator[None]:
-    """Two programs that share one CPU, so that each waits while the other runs."""
-    source = f"import os\nos.sched_setaffinity(0, {{{min(os.sched_getaffinity(0))}}})\nwhile True: pass"
-    programs = [subprocess.Popen([sys.executable, "-c", source]) for _ in range(2)]
-    yield
-    for program in programs:
+def programs() -> Iterator[Callable[[str], int]]:
+    """Starts a program of this process's own that keeps to the one CPU, and gives its process id."""
+    started: list[subprocess.Popen[bytes]] = []
+
+    def start(source: str) -> int:
+        started.append(subprocess.Popen([sys.executable, "-c", ON_ONE_CPU + source]))
+        return started[-1].pid
+
+    yield start
+    for program in started:
         program.kill()
         program.wait()
 
 
+@pytest.fixture
+def crowded_cpu() -> Iterator[None]:
+    """Two programs of strangers that compute on the one CPU: nothing of this process's, since who began them ended."""
+    leave = "if os.fork(): os._exit(0)\nos.setsid()\nprint(os.getpid(), flush=True)\nos.close(1)\n"
+    command = [sys.executable, "-c", ON_ONE_CPU + leave + COMPUTES]
+    strangers = [int(subprocess.run(command, stdout=subprocess.PIPE, check=True).stdout) for _ in range(2)]
+    yield
+    for stranger in strangers:
+        os.kill(stranger, signal.SIGKILL)
+
+
 @pytest.mark.usefixtures("crowded_cpu")
-def test_time_in_which_a_program_got_no_cpu_does_not_count_against_it(observer: Observer) -> None:
+def test_time_in_which_a_program_got_no_cpu_does_not_count_against_it(
+    observer: Observer, programs: Callable[[str], int]
+) -> None:
+    programs(WORKS_NOW_AND_THEN)
+    began, patience = time.monotonic(), observer.patience
+    assert not observer.wait(lambda: False, within=2.0)
+    assert time.monotonic() - began > 2.2
+    assert observer.patience < patience
+    observer.patience = 0.0
     began = time.monotonic()
     assert not observer.wait(lambda: False, within=2.0)
-    assert time.monotonic() - began > 2.5
+    assert observer.patience <= 0.0
 
 
 @pytest.mark.usefixtures("crowded_cpu")
-def test_a_thread_that_waits_for_a_cpu_has_waited_as_long_as_others_ran() -> None:
-    before = cpu_waits(os.getpid())
+def test_a_program_that_waits_for_a_cpu_has_waited_as_long_as_strangers_ran(programs: Callable[[str], int]) -> None:
+    programs(WORKS_NOW_AND_THEN)
+    before = cpu_uses()
     deadline = time.monotonic() + 20
-    while kept_waiting(before, cpu_waits(os.getpid())) < 0.5 and time.monotonic() < deadline:
+    while kept_waiting(before, cpu_uses()) < 0.5 and time.monotonic() < deadline:
         time.sleep(0.05)
-    assert kept_waiting(before, cpu_waits(os.getpid())) >= 0.5
+    assert kept_waiting(before, cpu_uses()) >= 0.5
+
+
+def test_a_program_that_only_computes_gains_no_time_by_it(programs: Callable[[str], int]) -> None:
+    hogs = {programs(COMPUTES), programs(COMPUTES)}  # each waits while the other runs
+
+    def uses() -> dict[int, CpuUse]:
+        return {pid: use for pid, use in cpu_uses().items() if pid in hogs}
+
+    deadline = time.monotonic() + 60
+    while min((use.cpu for use in uses().values()), default=0.0) < 1.2 and time.monotonic() < deadline:
+        time.sleep(0.05)
+    before = uses()
+    while sum(use.cpu for use in uses().values()) < sum(use.cpu for use in before.values()) + 1.0:
+        time.sleep(0.05)
+    assert kept_waiting(before, uses()) == 0.0

@@ -130,7 +130,7 @@ class Launch(MessageExpectations, ServiceExpectations, LifecycleExpectations, Pr
         # The middleware reads its profile once, before the first participant of the process.
         os.environ.update(profile_environment())
         os.environ.pop("ROS_AUTOMATIC_DISCOVERY_RANGE", None)
-        self.observer = Observer(self.domain_id)
+        self.observer = Observer(self.domain_id, session.current.patience)
         if here is not None:
             self.watch = Watch(here, self.observer, lambda: [program for _, program in self.programs])
         self.prepare()
@@ -281,6 +281,7 @@ class Launch(MessageExpectations, ServiceExpectations, LifecycleExpectations, Pr
             if self.watch is not None:
                 self.watch.close()
         finally:
+            session.current.patience = self.observer.patience
             self.observer.close()
             remove_written(session.current.folder)
             remove_logs()

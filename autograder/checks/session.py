@@ -16,6 +16,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from autograder import kernel
+from autograder.graph.observer import PATIENCE
 from autograder.results import CheckResult, Isolation, NodeLog, Outcome
 from autograder.sandbox.nodes import NodeSandbox
 
@@ -94,6 +95,8 @@ class Session:
         self.logs: list[NodeLog] = []
         self.scored_logs: list[NodeLog] = []
         """Logs of what has been scored since the cell began."""
+        self.patience = PATIENCE
+        """Seconds that the waits of this check may still take longer on a busy machine."""
         self.started = time.monotonic()
 
     @property

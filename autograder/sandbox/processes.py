@@ -9,7 +9,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 _HAD_ITS_CHANCE = 2.0
-"""Seconds of CPU after which a thread was not kept from anything; to start a whole node takes a third of one."""
+"""Seconds of CPU in one wait after which a process was not kept from anything; a node starts in a third of one."""
+_BEGINNING = 1.0
+"""Seconds of CPU that a program may take to begin; one that computes on takes what it gets, and waits for ever."""
 
 
 @dataclass(frozen=True)
@@ -90,8 +92,6 @@ class CpuWait:
 
     when: float
     """Seconds on the monotonic clock at which this was read."""
-    ran: float
-    """Seconds for which it had one."""
     waited: float
     """Seconds for which it was ready to run and got no CPU, up to its last turn."""
     turns: int
@@ -100,41 +100,71 @@ class CpuWait:
     """Whether it runs or waits for its turn now."""
 
 
-def cpu_waits(root: int) -> dict[int, dict[int, CpuWait]]:
-    """Return what the threads of `root` and its descendants have had of the CPUs, by process and thread.
+@dataclass(frozen=True)
+class CpuUse:
+    """What a process has had of the CPUs."""
+
+    cpu: float
+    """Seconds, of all its threads, those that have ended included."""
+    age: float
+    """Seconds since it began."""
+    threads: dict[int, CpuWait]
+
+    def computes(self) -> bool:
+        """Whether it has computed for most of the time in which nobody kept it from that."""
+        free = self.age - max((wait.waited for wait in self.threads.values()), default=0.0)
+        return self.cpu > _BEGINNING and self.cpu > free / 2
+
+
+def cpu_uses() -> dict[int, CpuUse]:
+    """Return what this process and its descendants have had of the CPUs, by process.
 
     Empty where the kernel does not count that (proc(5), `/proc/PID/schedstat`).
     """
-    waits: dict[int, dict[int, CpuWait]] = {}
-    for pid in (root, *descendants(root)):
-        with contextlib.suppress(OSError):
-            for task in os.listdir(f"/proc/{pid}/task"):
-                with contextlib.suppress(OSError, IndexError, ValueError):
-                    folder = Path(f"/proc/{pid}/task/{task}")
-                    ran, waited, turns = map(int, (folder / "schedstat").read_text().split())
-                    state = (folder / "stat").read_text().rpartition(")")[2].split()[0]
-                    now = CpuWait(time.monotonic(), ran / 1e9, waited / 1e9, turns, state == "R")
-                    waits.setdefault(pid, {})[int(task)] = now
+    uses: dict[int, CpuUse] = {}
+    for pid in (os.getpid(), *descendants(os.getpid())):
+        with contextlib.suppress(OSError, IndexError, ValueError):
+            fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+            began = int(fields[19]) / os.sysconf("SC_CLK_TCK")
+            threads = _cpu_waits(pid)
+            if threads:
+                uses[pid] = CpuUse(cpu_time(pid), time.clock_gettime(time.CLOCK_BOOTTIME) - began, threads)
+    return uses
+
+
+def _cpu_waits(pid: int) -> dict[int, CpuWait]:
+    waits: dict[int, CpuWait] = {}
+    for task in os.listdir(f"/proc/{pid}/task"):
+        with contextlib.suppress(OSError, IndexError, ValueError):
+            folder = Path(f"/proc/{pid}/task/{task}")
+            _, waited, turns = map(int, (folder / "schedstat").read_text().split())
+            state = (folder / "stat").read_text().rpartition(")")[2].split()[0]
+            waits[int(task)] = CpuWait(time.monotonic(), waited / 1e9, turns, state == "R")
     return waits
 
 
-def kept_waiting(before: dict[int, dict[int, CpuWait]], after: dict[int, dict[int, CpuWait]]) -> float:
-    """Return by how many seconds a message through all these processes may have come late for want of a CPU.
+def kept_waiting(before: dict[int, CpuUse], after: dict[int, CpuUse]) -> float:
+    """Return by how many seconds a message through all these processes may have come late because of others.
 
-    It passes one process after another, so their waits add up; the threads of one wait side by side. A thread that does
-    nothing but compute waits for ever, and does not count.
+    It passes one process after another, so their waits add up; the threads of one wait side by side. Not counted are
+    the waits of a program that computes on and on, and of any process as long as its own kind may have caused: the time
+    for which the rest of these processes had a CPU.
     """
-    return sum(
-        max(_waited_since(before.get(pid, {}).get(thread), wait) for thread, wait in threads.items())
-        for pid, threads in after.items()
-    )
+    used = {pid: use.cpu - (before[pid].cpu if pid in before else 0.0) for pid, use in after.items()}
+    together = sum(used.values())
+    kept = 0.0
+    for pid, use in after.items():
+        if used[pid] > _HAD_ITS_CHANCE or (pid != os.getpid() and use.computes()):
+            continue
+        known = before[pid].threads if pid in before else {}
+        waited = max(_waited_since(known.get(thread), wait) for thread, wait in use.threads.items())
+        kept += max(0.0, waited - (together - used[pid]))
+    return kept
 
 
 def _waited_since(before: CpuWait | None, after: CpuWait) -> float:
     if before is None:
-        before = CpuWait(after.when, 0.0, 0.0, 0, ready=False)
-    if after.ran - before.ran > _HAD_ITS_CHANCE:
-        return 0.0
+        before = CpuWait(after.when, 0.0, 0, ready=False)
     if after.ready and before.ready and after.turns == before.turns:
         return after.when - before.when  # the kernel adds a wait when it is over, and this one is not
     return after.waited - before.waited

@@ -181,6 +181,7 @@ class Program:
 
     def stacks(self, timeout: float = 1.0) -> str:
         """Return what each of its threads does now, as a traceback each, newest call first; "" if it does not say."""
+        self._catch_up(self)  # what is left of an earlier answer is none to this question
         with self._changed:
             self._stacks.clear()
             if self._status is not None:

@@ -1,6 +1,8 @@
 """Forges what it is asked for when it is stuck: a stack with a line number of 20000 digits.
 
-Must: stuck-callback.
+It fills the pipe that its true stacks have to pass as well: when the machine is busy, they may find no room in it.
+
+Must: stuck-callback, no-topic.
 """
 
 import os
