@@ -1,7 +1,7 @@
-"""Programs that would rather not be graded: each one of `attacks/graded` fails its check, and none stays undecided.
+"""Programs that would rather not be graded: each one of `attacks/graded` fails its check, and few stay undecided.
 
 The line `Must: …` of its docstring is the code of the reason, or several, where it is for the program's own doing a
-matter of luck which one is found.
+matter of luck which one is found. `stuck` means that the grader gets stuck, and has to say so of this check alone.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from autograder.grading import supervisor
 from autograder.grading.job import Cell, Job
 from autograder.grading.stage_a import run_in_worker
 from autograder.results import Isolation, Status
@@ -28,22 +29,51 @@ ros.score(1)
 TALKS, HAS_A_PARAMETER = 'ros.expect_messages("/talk", String, within=4)', 'ros.expect_parameter("/talker", "x", 3)'
 
 
-@pytest.mark.parametrize("name", [name for name in PROGRAMS if name[0] != "_"])
+SOON_STUCK = """
+import sys
+sys.modules["__main__"].CELL_SECONDS, sys.modules["__main__"].STUCK_SECONDS = 30, 2
+from autograder.checks import outcomes
+from autograder.checks.scoring import score
+"""
+GOOD = "outcomes.passed('good')\nscore(1)"
+MAKE_STUCK = [name for name, source in PROGRAMS.items() if "\nMust: stuck.\n" in source]
+
+
+@pytest.mark.parametrize("name", [name for name in PROGRAMS if name[0] != "_" and name not in MAKE_STUCK])
 def test_the_check_fails_and_says_why(name: str) -> None:
     if not preflight().full:
         pytest.skip(preflight().why_not_full)
     must = re.search(r"^Must: (.+)\.$", PROGRAMS[name], re.MULTILINE)
     assert must is not None
-    source = CHECK.format(HAS_A_PARAMETER if name.startswith("parameter") else TALKS)
-    job = Job(
+    (check,) = run_in_worker(job(name, SET_UP, check_of(name))).checks
+    assert check.status is Status.FAILED and check.points == 0, check
+    assert check.first_failure is not None and check.first_failure.code in must[1].split(", "), check
+
+
+@pytest.mark.parametrize("name", MAKE_STUCK)
+def test_a_check_in_which_the_grader_is_made_stuck_costs_no_other_and_is_flagged(name: str) -> None:
+    if not preflight().full:
+        pytest.skip(preflight().why_not_full)
+    before, check, after = run_in_worker(job(name, SET_UP + SOON_STUCK, GOOD, check_of(name), GOOD)).checks
+    assert (before.points, after.points) == (1, 1)
+    assert check.status is Status.UNKNOWN and check.points is None and check.flags, check
+    assert check.outcomes[0].code == supervisor.STUCK, check
+
+
+def check_of(name: str) -> str:
+    """The check that a program has to get around."""
+    return CHECK.format(HAS_A_PARAMETER if name.startswith("parameter") else TALKS)
+
+
+def job(name: str, set_up: str, *checks: str) -> Job:
+    """A submission with one program, and these checks on it."""
+    cells = [Cell(grade_id=f"check{number}", points=1, source=source) for number, source in enumerate(checks)]
+    return Job(
         student="someone",
         lab="lab",
         digest="digest",
         isolation=Isolation.FULL,
         seed=1,
         files={"p.py": PROGRAMS[name], "_rmw.py": PROGRAMS["_rmw"]},
-        cells=[Cell(grade_id="set_up", source=SET_UP), Cell(grade_id="check", points=1, source=source)],
+        cells=[Cell(grade_id="set_up", source=set_up), *cells],
     )
-    (check,) = run_in_worker(job).checks
-    assert check.status is Status.FAILED and check.points == 0, check
-    assert check.first_failure is not None and check.first_failure.code in must[1].split(", "), check
