@@ -101,7 +101,7 @@ def account(scene: Scene, topic: str) -> str:
         publisher.runs, f"{publisher.runs} messages were published"
     )
     if publisher.runs:
-        sent += f", the last of them {inside.now - publisher.last:.1f} s ago"
+        sent += f", {'the last of them ' * (publisher.runs > 1)}{inside.now - publisher.last:.1f} s ago"
     return f"{', '.join(said)}, and {sent}."
 
 
