@@ -85,6 +85,7 @@ def test_a_submission_that_gets_every_check_stuck_is_given_up(tmp_path: Path) ->
     given.cells.insert(0, Cell(grade_id="set_up", source=IN_A_CALL_FOR_EVER))
     result = run_in_worker(given)
     assert [check.points for check in result.checks] == [None] * 4
+    assert {check.outcomes[0].code for check in result.checks} == {supervisor.STUCK}
     assert (tmp_path / "seen").read_text() == "x" * supervisor.LOST
 
 

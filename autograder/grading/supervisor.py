@@ -20,8 +20,8 @@ STUCK = "stuck"
 """The reason code of a check at which the worker got stuck."""
 _LINES = 6
 """Lines that are kept of what a worker said at its end."""
-_STACKS = b"Timeout ("
-"""How the stacks begin that the worker writes when it is stuck."""
+_STACKS = b"\nTimeout ("
+"""How the stacks begin that the worker writes when it is stuck; no text in a line of JSON holds the end of a line."""
 
 
 def run_in_worker(job: Job, stop: threading.Event | None = None) -> SubmissionResult:
@@ -49,7 +49,7 @@ def run_in_worker(job: Job, stop: threading.Event | None = None) -> SubmissionRe
         left = [cell for cell in left if cell.grade_id not in known]
         if not left:
             break
-        if run.timed_out or _STACKS in run.stdout:
+        if run.timed_out or _STACKS in b"\n" + run.stdout:
             lost.append(_stuck(left.pop(0), run, limit))
         elif died_at == left[0].grade_id:
             because = f"The grader ended with status {run.status} and no result."
@@ -57,7 +57,9 @@ def run_in_worker(job: Job, stop: threading.Event | None = None) -> SubmissionRe
         else:
             died_at = left[0].grade_id
     result.checks += lost
-    result.checks += [_undecided(cell, "The grader gave up after the checks it lost before.", "") for cell in left]
+    for cell in left:
+        because = "It was not run: at other checks of this submission the grader got stuck or died."
+        result.checks.append(_undecided(cell, because, "", lost[-1].outcomes[0].code))
     return believed(job, result)
 
 
@@ -118,7 +120,7 @@ def _checks(job: Job) -> list[Cell]:
 
 
 def _stuck(cell: Cell, run: OuterRun, limit: float) -> CheckResult:
-    stacks = run.stdout.partition(_STACKS)[2].decode("utf-8", "replace")
+    stacks = (b"\n" + run.stdout).partition(_STACKS)[2].decode("utf-8", "replace")
     if not stacks:
         return _undecided(cell, f"The grader took longer than {limit:.0f} s.", run.stderr, STUCK)
     because = f"The grader got stuck in this check and was ended after {CELL_SECONDS + STUCK_SECONDS:.0f} s."
