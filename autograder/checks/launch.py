@@ -109,12 +109,13 @@ class Launch(MessageExpectations, ServiceExpectations, LifecycleExpectations, Pr
         file: tuple[str, Mapping[str, str], str] | None = None,
         programs: Mapping[str, Node] | None = None,
         includes: Mapping[str, str] | None = None,
+        around: str = "",
     ) -> None:
         """Use `launch` or `launch_file`."""
         self.nodes = list(nodes)
         self._file = file
         self._stand_ins = dict(programs or {})
-        self._includes = dict(includes or {})
+        self._includes, self._around = dict(includes or {}), around
         self._listen, self._serve, self._lifecycle = list(listen), list(serve), list(lifecycle)
         self.programs: list[tuple[Node, Program]] = []
         self._missing: list[str] = []
@@ -166,7 +167,7 @@ class Launch(MessageExpectations, ServiceExpectations, LifecycleExpectations, Pr
         programs = set(self._stand_ins) or {path.stem for path in folder.glob("*.py")}
         session.current.use(name)
         try:
-            found = read_launch_file(folder / name, arguments, find, programs, self._includes)
+            found = read_launch_file(folder / name, arguments, find, programs, self._includes, self._around)
         except LaunchFileError as error:
             self._trouble.append(Diagnosis(str(error), "launch-file", error.hint))
             return []
@@ -354,6 +355,7 @@ def launch_file(
     arguments: Mapping[str, str] | None = None,
     *,
     package: str,
+    namespace: str = "",
     programs: Mapping[str, Node] | None = None,
     includes: Mapping[str, str] | None = None,
     listen: Iterable[tuple[str, type]] = (),
@@ -365,10 +367,11 @@ def launch_file(
         file: a launch file in ROS 2's YAML schema, such as `vehicle.launch.yaml`.
         arguments: launch arguments, as `name:=value` after `ros2 launch PACKAGE FILE`.
         package: the name of the package that the student's programs are said to be in.
+        namespace: as if a launch file included this one after `push_ros_namespace` with it.
         programs: the course's own program to start where the file says `exec: NAME`, by that name.
         includes: the course's own launch file to read where the file includes NAME, by that name; it may start any
             program of the lab.
         listen: (topic, message class) to record from before the start.
         lifecycle: full names of lifecycle nodes whose transition events are recorded from before the start.
     """
-    return Launch([], listen, (), lifecycle, (file, dict(arguments or {}), package), programs, includes)
+    return Launch([], listen, (), lifecycle, (file, dict(arguments or {}), package), programs, includes, namespace)

@@ -22,6 +22,7 @@ def read_launch_file(
     find: Callable[[str], Path] | None = None,
     programs: Collection[str] | None = None,
     stand_ins: Mapping[str, str] | None = None,
+    around: str = "",
 ) -> list[LaunchedNode]:
     """Read a launch file and say what it starts, in its order.
 
@@ -32,6 +33,7 @@ def read_launch_file(
             package is the folder of the launch file.
         programs: names of the programs that a package has; without it they are not looked at.
         stand_ins: names of launch files to read in place of included ones, by the names of those.
+        around: the namespace that a file which includes this one would push.
 
     Raises:
         LaunchFileError: it is missing, is no launch file, is refused by `ros2 launch`, or uses what is not covered.
@@ -42,6 +44,8 @@ def read_launch_file(
         Packages(find or (lambda package: folder), programs, stand_ins),
         {name: str(value) for name, value in arguments.items()},
     )
+    if around:
+        context.configurations[NAMESPACE] = around
     reader.file(path, context, set(arguments), Place(path.name, folder), depth=1)
     return reader.nodes
 

@@ -23,7 +23,7 @@ class TunableCamera(Node):
         return SetParametersResult(successful=True)
 
     def update(self, parameters):
-        for parameter in parameters:
+        for parameter in parameters[:1]:
             if parameter.name == "camera_rate":
                 self.timer.timer_period_ns = int(1e9 / parameter.value)
 

@@ -20,7 +20,7 @@ class TunableCamera(Node):
         for parameter in parameters:
             if parameter.name == "camera_rate" and not 1 <= parameter.value <= 60:
                 return SetParametersResult(successful=False)
-        return SetParametersResult(successful=True)
+            return SetParametersResult(successful=True)
 
     def update(self, parameters):
         for parameter in parameters:
