@@ -264,3 +264,10 @@ def test_the_labs_own_launch_files_can_be_read(tmp_path: Path, sides: dict[str, 
     assert [f"{node.namespace}/{node.name}" for node in nodes] == [
         f"/{space}/{side}_demo" for side in ("right", "left", "rear")
     ]
+
+
+def test_a_file_can_be_read_as_inside_a_namespace(tmp_path: Path) -> None:
+    file = tmp_path / "a.launch.yaml"
+    file.write_text(f"launch:\n{CAMERA}, namespace: inner}}\n{CAMERA}, namespace: /fixed}}\n")
+    nodes = read_launch_file(file, {}, around="/area")
+    assert [node.namespace for node in nodes] == ["/area/inner", "/fixed"]
