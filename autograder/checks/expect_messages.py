@@ -317,15 +317,15 @@ class MessageExpectations(GraphExpectations):
             if not trouble:
                 reason = replace(
                     reason,
-                    because=f"{missing} did not run {'once' if runs == 1 else f'{runs} times'} while others did. "
-                    + reason.because,
+                    because=f"{missing} did not run {'once' if runs == 1 else f'{runs} times'}"
+                    f"{' while others did' * any(count >= runs for count in counts.values())}. " + reason.because,
                 )
         self.fail(title, reason, expected=f"{runs} complete runs of each", observed=told or "no run", hint=hint)
 
     def _starves(self, topic: str, names: Sequence[str], runs: int) -> bool:
         """Whether some callback has run so often that one of these, with fewer than `runs` runs, gets no turn."""
         counts = Counter(span.name for span in self.activity(topic).spans())
-        often = max(2 * DECISIVE_RUNS, 4 * runs)
+        often = max(2 * DECISIVE_RUNS, 8 * runs)
         return min(counts[name] for name in names) < runs and max(counts.values(), default=0) >= often
 
     def expect_runs(
