@@ -82,12 +82,12 @@ def run_beside_honest_node(sandbox: NodeSandbox, names: list[str]) -> dict[str, 
         attacks = {name: group.start(name, env={"ROS_DOMAIN_ID": "7"}) for name in names}
         honest = group.start("honest_node", env={"ROS_DOMAIN_ID": "7"})
         observer.wait(lambda: observer.nodes(), 5)
-        heard = talk.wait_for(1, 20)
+        heard = talk.wait_for(1, 40)
         talk.wait_for(talk.count + 50, 2)  # in vain, if it floods the observer: that harms its own launch alone
         grown = memory(os.getpid()) - before
         for attack in attacks.values():
             attack.stop(0.0)
-        heard = heard and talk.wait_for(talk.count + 20, 20)
+        heard = heard and talk.wait_for(talk.count + 20, 40)
         entry = {
             "heard": heard,
             "own": all(message.msg.data == "honest" for message in talk.messages),

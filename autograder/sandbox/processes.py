@@ -8,7 +8,7 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-_HAD_ITS_CHANCE = 2.0
+_HAD_ITS_CHANCE = 3.0
 """Seconds of CPU in one wait after which a process was not kept from anything; a node starts in a third of one."""
 _BEGINNING = 1.0
 """Seconds of CPU that a program may take to begin; one that computes on takes what it gets, and waits for ever."""

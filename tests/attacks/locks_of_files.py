@@ -9,9 +9,9 @@ import struct
 
 from _tries import tries
 
-file = os.open("/tmp/locked", os.O_CREAT | os.O_RDWR)
-lock = struct.pack("hhqqi4x", fcntl.F_WRLCK, 0, 0, 1, 0)
+file = os.open(__file__, os.O_RDONLY)  # others may have filled /tmp
+lock = struct.pack("hhqqi4x", fcntl.F_RDLCK, 0, 0, 1, 0)
 for command in (fcntl.F_SETLK, fcntl.F_SETLKW, 37, 38):  # the last two belong to the open file: F_OFD_SETLK, …LKW
     tries(f"command {command}", lambda command=command: fcntl.fcntl(file, command, lock))
-tries("lockf", lambda: fcntl.lockf(file, fcntl.LOCK_EX, 1, 2))
+tries("lockf", lambda: fcntl.lockf(file, fcntl.LOCK_SH, 1, 2))
 print("done")
