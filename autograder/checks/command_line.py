@@ -55,12 +55,14 @@ class CommandLine:
         if not words:
             raise CommandLineError(f"`{self.entry}` in `{self.file}` has no words.", "unanswered", f"Write {example}.")
         option = ""  # the one that the next word belongs to
-        for word in words:
+        for before, word in itertools.pairwise(["", *words]):
             if (word in _WITH_A_WORD or word in _ALONE) == bool(option):
                 raise CommandLineError(
                     f"`{self.entry}` in `{self.file}` is not a list of ROS arguments: `{word}` is not expected there.",
                     "command-line",
-                    f"Every rule has its own `-r`, every parameter its own `-p`: {example}.",
+                    "There is no space after `:=`."
+                    if before.endswith(":=")
+                    else f"Every rule has its own `-r`, every parameter its own `-p`: {example}.",
                 )
             option = "" if option or word in _ALONE else word
         if option:
@@ -83,7 +85,9 @@ class CommandLine:
             raise CommandLineError(f"`{self.entry}` in `{self.file}` has no answer yet.", "unanswered")
         if not isinstance(text, str) or len(text) > _LONGEST:
             raise CommandLineError(
-                f"`{self.entry}` in `{self.file}` is not a command line.", "command-line", "Put it in quotes."
+                f"`{self.entry}` in `{self.file}` is not a command line.",
+                "command-line",
+                "Write the words in one line, as you would type them, without brackets and commas.",
             )
         return text
 
