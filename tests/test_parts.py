@@ -185,11 +185,6 @@ def test_what_is_no_table_gives_nothing(grade: Grade, text: str) -> None:  # noq
     assert result.first_failure is not None and result.first_failure.code == "not-yaml"
 
 
-def test_a_list_in_place_of_a_table_is_called_one(grade: Grade) -> None:  # noqa: F811
-    first = grade(TABLE, table__yaml="- reliability: best_effort\n- late: 5\n- heard: yes\n").first_failure
-    assert first is not None and "begins with `- `" in first.because
-
-
 def test_a_table_that_is_missing_gives_nothing(grade: Grade) -> None:  # noqa: F811
     result = grade(TABLE)
     assert result.points == 0.0

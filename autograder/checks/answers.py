@@ -60,9 +60,6 @@ class Answers:
         except student_yaml.StudentFileError as error:
             hint = error.hint or _LINES
             outcomes.failed(title, because=error.because, hint=hint, code=error.code)
-        if isinstance(table, list):
-            because = "It is a list: a line that begins with `- ` is an item of one."
-            outcomes.failed(title, because=because, hint="Leave the `- ` out.", code="not-yaml")
         if not isinstance(table, dict) or not table:
             outcomes.failed(title, because=_no_table(table), hint=_LINES, code="not-yaml")
         self._table = {str(key).strip(): value for key, value in table.items()}
