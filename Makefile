@@ -13,7 +13,7 @@ RUN := PATH="$(CURDIR)/.venv/bin:$$PATH"
 define set_up
 @for python in $(if $(PYTHON),"$(PYTHON)") python3 python3.14 python3.13 python3.12 python3.11; do \
   if "$$python" -I -c 'import sys; sys.exit(sys.version_info < (3, 6))' 2>/dev/null; then \
-    exec "$$python" -I autograder/bootstrap.py --python "$(PYTHON)" $(1); fi; done; \
+    exec "$$python" -I autograder/setup/bootstrap.py --python "$(PYTHON)" $(1); fi; done; \
 echo "No Python was found. The kit needs Python 3.11 to 3.14." >&2; \
 echo "What to do: sudo apt-get install python3 python3-venv   or name one: make PYTHON=/path/to/python3.12" >&2; exit 2
 endef
@@ -42,7 +42,7 @@ check: setup ## report on one notebook: NB=path/to/notebook.ipynb
 	@$(RUN) autograder check "$(NB)" $(ARGS)
 
 jupyter: setup ## open the labs in JupyterLab
-	@cd labs && JUPYTER_CONFIG_PATH="$(CURDIR)/autograder/jupyter" $(RUN) jupyter lab $(if $(filter 0,$(shell id -u)),--allow-root) $(ARGS)
+	@cd labs && JUPYTER_CONFIG_PATH="$(CURDIR)/autograder/notebook/jupyter" $(RUN) jupyter lab $(if $(filter 0,$(shell id -u)),--allow-root) $(ARGS)
 
 release: setup ## make labs/ from solutions/
 	@$(RUN) autograder release $(ARGS)

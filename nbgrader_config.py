@@ -14,16 +14,12 @@ try:
     # nbgrader looks for modules in the working folder, which may be a student's.
     sys.path[:] = [str(_ROOT), *(folder for folder in sys.path if folder not in ("", str(Path.cwd()), str(_ROOT)))]
 
-    from autograder.grading.stage_b import prepare_nbgrader
+    from autograder.gradebook.api import prepare_nbgrader
 
     prepare_nbgrader()
 
-    from autograder.grading.stages import configure
+    from autograder.gradebook.entry import take_over
 
-    configure(get_config(), _ROOT)  # noqa: F821  traitlets provides get_config
-
-    from autograder.grading.validate import install
-
-    install(_ROOT)
+    take_over(get_config(), _ROOT)  # noqa: F821  traitlets provides get_config
 except BaseException as error:
     sys.exit(f"nbgrader_config.py: {type(error).__name__}: {error}. Nothing was executed; run `make` first.")

@@ -1,10 +1,12 @@
 """A ROS 2 course kit that grades itself: it launches students' nodes in a sandbox and watches the ROS graph."""
 
-__version__ = "0.1.0"
+from autograder.core.version import VERSION
+
+__version__ = VERSION
 
 
 def load_ipython_extension(shell: object) -> None:
     """Make `%load_ext autograder` register the `%%node` and `%%file` cell magics."""
-    from autograder.notebook import register
+    from autograder.notebook.extension import register
 
     register(shell)

@@ -7,7 +7,6 @@ second builder takes the outputs of the first from the cache, so book and slides
 from __future__ import annotations
 
 import os
-import socket
 import sys
 from pathlib import Path
 
@@ -15,26 +14,11 @@ HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent
 sys.path[:0] = [str(ROOT), str(HERE / "_ext")]
 
+from autograder.graph.domains import free_domains  # noqa: E402
 from autograder.sandbox.environment import profile_environment  # noqa: E402  (needs the path above)
 
-
-def free_domain() -> int:
-    """Return a ROS domain ID (1 to 101) in which no participant of this machine is alive."""
-    ids = range(1, 102)
-    first = os.getpid() % len(ids)
-    for domain in (*ids[first:], *ids[:first]):
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-            try:
-                # RTPS: the first participant of a domain takes this unicast port.
-                probe.bind(("127.0.0.1", 7410 + 250 * domain))
-            except OSError:
-                continue
-            return domain
-    raise RuntimeError("All ROS domains of this machine are in use.")
-
-
 # What the kernels inherit. The log folder must exist before rclpy starts.
-os.environ |= profile_environment() | {"ROS_DOMAIN_ID": str(free_domain()), "JUPYTER_PREFER_ENV_PATH": "1"}
+os.environ |= profile_environment() | {"ROS_DOMAIN_ID": str(next(free_domains())), "JUPYTER_PREFER_ENV_PATH": "1"}
 Path(os.environ["ROS_LOG_DIR"]).mkdir(parents=True, exist_ok=True)
 
 project = "ROS 2 in Python: executors, names, lifecycle, quality of service"

@@ -11,7 +11,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from autograder.results import Isolation
+from autograder.core.results import Isolation
 from autograder.sandbox.nodes import NodeSandbox, Program
 from autograder.sandbox.processes import descendants, memory
 

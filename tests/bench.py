@@ -25,9 +25,9 @@ import sample_class
 from rich.console import Console
 from rich.table import Table
 
-from autograder.grading.stage_a import result_path
-from autograder.results import SubmissionResult
-from autograder.submission.lab import grade_id_of, load_lab
+from autograder.core.results import SubmissionResult
+from autograder.course.lab import grade_id_of, load_lab
+from autograder.grading.store import ResultStore
 
 LAB = "lab2_executors"
 SET_UP = "setup"
@@ -36,7 +36,7 @@ BIN = Path(sys.prefix) / "bin"
 PLAIN_LAUNCH = """
 import os, signal, subprocess, sys, tempfile
 from pathlib import Path
-from autograder.checks import session
+from autograder.checks import runtime
 
 
 class PlainProgram:
@@ -106,7 +106,7 @@ class PlainPrograms:
     close = end
 
 
-session.current._sandbox = PlainPrograms()
+runtime.current._sandbox = PlainPrograms()
 """
 
 
@@ -199,7 +199,7 @@ def ours(folder: Path, students: list[str]) -> Measured:
     for student in students:
         sample_class.build_student(lab, student, root / "handed_in")
     seconds, cpu = timed([BIN / "autograder", "grade", LAB, root / "handed_in", "--force"], root)
-    results = {student: SubmissionResult.load(result_path(root, LAB, student)) for student in students}
+    results = {student: SubmissionResult.load(ResultStore(root).path(LAB, student)) for student in students}
     return Measured(
         seconds, cpu, {name: {c.grade_id: c.points for c in result.checks} for name, result in results.items()}
     )

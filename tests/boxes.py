@@ -7,7 +7,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from autograder.results import Isolation
+from autograder.core.results import Isolation
 from autograder.sandbox import bubblewrap
 from autograder.sandbox.environment import python_environment
 from autograder.sandbox.outer import run_in_sandbox

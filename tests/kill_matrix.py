@@ -12,7 +12,7 @@ from pathlib import Path
 import sample_class
 from sample_class import ROOT, Expected
 
-from autograder.submission.lab import Lab, load_lab
+from autograder.course.lab import Lab, load_lab
 
 PAGE = ROOT / "tests" / "classes" / "KILL_MATRIX.md"
 

@@ -17,7 +17,7 @@ import sample_class
 import yaml
 from sample_class import ROOT
 
-from autograder.submission.lab import Lab, grade_id_of, load_lab, source_of
+from autograder.course.lab import Lab, grade_id_of, load_lab, source_of
 
 PAGE = ROOT / "tests" / "classes" / "REQUIREMENTS.md"
 

@@ -18,7 +18,7 @@ import yaml
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
-from autograder.submission.lab import Lab, grade_id_of, load_lab  # noqa: E402
+from autograder.course.lab import Lab, grade_id_of, load_lab  # noqa: E402
 
 
 @dataclass

@@ -20,9 +20,10 @@ import sample_class
 from rich.console import Console
 from rich.table import Table
 
-from autograder.grading.stage_a import Settings, run_class
-from autograder.results import SubmissionResult
-from autograder.submission.lab import Lab, load_lab
+from autograder.core.results import SubmissionResult
+from autograder.course.lab import Lab, load_lab
+from autograder.grading.pool import run_class
+from autograder.grading.runner import Settings
 
 BUSY_LOOPS = 4
 # Not to outlive this program, however it ends: standard input closes then.

@@ -47,7 +47,7 @@ def report(request: pytest.FixtureRequest) -> dict[str, dict[str, Any]]:
             text = said.stdout + said.stderr
         else:
             text = as_ordinary_user(
-                "from autograder.results import Isolation\n"
+                "from autograder.core.results import Isolation\n"
                 "from autograder.sandbox.outer import run_in_sandbox\n"
                 f"run = run_in_sandbox({[*RUN_STDIN]!r}, {source.encode()!r}, Isolation.FULL, 120.0)\n"
                 "print(run.stdout.decode(), run.stderr)\n"

@@ -22,7 +22,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 
 import sample_class
 
-from autograder.submission.lab import lab_names, load_lab
+from autograder.course.lab import lab_names, load_lab
 
 ROOT = Path(__file__).resolve().parent.parent
 START_SECONDS, RUN_SECONDS = 90, 240

@@ -10,10 +10,10 @@ from pathlib import Path
 
 import pytest
 
-from autograder.checks import session
+from autograder.checks import runtime
+from autograder.core.results import CheckResult, Isolation, Outcome, Status
 from autograder.grading.job import Cell, Job
 from autograder.grading.worker import run_job
-from autograder.results import CheckResult, Isolation, Outcome, Status
 
 SET_UP = """\
 %load_ext autograder
@@ -79,11 +79,11 @@ def grade(tmp_path: Path) -> Iterator[Grade]:
                 Cell(grade_id="check", points=2, source=textwrap.dedent(check)),
             ],
         )
-        (result,) = [check for part in run_job(job, tmp_path) for check in part.checks]
+        (result,) = run_job(job, tmp_path)
         return result
 
     yield run
-    session.current.close()
+    runtime.current.close()
     linecache.clearcache()
 
 
@@ -551,7 +551,7 @@ launch:
     params = "/veh/robot:\n  ros__parameters: {word: from the file}\n"
     result = grade(check, robot__py=f"import os\n{program}", a__launch__yaml=launched, p__yaml=params)
     assert result.points == 2.0, result
-    assert not list(session.current.folder.glob(".launch_params_*"))
+    assert not list(runtime.current.folder.glob(".launch_params_*"))
 
 
 def test_a_parameter_file_that_ros2_launch_would_not_find_is_the_reason(grade: Grade) -> None:

@@ -10,9 +10,10 @@ import pytest
 import sample_class
 from sample_class import ROOT
 
-from autograder.grading.stage_a import Settings, run_class
-from autograder.results import CheckResult, SubmissionResult
-from autograder.submission.lab import Lab, load_lab
+from autograder.core.results import CheckResult, SubmissionResult
+from autograder.course.lab import Lab, load_lab
+from autograder.grading.pool import run_class
+from autograder.grading.runner import Settings
 
 LABS = kill_matrix.labs()
 MEMBERS = [(lab, student) for lab in LABS for student in sample_class.students(lab)]

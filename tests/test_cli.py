@@ -20,10 +20,10 @@ import pytest
 import toy
 from junitparser import JUnitXml
 
-from autograder.files import write_beside
+from autograder.core.files import write_beside
+from autograder.course.lab import load_lab
 from autograder.sandbox.isolation import preflight
 from autograder.sandbox.scratch import Scratch
-from autograder.submission.lab import load_lab
 
 KIT = Path(__file__).resolve().parent.parent
 MAIN = "import sys; sys.argv[0] = 'autograder'; from autograder.cli import main; main()"
@@ -216,7 +216,7 @@ def test_an_interrupt_keeps_finished_results_and_leaves_nothing_running(root: Pa
     hand_in(course, "ann", "print('hello')")
     for number in range(3):
         hand_in(course, f"stuck{number}", STUCK)
-    process = start(course, "grade", "toy", "class", "--jobs", "4", start_new_session=True)
+    process = start(course, "grade", "toy", "class", "--jobs", "1", start_new_session=True)
     assert process.stderr is not None
     assert "ann" in process.stderr.readline()
     family = family_with_a_worker(process)

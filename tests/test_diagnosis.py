@@ -14,11 +14,11 @@ import pytest
 from diagnosis_cases import CASES
 
 import autograder.diagnosis
-from autograder.checks import Node, launch, session
+from autograder.checks import Node, launch, runtime
+from autograder.core.results import Isolation
 from autograder.diagnosis import Diagnosis, Scene
 from autograder.diagnosis.codes import CODES
 from autograder.diagnosis.events import read
-from autograder.results import Isolation
 
 TOGETHER = 8
 """Programs in one launch."""
@@ -39,7 +39,7 @@ def answers(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, tupl
     folder = tmp_path_factory.mktemp("programs")
     for name, case in CASES.items():
         (folder / f"{name}.py").write_text(case.source(name))
-    session.current.configure(folder, Isolation.NONE, 7)
+    runtime.current.configure(folder, Isolation.NONE, 7)
     found: dict[str, tuple[Diagnosis | None, str]] = {}
     names = list(CASES)
     for start in range(0, len(names), TOGETHER):
@@ -62,7 +62,7 @@ def answers(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, tupl
             for name in batch:
                 ros.observer.wait(lambda: answered(name), 8.0)  # noqa: B023
     yield found
-    session.current.close()
+    runtime.current.close()
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -119,11 +119,11 @@ rclpy.spin(rclpy.create_node("twin"))
 
 def test_where_a_program_runs_twice_the_node_of_one_is_not_the_misplaced_node_of_the_other(tmp_path: Path) -> None:
     (tmp_path / "twin.py").write_text(LATE)
-    session.current.configure(tmp_path, Isolation.NONE, 7)
+    runtime.current.configure(tmp_path, Isolation.NONE, 7)
     with launch(Node("twin", namespace="/first"), Node("twin", namespace="/late"), Node("twin")) as ros:
         ros.observer.wait(lambda: {"/first/twin", "/twin"} <= set(ros.observer.nodes()), 20.0)
         ros.observer.wait(lambda: all(inside.attached for inside in ros.scene().insides), 20.0)
         late, astray = [autograder.diagnosis.why_no_node(ros.scene(), f"/{where}/twin") for where in ("late", "astray")]
-    session.current.close()
+    runtime.current.close()
     assert late.code == "no-node" and "runs, but" in late.because
     assert astray.code == "namespace" and "namespace: `/twin`." in astray.because

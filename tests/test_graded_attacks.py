@@ -11,10 +11,10 @@ from pathlib import Path
 
 import pytest
 
+from autograder.core.results import Isolation, Status
 from autograder.grading import supervisor
 from autograder.grading.job import Cell, Job
-from autograder.grading.stage_a import run_in_worker
-from autograder.results import Isolation, Status
+from autograder.grading.runner import run_in_worker
 from autograder.sandbox.isolation import preflight
 
 FOLDER = Path(__file__).parent / "attacks" / "graded"

@@ -25,9 +25,9 @@ from rclpy.qos import (
     qos_check_compatible,
 )
 
-from autograder.checks import session
-from autograder.checks.activity import Activity
-from autograder.checks.launch import Node
+from autograder.checks import runtime
+from autograder.checks.concurrency import Activity
+from autograder.checks.program import Node
 from autograder.graph.names import nearest
 from autograder.graph.observer import Observer
 from autograder.graph.qos import first_mismatch
@@ -130,7 +130,7 @@ def test_a_parameter_keeps_its_type_on_the_command_line(value: bool | int | floa
 @pytest.fixture
 def observer() -> Iterator[Observer]:
     os.environ.update(profile_environment())
-    watching = Observer(session.current.next_domain())
+    watching = Observer(runtime.current.next_domain())
     yield watching
     watching.close()
 

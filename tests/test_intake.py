@@ -20,17 +20,17 @@ import yaml
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from autograder.checks import answers, session
+from autograder.checks import answers, findings, runtime
 from autograder.checks.command_line import CommandLineError, command_line
 from autograder.checks.forms import NAME_OR_NONE
-from autograder.errors import KitError
-from autograder.grading.collect import collect
+from autograder.core.errors import KitError
+from autograder.core.results import Isolation, Status
+from autograder.course.lab import grade_id_of, load_lab
 from autograder.grading.job import Cell, Job
 from autograder.grading.worker import run_job
 from autograder.launch_files import LaunchFileError, read_launch_file
 from autograder.report.terminal import plain
-from autograder.results import Isolation, Status
-from autograder.submission.lab import grade_id_of, load_lab
+from autograder.submission.intake import collect
 from autograder.submission.reader import read_submission
 
 CASES = {path.stem: yaml.safe_load(path.read_text(encoding="utf-8")) for path in
@@ -178,7 +178,7 @@ def test_tables_of_answers(tmp_path: Path) -> None:
             *(Cell(grade_id=name, points=2, source=check.format(name)) for name in cases),
         ],
     )  # fmt: skip
-    results = {check.grade_id: check for part in run_job(job, tmp_path) for check in part.checks}
+    results = {check.grade_id: check for check in run_job(job, tmp_path)}
     assert results.keys() == cases.keys()
     for name, case in cases.items():
         assert (results[name].status, results[name].points) == (Status.FAILED, 0.0), name
@@ -205,7 +205,7 @@ def test_markdown(case: dict[str, Any]) -> None:
     from bs4 import BeautifulSoup
     from nbconvert.filters import markdown2html
 
-    from autograder.grading.stages import inert
+    from autograder.gradebook.inert import inert
 
     page = BeautifulSoup(markdown2html(inert(written_out(case["text"]))), "html.parser")
     plain = {"p", "a", "code", "pre", "br", "em", "strong", "blockquote", "ol", "li"}
@@ -231,10 +231,10 @@ FORMS = {"number": range(1, 9), "word": ["yes", "no"], "name": NAME_OR_NONE, "wo
 @settings(max_examples=50, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
 @given(text=tables | st.text(max_size=40).map(lambda text: f"number: {text}\nword: {text}"))
 def test_no_table_leaves_a_check_undecided(text: str, tmp_path: Path) -> None:
-    before = session.current.folder
-    session.current.configure(tmp_path, Isolation.NONE, seed=1)
+    before = runtime.current.folder
+    runtime.current.configure(tmp_path, Isolation.NONE, seed=1)
     (tmp_path / "table.yaml").write_bytes(text.encode("utf-8", "replace"))
-    session.reset()
+    findings.current.reset()
     try:
         with answers("table.yaml") as table:
             table.expect_filled(FORMS)
@@ -247,8 +247,8 @@ def test_no_table_leaves_a_check_undecided(text: str, tmp_path: Path) -> None:
         with contextlib.suppress(CommandLineError):
             command_line("table.yaml", "word").words()
     finally:
-        session.current.configure(before, Isolation.NONE, seed=1)
-        session.reset()
+        runtime.current.configure(before, Isolation.NONE, seed=1)
+        findings.current.reset()
 
 
 WHOLE = io.BytesIO()
@@ -297,7 +297,7 @@ def test_no_name_in_a_zip_stops_a_class(names: list[str], tmp_path: Path) -> Non
 
 @pytest.mark.parametrize("source", ["\n \t" * 20_000 + '"', "a." * 30_000, '"' + "x" * 500])
 def test_code_that_would_take_the_colouring_long_is_shown_plain(source: str) -> None:
-    from autograder.grading.stages import ColouredCode
+    from autograder.gradebook.feedback import ColouredCode
 
     assert "<span class=" not in ColouredCode(pygments_lexer="ipython3")(source).replace("<span></span>", "")
     assert "<span class=" in ColouredCode(pygments_lexer="ipython3")("import rclpy")

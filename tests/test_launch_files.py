@@ -11,6 +11,9 @@ import yaml
 from rclpy.node import Node
 from sample_class import ROOT
 
+from autograder.core.student_yaml import FILE_BYTES
+from autograder.course.cell_file import parse
+from autograder.course.lab import load_lab
 from autograder.launch_files import (
     LaunchedNode,
     LaunchFileError,
@@ -18,9 +21,6 @@ from autograder.launch_files import (
     read_launch_file,
     remove_written,
 )
-from autograder.student_yaml import FILE_BYTES
-from autograder.submission.lab import load_lab
-from autograder.submission.magics import parse
 
 CAMERA = '- node: {pkg: "camera_lab", exec: "camera_demo"'
 

@@ -15,7 +15,7 @@ from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.lifecycle import LifecycleNode, TransitionCallbackReturn
 
-from autograder.checks import session
+from autograder.checks import runtime
 from autograder.graph.lifecycle import LifecycleClient, NoAnswer, ServiceMissing, in_order
 from autograder.graph.observer import Observer
 from autograder.sandbox.environment import profile_environment
@@ -43,7 +43,7 @@ class Part(LifecycleNode):  # type: ignore[misc]
 def observer() -> Iterator[Observer]:
     os.environ.update(profile_environment())
     Path(os.environ["ROS_LOG_DIR"]).mkdir(parents=True, exist_ok=True)
-    watching = Observer(session.current.next_domain())
+    watching = Observer(runtime.current.next_domain())
     yield watching
     watching.close()
 

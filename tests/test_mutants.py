@@ -13,7 +13,7 @@ from mutation.source import Source
 from mutation.text_rules import text_changes
 from sample_class import ROOT
 
-from autograder.submission.lab import load_lab
+from autograder.course.lab import load_lab
 
 PROGRAM = """\
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup

@@ -15,10 +15,16 @@ from typing import Any
 import pytest
 import toy
 
-from autograder.errors import KitError
-from autograder.grading import stage_a, stage_b, supervisor
-from autograder.grading.stage_a import Settings, result_path
-from autograder.submission.lab import Lab, grade_id_of, load_lab
+from autograder.core.errors import KitError
+from autograder.course.lab import Lab, grade_id_of, load_lab
+from autograder.gradebook.api import prepare_nbgrader
+from autograder.gradebook.grades import write_grades
+from autograder.gradebook.recorder import Recorder
+from autograder.gradebook.release import register, release
+from autograder.grading import runner
+from autograder.grading.runner import Settings
+from autograder.grading.store import ResultStore
+from autograder.grading.validation import validated
 
 KIT = Path(__file__).resolve().parent.parent
 LIVE = (
@@ -52,7 +58,7 @@ class Course:
 
     def run(self, student: str) -> None:
         path = self.root / "build" / "submitted" / student / toy.LAB / f"{toy.LAB}.ipynb"
-        stage_a.run_submission(path, student, self.lab, Settings(), keep_in=result_path(self.root, toy.LAB, student))
+        runner.run_submission(path, student, self.lab, Settings(), ResultStore(self.root))
 
     def grade(self, *students: str, force: bool = False) -> list[str]:
         """Run and record; return whom nbgrader was asked to record."""
@@ -63,7 +69,7 @@ class Course:
         return [student for student in students if self._stamp(student) != before[student]]
 
     def record(self, *students: str, force: bool = False) -> None:
-        with stage_b.Recorder(self.root, self.lab, force) as recorder:
+        with Recorder(self.root, self.lab, force) as recorder:
             for student in students:
                 recorder.record(student)
         assert recorder.failures == {}
@@ -74,7 +80,7 @@ class Course:
 
     def grades(self, student: str) -> dict[str, tuple[float | None, bool]]:
         """Automatic score and whether it waits for a person, by grade_id."""
-        stage_b.prepare_nbgrader()
+        prepare_nbgrader()
         from nbgrader.api import Gradebook
 
         with Gradebook(f"sqlite:///{self.root / 'build' / 'gradebook.db'}") as gradebook:
@@ -92,7 +98,7 @@ class Course:
 def course(tmp_path_factory: pytest.TempPathFactory) -> Any:
     """One course for the module, for a fresh gradebook takes seconds."""
     patch = pytest.MonkeyPatch()
-    patch.setattr(stage_a, "run_in_worker", lambda job, _=None: supervisor.believed(job, toy.judge(job)))
+    patch.setattr(runner, "run_in_worker", lambda job, _=None: validated(toy.judge(job), job.checks))
     yield Course(tmp_path_factory.mktemp("nbgrader") / "course")
     patch.undo()
 
@@ -138,7 +144,7 @@ def test_no_verdict_means_manual_grading(course: Course) -> None:
     course.hand_in("died", course.cells(talker="die"))
     course.grade("died")
     assert course.grades("died")["check_talker"] == (None, True)
-    rows = stage_b.write_grades(course.root).read_text().splitlines()
+    rows = write_grades(course.root).read_text().splitlines()
     assert rows[0] == "student,lab,score,max_score,waiting" and "died,toy,,9,2" in rows
     assert "an instructor decides" in course.feedback("died")
 
@@ -154,24 +160,20 @@ def test_markers_in_an_answer_are_only_words(course: Course) -> None:
 def test_the_hook_before_grading_leaves_a_foreign_working_folder_alone(
     course: Course, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from traitlets.config import Config
-
-    stage_b.prepare_nbgrader()
-    from autograder.grading.stages import configure
+    prepare_nbgrader()
+    from autograder.gradebook.entry import before_autograde
 
     (tmp_path / "build").mkdir()
     monkeypatch.chdir(tmp_path)
-    config = Config()
-    configure(config, course.root)
-    stage_b.register(course.root, toy.LAB)
-    config.Autograde.pre_convert_hook(assignment=toy.LAB, student="ann", notebooks=[])
+    register(course.root, toy.LAB)
+    before_autograde(course.root, assignment=toy.LAB, student="ann", notebooks=[])
     assert list((tmp_path / "build").iterdir()) == []
 
 
 def test_a_result_that_lost_a_check_means_manual_grading(course: Course) -> None:
     course.hand_in("lost", course.cells())
     course.run("lost")
-    path = result_path(course.root, toy.LAB, "lost")
+    path = ResultStore(course.root).path(toy.LAB, "lost")
     result = json.loads(path.read_text())
     del result["checks"][0]
     result["checks"][0]["max_points"] = 1000
@@ -256,7 +258,7 @@ def test_nothing_of_a_students_is_live_in_feedback_or_formgrader(course: Course)
     from nbgrader.server_extensions.formgrader import handlers
     from traitlets.config import Config
 
-    from autograder.grading.stages import configure
+    from autograder.gradebook.config import configure
 
     # As formgrader makes its exporter.
     config = Config()
@@ -307,7 +309,7 @@ def test_a_manual_grade_stays_and_reaches_the_feedback(course: Course) -> None:
     course.grade("manual")
     assert "(Score: 7.5 / 9.0)" in course.feedback("manual")
     course.grade("manual", force=True)
-    assert "manual,toy,7.5,9,0\n" in stage_b.write_grades(course.root).read_text()
+    assert "manual,toy,7.5,9,0\n" in write_grades(course.root).read_text()
 
 
 def test_changed_graded_cells_are_refused_with_a_way_out(course: Course, tmp_path: Path) -> None:
@@ -316,11 +318,11 @@ def test_changed_graded_cells_are_refused_with_a_way_out(course: Course, tmp_pat
     path = copied / "solutions" / toy.LAB / "toy.ipynb"
     path.write_text(path.read_text().replace("check_answers", "check_renamed"))
     with pytest.raises(KitError, match=r"gradebook\.db away"):
-        stage_b.register(copied, toy.LAB)
+        register(copied, toy.LAB)
 
 
 def test_releasing_twice_gives_the_same_files(course: Course) -> None:
-    folder = stage_b.release(course.root, toy.LAB)
+    folder = release(course.root, toy.LAB)
     path = folder / "toy.ipynb"
     first = path.read_bytes()
     cells = json.loads(first)["cells"]
@@ -333,7 +335,7 @@ def test_releasing_twice_gives_the_same_files(course: Course) -> None:
     before = source.read_text()
     source.write_text(json.dumps(noisy))
     try:
-        stage_b.release(course.root, toy.LAB)
+        release(course.root, toy.LAB)
     finally:
         source.write_text(before)
     assert path.read_bytes() == first
@@ -384,7 +386,7 @@ def test_nbgrader_refuses_stock_execution(course: Course, tmp_path: Path) -> Non
     stages = '--Autograde.autograde_preprocessors=["nbgrader.preprocessors.Execute"]'
     done = nbgrader(root, "autograde", toy.LAB, stages)
     assert done.returncode != 0 and not (root / "build" / "autograded").exists()
-    broken = (root / "nbgrader_config.py").read_text().replace("autograder.grading.stages", "autograder.nowhere")
+    broken = (root / "nbgrader_config.py").read_text().replace("autograder.gradebook.entry", "autograder.nowhere")
     (root / "nbgrader_config.py").write_text(broken)
     done = nbgrader(root, "autograde", toy.LAB)
     assert done.returncode != 0 and "Nothing was executed" in done.stderr

@@ -17,9 +17,9 @@ from typing import Any
 import pytest
 import toy
 
-from autograder.grading.collect import collect
-from autograder.grading.stage_b import prepare_nbgrader
-from autograder.submission.lab import load_lab
+from autograder.course.lab import load_lab
+from autograder.gradebook.recorder import prepare_nbgrader
+from autograder.submission.intake import collect
 
 KIT = Path(__file__).resolve().parent.parent
 

@@ -16,9 +16,10 @@ import pytest
 from IPython.core.interactiveshell import InteractiveShell
 from jupyter_client.manager import KernelManager
 
-from autograder import kernel
-from autograder.kernel_folder import MANIFEST
-from autograder.submission.lab import blank_mark
+from autograder.core import front_end
+from autograder.course.lab import blank_mark
+from autograder.notebook.kernel import Kernel
+from autograder.notebook.program_folder import MANIFEST
 
 START = 60
 """Far beyond what a kernel, or a cell, takes on a busy machine, in seconds."""
@@ -59,9 +60,9 @@ def shell(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Interacti
     shell = InteractiveShell.instance()
     shell.run_line_magic("load_ext", "autograder")
     yield shell
-    assert kernel.active is not None
-    kernel.active.ready()
-    kernel.active = None
+    assert front_end.active is not None
+    front_end.active.ready()
+    front_end.active = None
     InteractiveShell.clear_instance()
 
 
@@ -129,20 +130,20 @@ def test_the_magics_explain_themselves(shell: InteractiveShell) -> None:
 
 
 def test_each_cell_begins_with_no_findings(shell: InteractiveShell) -> None:
-    from autograder.checks import session
-    from autograder.results import Outcome, Status
+    from autograder.checks import findings
+    from autograder.core.results import Outcome, Status
 
-    session.current.outcomes.append(Outcome(status=Status.PASSED, title="left over"))
+    findings.current.outcomes.append(Outcome(status=Status.PASSED, title="left over"))
     shell.run_cell("1")
-    assert session.current.outcomes == []
+    assert findings.current.outcomes == []
 
 
-def new_kernel(shell: InteractiveShell, manifest: Path | None) -> kernel.Kernel:
+def new_kernel(shell: InteractiveShell, manifest: Path | None) -> Kernel:
     """What a new kernel finds: the manifest is of one that has ended."""
     if manifest is not None:
         content = json.loads(manifest.read_text())
         manifest.write_text(json.dumps(content | {"kernel": {"pid": 1, "start": "0"}}))
-    return kernel.Kernel(shell)
+    return Kernel(shell)
 
 
 def test_a_new_kernel_knows_no_program_of_the_last_one(shell: InteractiveShell) -> None:
@@ -154,8 +155,8 @@ def test_a_new_kernel_knows_no_program_of_the_last_one(shell: InteractiveShell) 
 def test_the_programs_stay_when_the_extension_is_loaded_again(shell: InteractiveShell) -> None:
     shell.run_cell("%%node talker\nprint('hello')\n")
     shell.run_line_magic("reload_ext", "autograder")
-    assert kernel.active is not None and kernel.active.has("talker.py")
-    assert shell.events.callbacks["pre_run_cell"].count(kernel.active.begin_cell) == 1
+    assert front_end.active is not None and front_end.active.has("talker.py")
+    assert shell.events.callbacks["pre_run_cell"].count(front_end.active.begin_cell) == 1
 
 
 def test_nothing_is_deleted_that_no_cell_wrote(shell: InteractiveShell) -> None:
@@ -194,7 +195,7 @@ def test_two_notebooks_of_one_folder_do_not_meet(shell: InteractiveShell, monkey
     shell.run_cell("%%node talker\nprint('hello')\n")
     Path("other.ipynb").write_text("{}")
     monkeypatch.setenv("JPY_SESSION_NAME", str(Path("other.ipynb").resolve()))
-    other = kernel.Kernel(shell)
+    other = Kernel(shell)
     assert other.folder.path.name == "other" and not other.has("talker.py")
     assert (folder() / "talker.py").is_file()
 
@@ -202,7 +203,7 @@ def test_two_notebooks_of_one_folder_do_not_meet(shell: InteractiveShell, monkey
 def test_visual_studio_code_says_which_notebook_it_is(shell: InteractiveShell, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("JPY_SESSION_NAME")
     shell.user_ns["__vsc_ipynb_file__"] = str(Path("lab.ipynb").resolve())
-    assert kernel.Kernel(shell).folder.path.name == "lab"
+    assert Kernel(shell).folder.path.name == "lab"
 
 
 def test_a_second_kernel_of_a_notebook_does_not_touch_the_first(shell: InteractiveShell) -> None:
@@ -212,7 +213,7 @@ def test_a_second_kernel_of_a_notebook_does_not_touch_the_first(shell: Interacti
         start = Path(f"/proc/{other.pid}/stat").read_text().rpartition(")")[2].split()[19]
         owner = {"kernel": {"pid": other.pid, "start": start}}
         manifest.write_text(json.dumps(json.loads(manifest.read_text()) | owner))
-        assert kernel.Kernel(shell).folder.path.name == "lab-2"
+        assert Kernel(shell).folder.path.name == "lab-2"
         assert (folder() / "talker.py").is_file()
         other.kill()
 
@@ -221,11 +222,12 @@ def test_without_a_notebook_the_kernel_leaves_nothing_behind(
     shell: InteractiveShell, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.delenv("JPY_SESSION_NAME")
-    kernel.active = kernel.Kernel(shell)
+    front_end.active.ready()
+    front_end.active = None
+    shell.run_line_magic("reload_ext", "autograder")
     assert say(shell, "%%node talker\nprint('hello')\n", capsys) == "node program talker written"
-    kernel.active.folder.close()
+    front_end.active.folder.close()
     assert not Path("nodes").exists()
-    kernel.active.start()
 
 
 # Kernels as a front end drives them.

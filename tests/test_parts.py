@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from test_checks import TALKER, grade  # noqa: F401  a fixture
 
 from autograder.checks.forms import allowed, plain, same, seal
-from autograder.results import CheckResult, Status
-from autograder.submission.markers import MORE_AT_GRADING, without_hidden_tests
+from autograder.core.results import CheckResult, Status
+from autograder.course.markers import MORE_AT_GRADING, without_hidden_tests
 
 PARTS = """\
 with launch("talker") as ros:

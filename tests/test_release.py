@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from autograder.grading import stage_b
-from autograder.submission.lab import CODE_STUB, load_lab
+from autograder.course.lab import CODE_STUB, load_lab
+from autograder.gradebook import release
 
 ROOT = Path(__file__).resolve().parent.parent
-released_files = functools.cache(stage_b.released_files)
+released_files = functools.cache(release.released_files)
 LABS = sorted(path.parent.name for path in (ROOT / "solutions").glob("*/*.ipynb"))
 
 

@@ -11,10 +11,10 @@ import rclpy
 from rclpy.node import Node
 from std_msgs.msg import String
 
-from autograder.checks import command_line, session
+from autograder.arguments import params_file, remap_rules
+from autograder.checks import command_line, runtime
 from autograder.checks.command_line import CommandLineError
-from autograder.graph import params_file, remap_rules
-from autograder.results import Isolation
+from autograder.core.results import Isolation
 
 
 @contextmanager
@@ -168,10 +168,10 @@ def test_nested_keys_of_a_parameter_file_are_joined() -> None:
 
 @pytest.fixture
 def table(tmp_path: Path) -> Iterator[Path]:
-    before = session.current.folder
-    session.current.configure(tmp_path, Isolation.NONE, seed=1)
+    before = runtime.current.folder
+    runtime.current.configure(tmp_path, Isolation.NONE, seed=1)
     yield tmp_path / "rules.yaml"
-    session.current.configure(before, Isolation.NONE, seed=1)
+    runtime.current.configure(before, Isolation.NONE, seed=1)
 
 
 @pytest.mark.parametrize(

@@ -12,12 +12,12 @@ import pytest
 from junitparser import JUnitXml
 from rich.console import Console
 
+from autograder.core.results import CheckResult, Isolation, NodeLog, Outcome, Part, Status, SubmissionResult
 from autograder.report.audience import Audience, result_for
 from autograder.report.export import to_csv, to_gradescope
 from autograder.report.html import check_html, submission_html
 from autograder.report.junit import junit_xml
 from autograder.report.terminal import check_text, check_view, class_view, submission_view, undecided_view
-from autograder.results import CheckResult, Isolation, NodeLog, Outcome, Part, Status, SubmissionResult
 
 NASTY = "<img src=x onerror=alert(1)>\x1b[31m\x00 `code` & [link](javascript:alert(2))"
 
@@ -39,9 +39,10 @@ FAILED = outcome(Status.FAILED, expected=NASTY, observed=NASTY, because=NASTY, h
 
 
 def result(*checks: CheckResult, student: str = "ann") -> SubmissionResult:
-    log = NodeLog(program="talker", grade_id="check", text=f"line 1\n{NASTY}\nlast line", exit_status=1)
+    log = NodeLog(program="talker", text=f"line 1\n{NASTY}\nlast line", exit_status=1)
+    checks = (checks[0].model_copy(update={"logs": [log]}), *checks[1:]) if checks else ()
     return SubmissionResult(
-        student=student, lab="lab", digest="d" * 64, isolation=Isolation.FULL, checks=list(checks), logs=[log],
+        student=student, lab="lab", digest="d" * 64, isolation=Isolation.FULL, checks=list(checks),
         problems=[outcome(Status.FAILED, title=NASTY, because=NASTY, hint=NASTY, code="forged-cell")],
     )  # fmt: skip
 
@@ -154,19 +155,19 @@ def test_an_untouched_answer_is_named_and_is_no_failure() -> None:
 def test_the_cells_that_programs_came_from_are_named() -> None:
     told: dict[str, Any] = {"remarks": ["`talker` was <changed>"], "origin": "`talker` from cell [7]"}
     assert "<changed>" in Page(check_html(VERDICTS["failed"], **told)).text
-    text = check_text(VERDICTS["failed"], [], **told)
+    text = check_text(VERDICTS["failed"], **told)
     assert "<changed>" in text and text.splitlines()[-1].strip() == "`talker` from cell [7]"
 
 
 def test_output_is_shown_without_escapes_and_only_its_end() -> None:
     text = "".join(f"\x1b[32m[INFO]\x1b[0m line {number}\r\n" for number in range(500))
     log = NodeLog(program="talker", text=text + "10 %\r100 %\x1b]0;window\x07", exit_status=None)
-    failed = check(0, outcome(Status.FAILED))
-    for view in (check_html(failed, logs=[log]), check_text(failed, [log], [], "")):
+    failed = check(0, outcome(Status.FAILED)).model_copy(update={"logs": [log]})
+    for view in (check_html(failed), check_text(failed, [], "")):
         assert "[INFO] line 499" in view and "line 400" not in view and "lines above]" in view
         assert "\x1b" not in view and "window" not in view
         assert "100 %" in view and "10 %" not in view.replace("100 %", "")
-    assert "Output" not in check_html(VERDICTS["passed"], logs=[log])
+    assert "Output" not in check_html(VERDICTS["passed"].model_copy(update={"logs": [log]}))
 
 
 def test_the_report_has_the_colours_of_the_page_it_is_in() -> None:

@@ -6,7 +6,7 @@ import pytest
 import requirements
 from sample_class import ROOT
 
-from autograder.submission.lab import load_lab
+from autograder.course.lab import load_lab
 
 LABS = requirements.labs()
 

@@ -9,8 +9,9 @@ import sample_class
 import toy
 import yaml
 
-from autograder.submission.lab import Lab, load_lab
-from autograder.submission.reader import Submission, read_submission
+from autograder.course.lab import Lab, load_lab
+from autograder.submission.reader import read_submission
+from autograder.submission.submission import Submission
 
 
 @pytest.fixture

@@ -15,8 +15,8 @@ from typing import Any
 import pytest
 from boxes import ATTACKS, ROOT, RUN_STDIN, in_sandbox
 
-from autograder.errors import KitError
-from autograder.results import Isolation
+from autograder.core.errors import KitError
+from autograder.core.results import Isolation
 from autograder.sandbox import isolation
 from autograder.sandbox.isolation import Preflight, choose, preflight
 from autograder.sandbox.nodes import Limits, NodeSandbox
@@ -36,13 +36,13 @@ def test_when_the_parent_is_killed_nothing_remains(kind: Isolation, processes: i
     ):
         pytest.skip(f"no {kind.value} isolation here")
     inner = (
-        "from pathlib import Path\nfrom autograder.results import Isolation\n"
+        "from pathlib import Path\nfrom autograder.core.results import Isolation\n"
         "from autograder.sandbox.nodes import NodeSandbox\n"
         "import tempfile; p = Path(tempfile.mkdtemp()); (p / 'sleeper.py').write_text('import time; time.sleep(600)')\n"
         f"s = NodeSandbox(p, Isolation.{kind.name}); g = s.group(); g.start('sleeper'); g.start('sleeper').wait(600)\n"
     )
     outer = (
-        "from autograder.results import Isolation\nfrom autograder.sandbox.outer import run_in_sandbox\n"
+        "from autograder.core.results import Isolation\nfrom autograder.sandbox.outer import run_in_sandbox\n"
         f"run_in_sandbox({[*RUN_STDIN]!r}, {inner.encode()!r}, Isolation.{kind.name}, 600.0)\n"
     )
     mounts = Path("/proc/self/mounts").read_text()
@@ -213,7 +213,7 @@ def test_a_program_that_only_computes_is_ended_and_says_so(tmp_path: Path) -> No
 @needs_full
 def test_a_submission_that_only_computes_has_little_left_for_its_later_launches() -> None:
     run = in_sandbox(
-        "import time, tempfile\nfrom pathlib import Path\nfrom autograder.results import Isolation\n"
+        "import time, tempfile\nfrom pathlib import Path\nfrom autograder.core.results import Isolation\n"
         "from autograder.sandbox.nodes import Limits, NodeSandbox\n"
         "folder = Path(tempfile.mkdtemp()); (folder / 'burns.py').write_text('while True: pass')\n"
         "(folder / 'asks.py').write_text('import resource; print(resource.getrlimit(resource.RLIMIT_CPU)[0])')\n"
@@ -265,7 +265,7 @@ def test_a_killed_notebook_leaves_nothing(tmp_path: Path) -> None:
         "signal.signal(signal.SIGTERM, signal.SIG_IGN)\nprint('here', flush=True)\ntime.sleep(600)\n"
     )
     source = (
-        "import time\nfrom pathlib import Path\nfrom autograder.results import Isolation\n"
+        "import time\nfrom pathlib import Path\nfrom autograder.core.results import Isolation\n"
         "from autograder.sandbox.nodes import NodeSandbox\n"
         f"sandbox = NodeSandbox(Path({str(programs)!r}), Isolation.NONE)\ngroup = sandbox.group()\n"
         "program = group.start('stays')\nwhile not program.output(): time.sleep(0.01)\n"

@@ -20,7 +20,7 @@ from pathlib import Path
 
 import pytest
 
-from autograder import bootstrap
+from autograder.setup import bootstrap
 
 ROOT = Path(__file__).resolve().parent.parent
 MAKE = shutil.which("make") or "make"
@@ -386,7 +386,7 @@ def test_a_full_disk_is_explained(tmp_path: Path) -> None:
     steps = '"$@" && cp -r "$COPY/." "$DISK" && exec make -C "$DISK" setup'
     copy = tmp_path.with_name(f"{tmp_path.name} copy")
     (copy / "autograder").mkdir(parents=True)
-    for name in ("Makefile", "autograder/bootstrap.py"):
+    for name in ("Makefile", "autograder/setup/bootstrap.py"):
         shutil.copy(ROOT / name, copy / name)
     for lock in ("requirements.lock", "requirements-dev.lock"):
         write_lock(copy, lock, "uv")

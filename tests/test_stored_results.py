@@ -8,11 +8,14 @@ from pathlib import Path
 import pytest
 import toy
 
-from autograder.grading import stage_a, supervisor
+from autograder.core.results import SubmissionResult
+from autograder.course.lab import load_lab
+from autograder.grading import runner, supervisor
 from autograder.grading.job import Job
-from autograder.grading.stage_a import Settings, run_class, run_submission
-from autograder.results import SubmissionResult
-from autograder.submission.lab import load_lab
+from autograder.grading.pool import run_class
+from autograder.grading.runner import Settings, run_submission
+from autograder.grading.store import ResultStore
+from autograder.grading.validation import validated
 
 
 @pytest.mark.skipif(len(os.sched_getaffinity(0)) < 2, reason="one core cannot become fewer")
@@ -51,9 +54,9 @@ def test_only_a_worker_without_a_result_is_asked_again(
 
     def worker(job: Job, _: object) -> SubmissionResult:
         asked.append(job)
-        return supervisor.believed(job, toy.judge(job)) if gives_a_result else supervisor.unknown(job, "It died.", "")
+        return validated(toy.judge(job), job.checks) if gives_a_result else supervisor.unknown(job, "It died.")
 
-    monkeypatch.setattr(stage_a, "run_in_worker", worker)
+    monkeypatch.setattr(runner, "run_in_worker", worker)
     for expected in runs:
-        assert run_submission(notebook, "ann", lab, Settings(), tmp_path / "result.json").needs_instructor
+        assert run_submission(notebook, "ann", lab, Settings(), ResultStore(tmp_path)).needs_instructor
         assert len(asked) == expected

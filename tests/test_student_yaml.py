@@ -10,7 +10,7 @@ import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from autograder.student_yaml import DEPTH, FILE_BYTES, VALUES, StudentFileError, load, read
+from autograder.core.student_yaml import DEPTH, FILE_BYTES, VALUES, StudentFileError, load, read
 
 
 def refused(text: str) -> StudentFileError:

@@ -18,11 +18,14 @@ import toy
 from hypothesis import given
 from hypothesis import strategies as st
 
-from autograder.errors import KitError
-from autograder.grading.collect import collect
-from autograder.submission.lab import Lab, grade_id_of, load_lab
-from autograder.submission.magics import BadNameError, parse
-from autograder.submission.reader import NOTEBOOK_BYTES, OWN_FILES, Submission, read_submission
+from autograder.core.errors import KitError
+from autograder.course.cell_file import BadNameError, parse
+from autograder.course.lab import Lab, grade_id_of, load_lab
+from autograder.submission.cell_files import OWN_FILES
+from autograder.submission.intake import collect
+from autograder.submission.notebook_file import NOTEBOOK_BYTES
+from autograder.submission.reader import read_submission
+from autograder.submission.submission import Submission
 
 ROOT = Path(__file__).resolve().parent.parent
 ORDINARY_USER = 12345
@@ -302,7 +305,8 @@ def test_the_digest_follows_the_kit(lab: Lab, tmp_path: Path) -> None:
     shutil.copytree(ROOT / "autograder", tmp_path / "autograder", ignore=shutil.ignore_patterns("__pycache__"))
     path = toy.hand_in(tmp_path, "ann", solved(lab))
     command = (
-        "import sys; from pathlib import Path; from autograder.submission import lab, reader\n"
+        "import sys; from pathlib import Path\n"
+        "from autograder.submission import reader; from autograder.course import lab\n"
         "print(reader.read_submission(Path(sys.argv[1]), lab.load_lab(Path(sys.argv[2]), sys.argv[3])).digest)"
     )
 

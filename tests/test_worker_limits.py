@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
+from autograder.core.results import Isolation, NodeLog
 from autograder.grading import supervisor, worker
 from autograder.grading.job import Cell, Job
-from autograder.grading.stage_a import run_in_worker
-from autograder.results import Isolation, NodeLog
+from autograder.grading.runner import run_in_worker
 
 PASS = "from autograder.checks import outcomes\nfrom autograder.checks.scoring import score\n"
 

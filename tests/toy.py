@@ -6,8 +6,8 @@ import json
 from pathlib import Path
 from typing import Any
 
+from autograder.core.results import CheckResult, Outcome, Status, SubmissionResult
 from autograder.grading.job import Job
-from autograder.results import CheckResult, Outcome, Status, SubmissionResult
 
 LAB = "toy"
 

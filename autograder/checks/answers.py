@@ -8,14 +8,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from autograder import student_yaml
-from autograder.checks import outcomes, session
+from autograder.checks import findings, outcomes, runtime
 from autograder.checks.forms import NAME_OR_NONE, allowed, begins_with_slash, one_of, same, seal
 from autograder.checks.parts import part
-from autograder.checks.scoring import score
-from autograder.checks.session import Score
+from autograder.checks.scoring import Score, score
+from autograder.core import student_yaml
+from autograder.core.results import Status
 from autograder.graph.names import nearest
-from autograder.results import Status
 
 _LINES = "Write one line for each question: `question: answer`, with a space after the colon."
 
@@ -40,7 +39,7 @@ class Answers:
         self._questions: dict[str, None] = {}
 
     def __enter__(self) -> Answers:
-        session.current.block_began = len(session.current.outcomes)
+        findings.current.block_began = len(findings.current.outcomes)
         return self
 
     def __exit__(self, kind: object, error: BaseException | None, trace: object) -> bool:
@@ -51,12 +50,12 @@ class Answers:
         if self._table:
             return
         title = f"`{self.file}` is a table of answers"
-        here = session.current.kernel
+        here = runtime.current.front_end
         if here is not None and not here.has(self.file):
             because, hint = here.why_missing("file", self.file)
             outcomes.failed(title, because=because, hint=hint, code="file-missing")
         try:
-            table = student_yaml.read(session.current.use(self.file))
+            table = student_yaml.read(runtime.current.use(self.file))
         except student_yaml.StudentFileError as error:
             hint = error.hint or _LINES
             outcomes.failed(title, because=error.because, hint=hint, code=error.code)
@@ -111,7 +110,7 @@ class Answers:
 
     def _lost(self, question: str) -> bool:
         """Whether it has been said already that there is no usable answer."""
-        found = session.current.outcomes[session.current.block_began :]
+        found = findings.current.outcomes[findings.current.block_began :]
         return any(outcome.part == question and outcome.status is Status.FAILED for outcome in found)
 
     def expect_sealed(self, answers: Mapping[str, str], hint: str = "") -> None:

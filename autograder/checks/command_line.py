@@ -7,8 +7,8 @@ import shlex
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from autograder import student_yaml
-from autograder.checks import session
+from autograder.checks import runtime
+from autograder.core import student_yaml
 
 _WITH_A_WORD = {
     "-r", "--remap", "-p", "--param", "--params-file", "-e", "--enclave",
@@ -77,7 +77,7 @@ class CommandLine:
 
     def _text(self) -> str:
         try:
-            table = student_yaml.read(session.current.use(self.file))
+            table = student_yaml.read(runtime.current.use(self.file))
         except student_yaml.StudentFileError as error:
             raise CommandLineError(error.because, error.code, error.hint or "Write `entry: words`.") from None
         text = table.get(self.entry) if isinstance(table, dict) else None

@@ -28,7 +28,7 @@ def flags(scene: Scene, overlaps: Sequence[tuple[str, str]], varied: Sequence[bo
         overlaps: topic and title of each expectation of overlapping callbacks that was met.
         varied: of each program, whether it was given parameters or arguments, which may rightly decide about names.
     """
-    insides = [Inside(scene, program) for program in scene.programs]
+    insides = [scene.inside(program) for program in scene.programs]
     by_hand = [overlap_by_hand(insides, topic, title) for topic, title in overlaps]
     return [flag for flag in by_hand if flag] + names_by_hand(scene, insides, varied)
 

@@ -8,92 +8,30 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-import yaml
-
-from autograder.checks import contradictions, outcomes, session
+from autograder.arguments import params_file, remap_rules
+from autograder.checks import contradictions, findings, outcomes, runtime
 from autograder.checks.command_line import CommandLine, CommandLineError
-from autograder.checks.expect_lifecycle import LifecycleExpectations
-from autograder.checks.expect_messages import MessageExpectations
-from autograder.checks.expect_programs import ProgramExpectations
-from autograder.checks.expect_services import ServiceExpectations
+from autograder.checks.expect.lifecycle import LifecycleExpectations
+from autograder.checks.expect.messages import MessageExpectations
+from autograder.checks.expect.programs import ProgramExpectations
+from autograder.checks.expect.services import ServiceExpectations
 from autograder.checks.parts import part
-from autograder.checks.scoring import score
-from autograder.checks.session import Score
-from autograder.checks.trial import Log, log_of, try_out
-from autograder.checks.watch import NotLaunchedError, Watch, watched
+from autograder.checks.program import Node
+from autograder.checks.scoring import Score, score
+from autograder.checks.try_out import Log, log_of, try_out
+from autograder.checks.waiting import NotLaunchedError, watched
+from autograder.core.front_end import Watcher
+from autograder.core.results import NodeLog
 from autograder.diagnosis import Diagnosis
-from autograder.graph import params_file, remap_rules
 from autograder.graph.observer import Observer
 from autograder.launch_files import LaunchFileError, read_launch_file, remove_written
-from autograder.results import NodeLog
 from autograder.sandbox.environment import profile_environment, remove_logs
 from autograder.sandbox.nodes import Program, ProgramGroup
-
-
-@dataclass(frozen=True)
-class Node:
-    """One program of the student's and the ROS arguments it is started with, named as in a launch description."""
-
-    program: str
-    namespace: str = ""
-    name: str = ""
-    remappings: Sequence[tuple[str, str]] = ()
-    parameters: Mapping[str, Any] = field(default_factory=dict)
-    params_file: str = ""
-    """A parameter file of the student's; it comes before `parameters`, which win."""
-    ros_arguments: Sequence[str] | CommandLine = ()
-    """Further words after `--ros-args`, as typed on a command line."""
-    arguments_of_its_own: Sequence[str] = ()
-    """Words before `--ros-args`."""
-    cores: int = 2
-    """CPUs that the program may use: the same number on every machine that has them."""
-    environment: Mapping[str, str] = field(default_factory=dict)
-    """Variables beside those that every program has."""
-    warnings: Sequence[str] = ()
-    """What a launch file names and does not have; the program starts without it."""
-
-    def arguments(self) -> list[str]:
-        """The program's command line."""
-        words: list[str] = []
-        for rule in self.rules():
-            words += ["-r", rule]
-        if self.params_file:
-            words += ["--params-file", self.params_file]
-        for name, value in self.parameters.items():
-            words += ["-p", f"{name}:={_yaml_value(value)}"]
-        words += self._typed()
-        return [*self.arguments_of_its_own, *(["--ros-args", *words] if words else [])]
-
-    def _typed(self) -> Sequence[str]:
-        typed = self.ros_arguments
-        return typed.words() if isinstance(typed, CommandLine) else typed
-
-    def all_rules(self) -> list[str]:
-        """The remap rules, those that were typed included."""
-        return self.rules() + remap_rules.rules_in([*self.arguments_of_its_own, *self._typed()])
-
-    def rules(self) -> list[str]:
-        """The remap rules in the order in which they are given: the first that matches wins."""
-        rules = [f"{old}:={new}" for old, new in self.remappings]
-        if self.namespace:
-            rules.append(f"__ns:={self.namespace}")
-        if self.name:
-            rules.append(f"__node:={self.name}")
-        return rules
-
-
-def _yaml_value(value: Any) -> str:
-    """A parameter value as the command line wants it; strings are quoted so that `40` stays a string."""
-    if isinstance(value, str):
-        return '"' + value.replace("\\", "\\\\").replace('"', '\\"') + '"'
-    if isinstance(value, float):
-        return repr(value)  # keeps the point: 40.0 is a double, 40 an integer
-    return yaml.safe_dump(value, default_flow_style=True, width=10_000).splitlines()[0]
 
 
 @watched
@@ -121,22 +59,22 @@ class Launch(MessageExpectations, ServiceExpectations, LifecycleExpectations, Pr
         self._missing: list[str] = []
         self._trouble: list[Diagnosis] = []
         self._group: ProgramGroup | None = None
-        self.watch: Watch | None = None
+        self.watch: Watcher | None = None
 
     def __enter__(self) -> Launch:
-        here = session.current.kernel
+        here = runtime.current.front_end
         if here is not None:
             here.ready()
-        self.domain_id = session.current.next_domain()
+        self.domain_id = runtime.current.next_domain()
         # The middleware reads its profile once, before the first participant of the process.
         os.environ.update(profile_environment())
         os.environ.pop("ROS_AUTOMATIC_DISCOVERY_RANGE", None)
-        self.observer = Observer(self.domain_id, session.current.patience)
+        self.observer = Observer(self.domain_id, findings.current.patience)
         if here is not None:
-            self.watch = Watch(here, self.observer, lambda: [program for _, program in self.programs])
+            self.watch = here.watch(self.observer, lambda: [program for _, program in self.programs])
         self.prepare()
         try:
-            self._group = session.current.sandbox.group()
+            self._group = runtime.current.sandbox.group()
             for topic, msg_type in self._listen:
                 self.observer.record(topic, msg_type)
             for offer in self._serve:
@@ -163,9 +101,9 @@ class Launch(MessageExpectations, ServiceExpectations, LifecycleExpectations, Pr
                 raise KeyError(wanted)
             return folder
 
-        folder = session.current.folder.resolve()
+        folder = runtime.current.folder.resolve()
         programs = set(self._stand_ins) or {path.stem for path in folder.glob("*.py")}
-        session.current.use(name)
+        runtime.current.use(name)
         try:
             found = read_launch_file(folder / name, arguments, find, programs, self._includes, self._around)
         except LaunchFileError as error:
@@ -199,10 +137,10 @@ class Launch(MessageExpectations, ServiceExpectations, LifecycleExpectations, Pr
             node: a program's name, or a `Node` with arguments.
         """
         launched = Node(node) if isinstance(node, str) else node
-        session.current.use(f"{launched.program}.py")
+        runtime.current.use(f"{launched.program}.py")
         if launched.params_file:
-            session.current.use(launched.params_file)
-        if not session.current.has(f"{launched.program}.py"):
+            runtime.current.use(launched.params_file)
+        if not runtime.current.has(f"{launched.program}.py"):
             self._miss(launched.program)
             return
         environment = {**launched.environment, **profile_environment(), "ROS_DOMAIN_ID": str(self.domain_id)}
@@ -215,7 +153,7 @@ class Launch(MessageExpectations, ServiceExpectations, LifecycleExpectations, Pr
         if refused:
             self._trouble.append(Diagnosis(*refused))
             return
-        unreadable = params_file.unreadable(words, session.current.folder)
+        unreadable = params_file.unreadable(words, runtime.current.folder)
         if unreadable is not None:
             hint = "Look at the indentation there, and at brackets and quotation marks."
             self._trouble.append(Diagnosis(unreadable.because, "params-file", hint))
@@ -226,7 +164,7 @@ class Launch(MessageExpectations, ServiceExpectations, LifecycleExpectations, Pr
 
     def _miss(self, program: str) -> None:
         """No cell has written this program."""
-        here = session.current.kernel
+        here = runtime.current.front_end
         if here is None:
             self._missing.append(program)
             return
@@ -255,7 +193,7 @@ class Launch(MessageExpectations, ServiceExpectations, LifecycleExpectations, Pr
 
     def _ipython_display_(self) -> None:
         """As the last line of a cell: run for a moment and show what happens."""
-        if self.programs or session.current.kernel is None:
+        if self.programs or runtime.current.front_end is None:
             print(self)
         else:
             try_out(self)
@@ -271,23 +209,23 @@ class Launch(MessageExpectations, ServiceExpectations, LifecycleExpectations, Pr
     def _end(self) -> None:
         # What still runs is ended here: how is no fact about the program.
         ended = {id(program): program.exit_status() for _, program in self.programs}
-        if session.current.kernel is None:
+        if runtime.current.front_end is None:
             varied = [
                 bool(node.parameters or node.params_file or node.arguments_of_its_own) for node, _ in self.programs
             ]
-            session.current.flags += contradictions.flags(self.scene(), self.overlaps, varied)
+            findings.current.flags += contradictions.flags(self.scene(), self.overlaps, varied)
         try:
             if self._group is not None:
                 self._group.end()
             if self.watch is not None:
                 self.watch.close()
         finally:
-            session.current.patience = self.observer.patience
+            findings.current.patience = self.observer.patience
             self.observer.close()
-            remove_written(session.current.folder)
+            remove_written(runtime.current.folder)
             remove_logs()
         for launched, program in self.programs:
-            session.current.logs.append(
+            findings.current.logs.append(
                 NodeLog(
                     program=launched.program,
                     text=program.output(),

@@ -12,10 +12,10 @@ from pathlib import Path
 from types import FrameType
 from typing import NoReturn
 
-from autograder.checks import session
+from autograder.checks import findings, runtime
+from autograder.core.results import Outcome, Status
+from autograder.course.markers import MORE_AT_GRADING, hidden_lines
 from autograder.graph.observer import ForgedGraph
-from autograder.results import Outcome, Status
-from autograder.submission.markers import MORE_AT_GRADING, hidden_lines
 
 _PACKAGE = str(Path(__file__).resolve().parent.parent)
 
@@ -43,7 +43,7 @@ def ends_block(error: BaseException | None) -> bool:
         with contextlib.suppress(LaunchEnded):
             failed_as_a_whole("The ROS graph can be read", because=_FORGED, code="forged-graph")
         return True
-    if session.current.kernel is not None or not isinstance(error, Exception):
+    if runtime.current.front_end is not None or not isinstance(error, Exception):
         return False
     unknown("The check itself broke", f"{type(error).__name__}: {error}")
     return True
@@ -64,7 +64,7 @@ def failed(
     """
     _record(_failure(title, expected, observed, because, hint, code))
     _rest_not_checked()
-    if session.current.part:
+    if findings.current.part:
         raise CheckEnded(title)
     _lose_parts()
     raise LaunchEnded(title)
@@ -72,8 +72,8 @@ def failed(
 
 def _lose_parts() -> None:
     """Take the points of every part that the current launch or table has looked at, or would have."""
-    found = session.current.outcomes[session.current.block_began :]
-    session.current.lost_parts |= {outcome.part for outcome in found if outcome.part}
+    found = findings.current.outcomes[findings.current.block_began :]
+    findings.current.lost_parts |= {outcome.part for outcome in found if outcome.part}
 
 
 def failed_as_a_whole(
@@ -85,8 +85,8 @@ def failed_as_a_whole(
         LaunchEnded: always.
     """
     _lose_parts()
-    del session.current.outcomes[session.current.block_began :]
-    session.current.part = ""
+    del findings.current.outcomes[findings.current.block_began :]
+    findings.current.part = ""
     _record(_failure(title, expected, observed, because, hint, code))
     _rest_not_checked(whole=True)
     _lose_parts()
@@ -116,13 +116,13 @@ def unknown(title: str, because: str) -> None:
 
 
 def _record(outcome: Outcome) -> None:
-    outcome.part = session.current.part
+    outcome.part = findings.current.part
     frame = _check_frame()
     # A cell's own helper function records for the line that called it: hidden there is hidden here.
     while frame is not None and not outcome.hidden:
         outcome.hidden = frame.f_lineno in hidden_lines(_lines(frame))
         frame = frame.f_back if frame.f_code.co_name != "<module>" else None
-    session.current.outcomes.append(outcome)
+    findings.current.outcomes.append(outcome)
 
 
 def _check_frame() -> FrameType | None:
@@ -197,14 +197,14 @@ def _part_title(block: ast.With) -> str:
 
 def _rest_not_checked(whole: bool = False) -> None:
     """Record what the source still wanted to check in the same block, or all that it wanted in the launch."""
-    frame, block = _block_of("" if whole else session.current.part)
+    frame, block = _block_of("" if whole else findings.current.part)
     if frame is None or block is None:
         return
     hidden = hidden_lines(_lines(frame))
-    for node, part in _expectations(block, session.current.part):
+    for node, part in _expectations(block, findings.current.part):
         if whole or node.lineno > frame.f_lineno:
             text = " ".join(ast.unparse(node).split(".", 1)[-1].split())
-            session.current.outcomes.append(
+            findings.current.outcomes.append(
                 Outcome(
                     status=Status.NOT_CHECKED,
                     title=text if len(text) <= 120 else text[:117] + "...",

@@ -16,7 +16,7 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Iterator
 
-from autograder.checks import outcomes, session
+from autograder.checks import findings, outcomes
 
 
 @contextlib.contextmanager
@@ -26,9 +26,9 @@ def part(title: str) -> Iterator[None]:
     Raises:
         ValueError: parts do not nest, and each has a title.
     """
-    if session.current.part or not title:
+    if findings.current.part or not title:
         raise ValueError(f"part({title!r}): parts have a title and do not nest.")
-    session.current.part = title
+    findings.current.part = title
     try:
         yield
     except outcomes.LaunchEnded:
@@ -36,4 +36,4 @@ def part(title: str) -> Iterator[None]:
     except outcomes.CheckEnded:
         pass
     finally:
-        session.current.part = ""
+        findings.current.part = ""

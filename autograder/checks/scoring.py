@@ -2,11 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
-from autograder.checks import outcomes, session
-from autograder.checks.session import Score
-from autograder.results import CheckResult, Outcome, Part, Status
+from autograder.checks import findings, outcomes, runtime
+from autograder.core.results import CellResult, Outcome, Part, Status
+
+
+class Score:
+    """A check's result as the last expression of its cell: a front end shows the report, `repr` is the points.
+
+    Args:
+        result: of the check.
+        remarks: what the student should know about the cells that the programs came from.
+        origin: those cells, in words.
+    """
+
+    def __init__(self, result: CellResult, remarks: Sequence[str] = (), origin: str = "") -> None:
+        """Wrap a result for display."""
+        self.result, self.remarks, self.origin = result, list(remarks), origin
+
+    def __repr__(self) -> str:
+        """The points as a number, as nbgrader reads them, or None when nobody could find out."""
+        return "None" if self.result.points is None else f"{self.result.points:g}"
 
 
 def score(points: float | Mapping[str, float]) -> Score:
@@ -20,9 +37,9 @@ def score(points: float | Mapping[str, float]) -> Score:
         ValueError: an expectation names a part that has no points here.
     """
     more = outcomes.parts_with_more_at_grading()
-    blank = session.current.blank_answers()
-    used, flags = set(session.current.used), list(dict.fromkeys(session.current.flags))
-    found, lost, seconds = session.current.take()
+    blank = runtime.current.blank_answers()
+    cell = findings.current
+    found, lost, used = cell.outcomes, cell.lost_parts, cell.used
     parts = [_part(title, worth, found, lost, more) for title, worth in _by_part(points, found).items()]
     full = round(sum(points.values()), 6) if isinstance(points, Mapping) else points
     statuses = {outcome.status for outcome in found}
@@ -36,36 +53,39 @@ def score(points: float | Mapping[str, float]) -> Score:
     if blank and all(blank.values()) and earned is not None:
         earned = 0.0  # whatever a check makes of it: nobody earns anything with what everybody receives
         parts = [part.model_copy(update={"points": 0.0, "more_at_grading": False}) for part in parts]
-    result = CheckResult(
-        grade_id="",
+    result = CellResult(
         max_points=full,
         points=earned,
-        seconds=seconds,
+        seconds=cell.seconds,
         outcomes=found,
         parts=parts,
-        flags=flags,
+        flags=list(dict.fromkeys(cell.flags)),
+        logs=cell.logs,
         more_at_grading=bool(earned and (more if not parts else any(part.more_at_grading for part in parts))),
     )
     if statuses != {Status.PASSED} or (blank and all(blank.values())):
         result.not_attempted = sorted(name for name, still in blank.items() if still)
+    cell.reset()
     return _in_notebook(result, used)
 
 
 def unscored() -> Score | None:
     """What a cell expected and found that asks for no score; None if that was nothing."""
-    used = set(session.current.used)
-    found, _, seconds = session.current.take()
-    score = _in_notebook(CheckResult(grade_id="", max_points=0, points=0, seconds=seconds, outcomes=found), used)
+    cell = findings.current
     # What the programs printed has been shown while they ran.
-    return Score(score.result, (), score.remarks, score.origin if score.result.status is not Status.PASSED else "")
+    result = CellResult(max_points=0, points=0, seconds=cell.seconds, outcomes=cell.outcomes)
+    used = cell.used
+    cell.reset()
+    score = _in_notebook(result, used)
+    return Score(result, score.remarks, score.origin if result.status is not Status.PASSED else "")
 
 
-def _in_notebook(result: CheckResult, used: set[str]) -> Score:
+def _in_notebook(result: CellResult, used: set[str]) -> Score:
     """The score, in a notebook with what is known of the cells that the programs came from."""
-    here = session.current.kernel
+    here = runtime.current.front_end
     if here is None:
         return Score(result)
-    return Score(result, session.current.scored_logs, here.remarks(used), here.origin(used))
+    return Score(result, here.remarks(used), here.origin(used))
 
 
 def _by_part(points: float | Mapping[str, float], found: list[Outcome]) -> Mapping[str, float]:

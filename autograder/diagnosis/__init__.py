@@ -10,12 +10,13 @@ What the graph shows is evidence. What the student's process says about itself (
 threads' stacks) is used here for the *reason* only; points never depend on it.
 """
 
-from autograder.diagnosis.base import Diagnosis, RunningProgram, Scene
 from autograder.diagnosis.callbacks import failed_in_a_callback
 from autograder.diagnosis.chain import inside_reason
 from autograder.diagnosis.matching import why_not_matched
 from autograder.diagnosis.names import why_doubled, why_no_endpoint, why_no_node, why_no_service, why_topic_present
 from autograder.diagnosis.programs import program_trouble, shut_down_inside
+from autograder.diagnosis.reason import Diagnosis, RunningProgram
+from autograder.diagnosis.scene import Scene
 from autograder.diagnosis.silence import SILENT, account, lifecycle_silence, why_no_answer, why_silent
 from autograder.diagnosis.together import layout, waits_for_its_group, why_not_together, why_starved
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from autograder.diagnosis.base import Diagnosis
 from autograder.diagnosis.events import Call, Thing
 from autograder.diagnosis.inside import Inside, called
+from autograder.diagnosis.reason import Diagnosis
 from autograder.diagnosis.sources import Place
 from autograder.graph.names import nearest
 
@@ -65,7 +65,7 @@ def waits_for_a_service(inside: Inside) -> Diagnosis | None:
         if call.what not in ("wait_for_service", "client.call") or not call.begun or not client:
             continue
         lasting = call.blocks or (call.what == "wait_for_service" and call.begun > 1)
-        services = inside.scene.observer.services()
+        services = inside.observer.services()
         if lasting and client.name and client.name not in services:
             return _nobody_offers(client, services, f"{_at(inside, call)}it waits for ")
     return None
@@ -76,7 +76,7 @@ def asks_nobody(inside: Inside) -> Diagnosis | None:
     for client in inside.things.values():
         waited = client.runs > client.done and inside.now - client.last > STUCK_AFTER
         if client.kind == "client" and waited and not client.destroyed:
-            services = inside.scene.observer.services()
+            services = inside.observer.services()
             if client.name not in services:
                 return _nobody_offers(client, services, f"`{inside.name}` has asked for an answer of ")
     return None

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from autograder.diagnosis.base import Diagnosis, RunningProgram, Scene
 from autograder.diagnosis.events import BadMessage, BadReturn, CallbackError, Event, ThreadError, read
 from autograder.diagnosis.inside import Inside
+from autograder.diagnosis.reason import Diagnosis, RunningProgram
+from autograder.diagnosis.scene import Scene
 from autograder.diagnosis.traces import KNOWN_ERRORS, quoted
 
 _AFTER = {

@@ -11,7 +11,8 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 from autograder.diagnosis import blocked, callbacks, spinning
-from autograder.diagnosis.base import Diagnosis, Scene, first
+from autograder.diagnosis.reason import Diagnosis
+from autograder.diagnosis.scene import Scene, first
 
 if TYPE_CHECKING:
     from autograder.diagnosis.inside import Inside

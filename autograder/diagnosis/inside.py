@@ -6,11 +6,13 @@ import re
 import time
 from collections.abc import Sequence
 from functools import cached_property
+from pathlib import Path
 from typing import TypeVar
 
 from autograder.diagnosis import events, sources
-from autograder.diagnosis.base import RunningProgram, Scene
 from autograder.diagnosis.events import Call, Event, ExecutorSeen, NodeSeen, ParameterSeen, Thing
+from autograder.diagnosis.reason import RunningProgram
+from autograder.graph.observer import Observer
 
 _T = TypeVar("_T")
 
@@ -18,9 +20,9 @@ _T = TypeVar("_T")
 class Inside:
     """One program as its probe shows it. Where the probe could not attach, nothing is known and nothing is said."""
 
-    def __init__(self, scene: Scene, program: RunningProgram) -> None:
-        """Read the program's events."""
-        self.scene = scene
+    def __init__(self, program: RunningProgram, folder: Path, observer: Observer) -> None:
+        """Read the program's events; its source lies in `folder`, its launch's graph is what `observer` sees."""
+        self.folder, self.observer = folder, observer
         self.program = program
         self.name = program.name
         self.now = time.monotonic()
@@ -71,7 +73,7 @@ class Inside:
     @cached_property
     def source(self) -> sources.Source:
         """The student's file."""
-        return sources.Source(self.scene.folder / f"{self.name}.py")
+        return sources.Source(self.folder / f"{self.name}.py")
 
     def place(self, thread: int) -> sources.Place | None:
         """Where the student's own code on this thread is, in the callback that runs there."""

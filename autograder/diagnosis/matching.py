@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from rclpy.qos import QoSProfile
 
-from autograder.diagnosis.base import Diagnosis, Scene
+from autograder.diagnosis.reason import Diagnosis
+from autograder.diagnosis.scene import Scene
 from autograder.graph import qos
 from autograder.graph.names import full_name
 

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from autograder.diagnosis.base import Diagnosis, Scene
+from autograder.arguments import remap_rules
 from autograder.diagnosis.chain import inside_reason, reason_inside
 from autograder.diagnosis.events import Thing
 from autograder.diagnosis.inside import Inside
 from autograder.diagnosis.programs import program_trouble
-from autograder.graph import remap_rules
+from autograder.diagnosis.reason import Diagnosis
+from autograder.diagnosis.scene import Scene
 from autograder.graph.names import full_name, nearest, type_name
 
 _LETTER_BY_LETTER = "Compare the two names letter by letter, namespace included."

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from autograder.arguments import remap_rules
 from autograder.diagnosis import callbacks
-from autograder.diagnosis.base import Diagnosis, Scene
 from autograder.diagnosis.inside import Inside
+from autograder.diagnosis.reason import Diagnosis
+from autograder.diagnosis.scene import Scene
 from autograder.diagnosis.spinning import SHUT_DOWN_IN_MAIN
 from autograder.diagnosis.traces import last_traceback
-from autograder.graph import remap_rules
 
 
 def program_trouble(scene: Scene) -> Diagnosis | None:
@@ -26,7 +27,7 @@ def program_trouble(scene: Scene) -> Diagnosis | None:
         refused = remap_rules.refused(scene.rules[number]) if number < len(scene.rules) else None
         if refused and "arse remap rule" in program.output():
             return Diagnosis(*refused)
-        return _death(Inside(scene, program))
+        return _death(scene.inside(program))
     return None
 
 

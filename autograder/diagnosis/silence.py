@@ -5,13 +5,14 @@ from __future__ import annotations
 from rclpy.qos import QoSProfile
 
 from autograder.diagnosis import spinning
-from autograder.diagnosis.base import Diagnosis, Scene, first
 from autograder.diagnosis.chain import inside_reason
 from autograder.diagnosis.events import LifecyclePublishOff, Thing
 from autograder.diagnosis.inside import Inside, called
 from autograder.diagnosis.matching import why_not_matched
 from autograder.diagnosis.names import why_no_endpoint
 from autograder.diagnosis.programs import program_trouble
+from autograder.diagnosis.reason import Diagnosis
+from autograder.diagnosis.scene import Scene, first
 from autograder.diagnosis.together import why_starved
 from autograder.graph.names import full_name, type_name
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from autograder.diagnosis.base import Diagnosis
 from autograder.diagnosis.inside import Inside
+from autograder.diagnosis.reason import Diagnosis
 
 SHUT_DOWN_IN_MAIN = "Let the callback set a future or a flag, and let `main` end the spinning and shut down."
 

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from autograder.diagnosis.base import Diagnosis, Scene
 from autograder.diagnosis.events import ExecutorSeen, Thing
 from autograder.diagnosis.inside import Inside, called, listed
+from autograder.diagnosis.reason import Diagnosis
+from autograder.diagnosis.scene import Scene
 
 MOST_OF_THE_TIME = 0.6
 """Share of the time that others must have taken for a callback to count as kept waiting by them."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
-from autograder.diagnosis.base import Diagnosis
+from autograder.diagnosis.reason import Diagnosis
 
 KNOWN_ERRORS = (
     (

@@ -1,1 +1,1 @@
-"""Grades a class: stage A runs submissions, stage B hands the results to nbgrader."""
+"""Runs submissions: each alone in the sandbox, many at once, and keeps what came of them."""

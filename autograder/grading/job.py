@@ -1,29 +1,16 @@
-"""What stage A hands to the worker in the sandbox: one submission as text, and the trusted cells to run on it."""
+"""What the worker in the sandbox is given: one submission as text, and the trusted cells to run on it."""
 
 from __future__ import annotations
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from autograder.results import Isolation, Outcome
+from autograder.core.results import CheckResult, Isolation, Outcome, SubmissionResult
+from autograder.course.lab import Cell
 
 CELL_SECONDS = 120.0
 """Seconds after which a check cell is ended; all of them together have a limit too (`supervisor.SECONDS_PER_CHECK`)."""
 STUCK_SECONDS = 30.0
 """Seconds more after which a cell that did not end is stuck in a call that no exception reaches: the worker ends."""
-
-
-class Cell(BaseModel):
-    """One trusted code cell of a lab, in the notebook's order."""
-
-    model_config = ConfigDict(extra="forbid")
-
-    grade_id: str
-    title: str = ""
-    """The nearest heading above it."""
-    points: float | None = None
-    """None: a set-up cell that is run but not graded."""
-    source: str
-    """With the hidden tests and their markers."""
 
 
 class Job(BaseModel):
@@ -43,3 +30,20 @@ class Job(BaseModel):
     """Of the files that are answers: whether the cell is still as students receive it."""
     cells: list[Cell]
     problems: list[Outcome] = Field(default_factory=list)
+
+    @property
+    def checks(self) -> list[Cell]:
+        """The cells that give points."""
+        return [cell for cell in self.cells if cell.points is not None]
+
+    def result(self, checks: list[CheckResult]) -> SubmissionResult:
+        """Return the result of this job with these checks."""
+        return SubmissionResult(
+            student=self.student,
+            lab=self.lab,
+            digest=self.digest,
+            isolation=self.isolation,
+            seed=self.seed,
+            problems=self.problems,
+            checks=checks,
+        )

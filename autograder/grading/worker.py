@@ -1,7 +1,7 @@
 """Runs the trusted check cells of one submission, inside the grading sandbox.
 
 Reads a `Job` as JSON from standard input and writes to standard output, for each check as soon as it is decided, a line
-with a `SubmissionResult` as JSON that holds this one check. When it is stuck, its stacks are the last thing it writes.
+with its `CheckResult` as JSON. When it is stuck, its stacks are the last thing it writes.
 The student's programs are text until the node sandbox starts them; nothing of theirs is imported here.
 """
 
@@ -20,10 +20,11 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, TextIO
 
-from autograder.checks import session
-from autograder.checks.session import Score
-from autograder.grading.job import CELL_SECONDS, STUCK_SECONDS, Cell, Job
-from autograder.results import CheckResult, NodeLog, Outcome, Status, SubmissionResult
+from autograder.checks import findings, runtime
+from autograder.checks.scoring import Score
+from autograder.core.results import CellResult, CheckResult, NodeLog, Outcome, Status
+from autograder.course.lab import Cell
+from autograder.grading.job import CELL_SECONDS, STUCK_SECONDS, Job
 from autograder.sandbox.limits import MIB
 from autograder.sandbox.scratch import Scratch
 
@@ -36,8 +37,8 @@ LOGS_KEPT = 8 * MIB
 """Characters of all programs' output together."""
 
 
-def run_job(job: Job, folder: Path, stacks: TextIO = sys.stderr) -> Iterator[SubmissionResult]:
-    """Run every cell of the job, in order, and give a result for each check, with its logs, once it is decided.
+def run_job(job: Job, folder: Path, stacks: TextIO = sys.stderr) -> Iterator[CheckResult]:
+    """Run every cell of the job, in order, and give the result of each check once it is decided.
 
     Args:
         job: the submission and the cells.
@@ -46,52 +47,42 @@ def run_job(job: Job, folder: Path, stacks: TextIO = sys.stderr) -> Iterator[Sub
     """
     for name, text in job.files.items():
         (folder / name).write_text(text, encoding="utf-8")
-    session.current.configure(folder, job.isolation, job.seed, job.answers)
+    runtime.current.configure(folder, job.isolation, job.seed, job.answers)
     if job.files:
-        _ = session.current.sandbox  # it warms up while the set-up cells import their messages
+        _ = runtime.current.sandbox  # it warms up while the set-up cells import their messages
     namespace: dict[str, Any] = {"__name__": "check_cells"}
-    logs_kept = LOGS_KEPT // max(1, sum(cell.points is not None for cell in job.cells))
+    logs_kept = LOGS_KEPT // max(1, len(job.checks))
     broken_set_up = ""
     try:
         for number, cell in enumerate(job.cells):
             started = time.monotonic()
-            session.reset()
+            findings.current.reset()
             faulthandler.dump_traceback_later(CELL_SECONDS + STUCK_SECONDS, exit=True, file=stacks)
             error, value = _run_cell(cell, number, namespace)
             faulthandler.cancel_dump_traceback_later()
             if cell.points is None:
                 broken_set_up = broken_set_up or error
                 continue
-            logs = [
-                log.model_copy(update={"grade_id": cell.grade_id})
-                for log in session.current.logs + session.current.scored_logs
-            ]
-            yield SubmissionResult(
-                student=job.student,
-                lab=job.lab,
-                digest=job.digest,
-                isolation=job.isolation,
-                checks=[_check_result(cell, value, error or broken_set_up)],
-                logs=_within(logs, logs_kept),
-                seconds={"checks": round(time.monotonic() - started, 3)},
-            )
+            check = _check_result(cell, value, error or broken_set_up)
+            took = round(time.monotonic() - started, 3)
+            yield check.model_copy(update={"logs": _within(check.logs, logs_kept), "seconds": took})
     finally:
         faulthandler.cancel_dump_traceback_later()
-        session.current.close()
+        runtime.current.close()
 
 
 def _check_result(cell: Cell, value: object, error: str) -> CheckResult:
     """The cell's result; whatever is not a score says nothing about the student, so nobody's points depend on it."""
     if isinstance(value, Score) and not error and value.result.max_points == cell.points:
-        check = value.result
+        found = value.result
     else:
         because = error or f"The check cell did not end in a score of {cell.points:g} points."
         outcomes = [
-            *session.current.outcomes,
+            *findings.current.outcomes,
             Outcome(status=Status.UNKNOWN, title="The check itself broke", because=because, code="grader"),
         ]
-        check = CheckResult(grade_id="", max_points=cell.points or 0.0, points=None, outcomes=outcomes)
-    return _shortened(check.model_copy(update={"grade_id": cell.grade_id, "title": cell.title}))
+        found = CellResult(max_points=cell.points or 0.0, points=None, outcomes=outcomes, logs=findings.current.logs)
+    return _shortened(CheckResult(grade_id=cell.grade_id, title=cell.title, **dict(found)))
 
 
 def _shortened(check: CheckResult) -> CheckResult:
@@ -161,8 +152,8 @@ def main() -> int:
         scratch.chmod(0o755)
         folder = scratch / "submission"
         folder.mkdir(mode=0o755)
-        for result in run_job(job, folder, out):
-            out.write(result.model_dump_json() + "\n")
+        for check in run_job(job, folder, out):
+            out.write(check.model_dump_json() + "\n")
             out.flush()
     out.close()
     return 0

@@ -21,7 +21,7 @@ from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
-from autograder.errors import KitError
+from autograder.core.errors import KitError
 from autograder.graph.names import full_name
 from autograder.graph.recording import Recording, quiet_profile
 from autograder.sandbox.processes import CpuUse, cpu_uses, kept_waiting

@@ -4,15 +4,29 @@ from __future__ import annotations
 
 import contextlib
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 from rclpy.event_handler import SubscriptionEventCallbacks
+from rclpy.node import Node
 from rclpy.qos import QoSDurabilityPolicy, QoSHistoryPolicy, QoSPolicyKind, QoSProfile, QoSReliabilityPolicy
 from rclpy.serialization import deserialize_message
 
-if TYPE_CHECKING:
-    from autograder.graph.observer import Observer
+
+class Recorder(Protocol):
+    """Who records: an observer."""
+
+    node: Node
+
+    def room_for(self, size: int) -> bool:
+        """Take room for one more message of `size` bytes; False if there is none left."""
+
+    def notify(self) -> None:
+        """Wake whoever waits: something happened."""
+
+    def wait(self, ready: Callable[[], object], within: float) -> bool:
+        """Wait until `ready()` is true; at most `within` seconds."""
 
 
 def quiet_profile() -> QoSProfile:
@@ -41,7 +55,7 @@ class Received:
 class Recording:
     """All messages of a topic since the observer subscribed, in the order of arrival, while the observer has room."""
 
-    def __init__(self, observer: Observer, topic: str, msg_type: type, qos: QoSProfile) -> None:
+    def __init__(self, observer: Recorder, topic: str, msg_type: type, qos: QoSProfile) -> None:
         """Subscribe; use `Observer.record`, which shares recordings."""
         self.topic = topic
         self.msg_type = msg_type

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from autograder import student_yaml
+from autograder.core import student_yaml
 from autograder.launch_files import substitutions, values, words
 from autograder.launch_files.errors import LaunchFileError, Place, ValueRefused
 from autograder.launch_files.texts import Text, parse, unescaped

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from autograder import student_yaml
+from autograder.core import student_yaml
 from autograder.launch_files import expressions
 from autograder.launch_files.errors import TEXT_LENGTH, ValueRefused
 from autograder.launch_files.files import Packages

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from autograder import student_yaml
+from autograder.core import student_yaml
 from autograder.launch_files import substitutions
 from autograder.launch_files.errors import ValueRefused
 from autograder.launch_files.texts import Text, parse, plain

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Literal, TypeVar
 
-from autograder.results import CheckResult, Outcome, Status, SubmissionResult
+from autograder.core.results import CellResult, Outcome, Status, SubmissionResult
 
 Audience = Literal["student", "instructor"]
+_Result = TypeVar("_Result", bound=CellResult)
 
 _HIDDEN_TITLE = {
     Status.PASSED: "A hidden check passed",
@@ -25,7 +26,7 @@ def outcome_for(outcome: Outcome, audience: Audience) -> Outcome:
     )
 
 
-def check_for(check: CheckResult, audience: Audience) -> CheckResult:
+def check_for(check: _Result, audience: Audience) -> _Result:
     """Return what this audience may know of a check."""
     flags = check.flags if audience == "instructor" else []
     shown = [outcome_for(outcome, audience) for outcome in check.outcomes]

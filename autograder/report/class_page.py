@@ -6,24 +6,13 @@ from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
-from autograder.files import write_beside
+from autograder.core.files import write_beside
+from autograder.core.results import CheckResult, Status, SubmissionResult
 from autograder.report.audience import reason
 from autograder.report.html import render
 from autograder.report.terminal import class_status, why_lost
-from autograder.results import CheckResult, Status, SubmissionResult
 
 _REASONS = 5
-
-
-def load_results(root: Path, lab: str | None = None) -> list[SubmissionResult]:
-    """Return the stored results of a course, sorted by lab and student; unreadable ones are left out."""
-    results = []
-    for path in sorted((root / "build" / "results").glob(f"{lab or '*'}/*.json")):
-        try:
-            results.append(SubmissionResult.load(path))
-        except ValueError:
-            continue
-    return results
 
 
 def _check_row(checks: Sequence[CheckResult]) -> dict[str, object]:
@@ -46,8 +35,8 @@ def _check_row(checks: Sequence[CheckResult]) -> dict[str, object]:
     }
 
 
-def write_class_page(root: Path, results: Sequence[SubmissionResult]) -> Path:
-    """Write `build/report/index.html` and return its path."""
+def write_class_page(path: Path, results: Sequence[SubmissionResult]) -> Path:
+    """Write the page to `path` and return that."""
     labs = []
     for lab in sorted({result.lab for result in results}):
         of_lab = [result for result in results if result.lab == lab]
@@ -57,6 +46,5 @@ def write_class_page(root: Path, results: Sequence[SubmissionResult]) -> Path:
                 by_id.setdefault(check.grade_id, []).append(check)
         students = [{"result": result, "status": class_status(result), "why": why_lost(result)} for result in of_lab]
         labs.append({"name": lab, "checks": [_check_row(checks) for checks in by_id.values()], "students": students})
-    path = root / "build" / "report" / "index.html"
     write_beside(path, render("class.html", labs=labs))
     return path

@@ -7,9 +7,9 @@ import io
 import json
 from collections.abc import Sequence
 
+from autograder.core.results import Status, SubmissionResult
 from autograder.report.audience import reason, result_for
 from autograder.report.junit import junit_xml
-from autograder.results import Status, SubmissionResult
 
 
 def to_csv(results: Sequence[SubmissionResult]) -> str:

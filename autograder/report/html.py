@@ -13,11 +13,11 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
+from autograder.core.output import last_lines
+from autograder.core.results import CellResult, Status, SubmissionResult
 from autograder.report import words
 from autograder.report.audience import Audience, check_for, result_for
-from autograder.report.output import last_lines
 from autograder.report.words import Verdict
-from autograder.results import CheckResult, NodeLog, Status, SubmissionResult
 
 _LOOK = {
     Verdict.PASSED: {"colour": "#009e73", "border": "3px solid"},
@@ -72,9 +72,10 @@ def render(template: str, **values: Any) -> str:
 
 
 def check_html(
-    check: CheckResult,
+    check: CellResult,
     audience: Audience = "student",
-    logs: Sequence[NodeLog] = (),
+    *,
+    title: str = "",
     remarks: Sequence[str] = (),
     origin: str = "",
 ) -> str:
@@ -83,15 +84,16 @@ def check_html(
     Args:
         check: to show.
         audience: a student does not see what hidden tests look at.
-        logs: output of the check's programs, shown if the check did not pass.
+        title: of the check, where no heading stands above it.
         remarks: what the student should know about the cells that the programs came from.
         origin: those cells, in words.
     """
     shown = check_for(check, audience)
     verdict, found = words.verdict(shown), words.findings(shown)
-    printed = [log.model_copy(update={"text": last_lines(log.text, LOG_LINES)}) for log in logs if log.text.strip()]
+    cut = [log.model_copy(update={"text": last_lines(log.text, LOG_LINES)}) for log in shown.logs if log.text.strip()]
     return render(
         "check.html",
+        title=title,
         check=shown,
         verdict=verdict,
         points=words.points(shown),
@@ -102,7 +104,7 @@ def check_html(
         passed=found.passed,
         held=found.held,
         holding=words.holding(found),
-        logs=printed if shown.status is not Status.PASSED else [],
+        logs=cut if shown.status is not Status.PASSED else [],
         origin=origin,
     )
 
@@ -110,8 +112,5 @@ def check_html(
 def submission_html(result: SubmissionResult, audience: Audience = "student") -> str:
     """Return a submission's whole report as one HTML page that needs no other file."""
     shown = result_for(result, audience)
-    fragments = [
-        Markup(check_html(check, audience, [log for log in shown.logs if log.grade_id == check.grade_id]))
-        for check in shown.checks
-    ]
+    fragments = [Markup(check_html(check, audience, title=check.title)) for check in shown.checks]
     return render("submission.html", result=shown, fragments=fragments)

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 
 from junitparser import Error, Failure, JUnitXml, TestCase, TestSuite
 
+from autograder.core.results import CheckResult, Outcome, Status, SubmissionResult
 from autograder.report.audience import Audience, reason, result_for
-from autograder.results import CheckResult, Outcome, Status, SubmissionResult
 
 _NOT_XML = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 

@@ -13,11 +13,11 @@ from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 from rich.text import Text
 
+from autograder.core.output import last_lines
+from autograder.core.results import CellResult, CheckResult, NodeLog, Outcome, Status, SubmissionResult
 from autograder.report import words
 from autograder.report.audience import Audience, check_for, reason, result_for
-from autograder.report.output import last_lines
 from autograder.report.words import Verdict
-from autograder.results import CheckResult, NodeLog, Outcome, Status, SubmissionResult
 
 SYMBOL = {Status.PASSED: "✓", Status.FAILED: "✗", Status.NOT_CHECKED: "-", Status.UNKNOWN: "?"}
 STYLE = {Status.PASSED: "blue", Status.FAILED: "bold red", Status.NOT_CHECKED: "dim", Status.UNKNOWN: "bold magenta"}
@@ -55,8 +55,7 @@ def submission_view(result: SubmissionResult, audience: Audience = "student") ->
     if result.problems:
         parts.append(Text())
     for check in result.checks:
-        logs = [log for log in result.logs if log.grade_id == check.grade_id]
-        parts.append(check_view(check, logs, title=check.title or check.grade_id))
+        parts.append(check_view(check, title=check.title or check.grade_id))
     parts.append(Text())
     total = f"{result.points:g} of {result.max_points:g} points"
     undecided = sum(check.status is Status.UNKNOWN for check in result.checks)
@@ -69,7 +68,7 @@ def submission_view(result: SubmissionResult, audience: Audience = "student") ->
 
 
 def check_view(
-    check: CheckResult, logs: Sequence[NodeLog] = (), remarks: Sequence[str] = (), origin: str = "", title: str = ""
+    check: CellResult, remarks: Sequence[str] = (), origin: str = "", title: str = ""
 ) -> RenderableType:
     """Return one check's report: what was found first, then what holds. Of a check that passed, a line."""
     verdict, found = words.verdict(check), words.findings(check)
@@ -86,7 +85,7 @@ def check_view(
         lines += _findings(found)
     if verdict in (Verdict.FAILED, Verdict.PARTLY, Verdict.UNKNOWN):
         lines += [Text(f"  {text}", "dim") for text in (words.holding(found),) if text]
-        lines += [_output(log) for log in logs if log.text.strip()]
+        lines += [_output(log) for log in check.logs if log.text.strip()]
     lines += [Text(f"  {plain(origin)}", "dim")] if origin else []
     return Group(*lines)
 
@@ -103,10 +102,10 @@ def _findings(found: words.Findings) -> list[RenderableType]:
     return lines + [Text(f"  {text}", "dim") for text in (found.not_looked_at,) if text]
 
 
-def check_text(check: CheckResult, logs: Sequence[NodeLog], remarks: Sequence[str], origin: str) -> str:
+def check_text(check: CellResult, remarks: Sequence[str], origin: str) -> str:
     """Return a student's view of one check as plain text, for a notebook in a terminal."""
     screen = Console(file=io.StringIO(), width=100, highlight=False, color_system=None, force_jupyter=False)
-    screen.print(check_view(check_for(check, "student"), logs, remarks, origin))
+    screen.print(check_view(check_for(check, "student"), remarks, origin))
     assert isinstance(screen.file, io.StringIO)
     return "\n".join(line.rstrip() for line in screen.file.getvalue().splitlines())
 

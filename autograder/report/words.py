@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import StrEnum
 
-from autograder.results import CheckResult, Outcome, Part, Status
+from autograder.core.results import CellResult, Outcome, Part, Status
 
 
 class Verdict(StrEnum):
@@ -30,7 +30,7 @@ SYMBOL = {
 }
 
 
-def verdict(check: CheckResult) -> Verdict:
+def verdict(check: CellResult) -> Verdict:
     """Return what became of a check."""
     if check.status is Status.UNKNOWN:
         return Verdict.UNKNOWN
@@ -41,7 +41,7 @@ def verdict(check: CheckResult) -> Verdict:
     return Verdict.PARTLY if check.points else Verdict.FAILED
 
 
-def points(check: CheckResult) -> str:
+def points(check: CellResult) -> str:
     """Return a check's points in words, and never more than grading gives."""
     full = f"{check.max_points:g} point{'' if check.max_points == 1 else 's'}"
     if check.points is None:
@@ -66,7 +66,7 @@ def part_verdict(part: Part) -> Verdict:
     return Verdict.PASSED if part.points == part.max_points else Verdict.FAILED
 
 
-def not_attempted(check: CheckResult) -> str:
+def not_attempted(check: CellResult) -> str:
     """Say which answers are still untouched; empty if none is, or if it did not matter."""
     files = [f"`%%node {name[:-3]}`" if name.endswith(".py") else f"`%%file {name}`" for name in check.not_attempted]
     if not files:
@@ -101,7 +101,7 @@ class Findings:
     """How many were not looked at, as a sentence; empty if none."""
 
 
-def findings(check: CheckResult) -> Findings:
+def findings(check: CellResult) -> Findings:
     """Sort a check's outcomes."""
     by_status = {status: [o for o in check.outcomes if o.status is status] for status in Status}
     left = len(by_status[Status.NOT_CHECKED])

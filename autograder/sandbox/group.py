@@ -14,7 +14,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
-from autograder.errors import KitError
+from autograder.core.errors import KitError
 from autograder.sandbox import watch
 from autograder.sandbox.limits import Limits
 from autograder.sandbox.loop import Loop

@@ -9,8 +9,8 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
-from autograder.errors import KitError
-from autograder.results import Isolation
+from autograder.core.errors import KitError
+from autograder.core.results import Isolation
 from autograder.sandbox import bubblewrap, landlock
 from autograder.sandbox.outer import run_in_sandbox
 

@@ -11,7 +11,7 @@ import time
 import traceback
 from collections.abc import Callable
 
-from autograder.errors import KitError
+from autograder.core.errors import KitError
 
 _WATCH = 0.1
 """Seconds between two looks."""

@@ -16,8 +16,8 @@ import tempfile
 import threading
 from pathlib import Path
 
-from autograder.errors import KitError
-from autograder.results import Isolation
+from autograder.core.errors import KitError
+from autograder.core.results import Isolation
 from autograder.sandbox import bubblewrap, seccomp
 from autograder.sandbox.environment import HERE, python_environment
 from autograder.sandbox.group import GroupLost, ProgramGroup

@@ -13,7 +13,7 @@ import threading
 import time
 from dataclasses import dataclass
 
-from autograder.results import Isolation
+from autograder.core.results import Isolation
 from autograder.sandbox import bubblewrap
 from autograder.sandbox.environment import python_environment
 from autograder.sandbox.limits import MIB

@@ -12,7 +12,7 @@ import errno
 import platform
 import struct
 
-from autograder.errors import KitError
+from autograder.core.errors import KitError
 
 _CALLS = {  # x86-64, the only architecture that the ROS wheels exist for
     "shmget": 29, "shmat": 30, "shmctl": 31, "shmdt": 67, "semget": 64, "semop": 65, "semctl": 66, "semtimedop": 220,

@@ -6,8 +6,8 @@ import sys
 import tempfile
 from pathlib import Path
 
-from autograder.errors import KitError
-from autograder.results import Isolation
+from autograder.core.errors import KitError
+from autograder.core.results import Isolation
 from autograder.sandbox.nodes import NodeSandbox
 
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from autograder.course.cell_file import parse
+from autograder.course.lab import Answer, Lab, grade_id_of, source_of
 from autograder.grading.job import Cell
-from autograder.submission.lab import Answer, Lab, grade_id_of, source_of
-from autograder.submission.magics import parse
 from mutation.python_rules import changes, swaps
 from mutation.source import Mutant, Source
 from mutation.text_rules import text_changes

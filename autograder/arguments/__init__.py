@@ -1,0 +1,1 @@
+"""What a ROS program is started with: remap rules and parameters."""

@@ -1,0 +1,214 @@
+"""Why no remap rule made a name that one was meant to make: one function per reason.
+
+Measured on rclpy 7.1.6. A rule is matched against a *full* name, the one the code gives after namespace and node name
+are settled. The first rule that matches a name wins, and its result is not looked at again. The prefix of a
+node-specific rule is the name that the node has after `__node`; only for `__node` itself it is the name in the code.
+
+A reason is given only if what the graph shows establishes it: the rule is for the node in question, or would be but
+for what the reason says, and after the advice the wanted name is there. One thing cannot be seen on the graph and is
+taken for granted: that the code has no name of its own that a rule makes as well.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass
+
+from autograder.arguments.rule_grammar import Reason, Rule, parse
+from autograder.graph.names import nearest
+
+
+@dataclass(frozen=True)
+class _Case:
+    """One rule, one node that it would give the wanted name, and what is known about the two."""
+
+    rule: Rule
+    number: int
+    node: str
+    rules: Sequence[Rule]
+    used: Collection[str]
+    """Names of topics that the node uses."""
+    nodes: Sequence[str]
+    wanted: str
+
+    @property
+    def said(self) -> str:
+        return f"The rule `{self.rule.text}` changed nothing:"
+
+    @property
+    def left(self) -> str:
+        return full_name(self.rule.left, self.node)
+
+    def is_for(self, rule: Rule) -> bool:
+        """Whether a rule is for the node."""
+        return rule.prefix in ("", self.node.rsplit("/", 1)[-1])
+
+    def makes(self, name: str) -> list[Rule]:
+        """The rules for the node that could have made a name."""
+        return [rule for rule in self.rules if self.is_for(rule) and full_name(rule.right, self.node) == name]
+
+    def in_code(self, name: str) -> bool:
+        """Whether the node uses a name that no rule has made: then its code gives it."""
+        return name in self.used and not self.makes(name)
+
+
+def full_name(name: str, node: str) -> str:
+    """The full name that `name` stands for in `node`."""
+    if name.startswith("/"):
+        return name
+    if name.startswith("~"):
+        return node + name[1:]
+    return f"{node.rsplit('/', 1)[0]}/{name}"
+
+
+def without_effect(
+    rules: Sequence[str], wanted: str, nodes: Sequence[str], topics: Sequence[str] | Mapping[str, Collection[str]]
+) -> Reason | None:
+    """Why no rule made the topic or service `wanted`, although one was meant to.
+
+    Args:
+        rules: of one program, in the order in which they were given.
+        wanted: the full name that should be there.
+        nodes: full names of the nodes on the graph.
+        topics: full names of topics, with the nodes that use each; a sequence stands for topics of all nodes.
+    """
+    users = topics if isinstance(topics, Mapping) else dict.fromkeys(topics, nodes)
+    read = [rule for rule in map(parse, rules) if rule and rule.renames_topics]
+    cases = [
+        _Case(rule, number, node, read, [name for name, of in users.items() if node in of], nodes, wanted)
+        for number, rule in enumerate(read)
+        for node in _own_nodes(rules, nodes)
+        if full_name(rule.right, node) == wanted and node not in users.get(wanted, ())
+    ]
+    for why in _REASONS:
+        for case in cases:
+            reason = why(case)
+            if reason:
+                return reason
+    return None
+
+
+def _own_nodes(rules: Sequence[str], nodes: Sequence[str]) -> list[str]:
+    """The nodes that the program with these rules can have made."""
+    found = list(nodes)
+    for rule in map(parse, rules):
+        if rule and rule.left in ("__node", "__name") and not rule.prefix:
+            found = [node for node in found if node.rsplit("/", 1)[-1] == rule.right]
+        elif rule and rule.left == "__ns" and not rule.prefix:
+            found = [node for node in found if (node.rsplit("/", 1)[0] or "/") == rule.right]
+    return found or list(nodes)
+
+
+def _other_kind(case: _Case) -> Reason | None:
+    if not case.is_for(case.rule) or case.rule.kind != "service" or not case.in_code(case.left):
+        return None
+    return (
+        f"{case.said} `rosservice://` makes it a rule for services, and `{case.left}` is a topic.",
+        "rule-kind",
+        "Leave `rosservice://` out: then the rule is for topics and services.",
+    )
+
+
+def _prefix(case: _Case) -> Reason | None:
+    names = [node.rsplit("/", 1)[-1] for node in case.nodes]
+    if case.is_for(case.rule) or case.rule.prefix in names or case.rule.kind == "service":
+        return None
+    if not case.in_code(case.left):
+        return None
+    return (
+        f"{case.said} it is for a node named `{case.rule.prefix}`, and no node on the graph has that name "
+        f"(the nodes are {', '.join(case.nodes)}).",
+        "rule-prefix",
+        "The prefix of a rule is the name that the node has now, after `__node`, not the one in its code.",
+    )
+
+
+def _order(case: _Case) -> Reason | None:
+    if not case.is_for(case.rule) or case.rule.kind == "service":
+        return None
+    for earlier in case.rules[: case.number]:
+        same = case.is_for(earlier) and full_name(earlier.left, case.node) == case.left
+        if same and earlier.kind != "service":
+            if full_name(earlier.right, case.node) not in case.used:
+                return None
+            return (
+                f"{case.said} `{earlier.text}` stands before it and matches the same name, and the first rule wins.",
+                "rule-order",
+                "Only the first rule that matches a name counts.",
+            )
+    return None
+
+
+def _chain(case: _Case) -> Reason | None:
+    if not case.is_for(case.rule) or case.left not in case.used or case.rule.kind == "service":
+        return None
+    others = [rule for rule in case.makes(case.left) if rule is not case.rule and rule.kind != "service"]
+    if not others:
+        return None
+    return (
+        f"{case.said} no entity has the name `{case.left}` in its code; `{others[0].text}` made it. Rules do not "
+        "chain: what one rule makes is not looked at by the next.",
+        "rules-do-not-chain",
+        "The left side is the name that the code gives. The first rule that matches it wins.",
+    )
+
+
+def _absolute_rule(case: _Case) -> Reason | None:
+    if not _idle(case) or not case.rule.left.startswith("/"):
+        return None
+    here = full_name(case.rule.left.lstrip("/"), case.node)
+    if not case.in_code(here):
+        return None
+    return (
+        f"{case.said} its left side is the absolute name `{case.left}`, and the name is `{here}` here.",
+        "absolute-rule",
+        "Write the left side without the leading slash: then it follows the namespace.",
+    )
+
+
+def _private_rule(case: _Case) -> Reason | None:
+    tail = case.left.rsplit("/", 1)[-1]
+    private = f"{case.node}/{tail}"
+    if not _idle(case) or case.rule.left.startswith("~") or not case.in_code(private):
+        return None
+    return (
+        f"{case.said} `{case.left}` is not the name of the private topic `~/{tail}`; that is `{private}` here.",
+        "private-rule",
+        f"Write `~/{tail}` on the left side: it follows the node's name.",
+    )
+
+
+def _absolute_name(case: _Case) -> Reason | None:
+    fixed = f"/{case.rule.left}"
+    if not _idle(case) or case.rule.left[:1] in ("/", "~") or fixed == case.left or not case.in_code(fixed):
+        return None
+    return (
+        f"{case.said} the name in the code is absolute, `{fixed}`, and the rule looks for `{case.left}`.",
+        "absolute-name",
+        "A name with a leading slash is absolute: no namespace reaches it. Write it without the slash.",
+    )
+
+
+def _no_match(case: _Case) -> Reason | None:
+    if not _idle(case) or not case.used:
+        return None
+    close = nearest(case.left, [name for name in case.used if case.in_code(name)])
+    return (
+        f"{case.said} nothing is called `{case.left}`, the name on its left side"
+        + (f"; the nearest name is `{close}`." if close else "."),
+        "rule-without-match",
+        "Compare the left side with the name in the code, letter by letter. ROS 2 does not warn about such a rule.",
+    )
+
+
+def _idle(case: _Case) -> bool:
+    """Whether the rule is for topics of the node and finds nothing there, and no rule before it takes its name."""
+    if case.rule.kind == "service" or not case.is_for(case.rule) or case.left in case.used:
+        return False
+    before = [rule for rule in case.rules[: case.number] if case.is_for(rule) and rule.kind != "service"]
+    return all(full_name(rule.left, case.node) != case.left for rule in before)
+
+
+_REASONS: tuple[Callable[[_Case], Reason | None], ...] = (
+    _order, _chain, _prefix, _other_kind, _absolute_rule, _private_rule, _absolute_name, _no_match,
+)  # fmt: skip

@@ -1,0 +1,1 @@
+"""What who writes a course needs."""

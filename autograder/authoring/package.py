@@ -1,0 +1,156 @@
+"""Writes a lab's programs and launch files as an ament_python package, to be built and launched by an installed ROS 2.
+
+The programs stay as they are: each is started as a script, with the package's folder first on Python's path, as the
+kit starts it. Launch files and the parameter files beside them are installed into `share/PACKAGE/launch`, where
+`$(dirname)` finds them; other files go to `share/PACKAGE/config`.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from xml.sax.saxutils import escape
+
+from autograder.arguments.params_file import node_keys
+from autograder.core.errors import KitError
+from autograder.course.lab import Lab
+from autograder.submission.reader import read_submission
+
+_IMPORT = re.compile(r"^\s*(?:from|import)\s+([a-z]\w*)", re.MULTILINE)
+_ROS_PACKAGE = re.compile(r"rclpy|\w+_msgs|\w+_interfaces|\w+_srvs|tf2_ros")
+_PACKAGE_OF_CHECKS = re.compile(r"""package["']?\s*[=:]\s*["']([a-z][a-z0-9_]*)["']""")
+
+_PACKAGE_XML = """\
+<?xml version="1.0"?>
+<package format="3">
+  <name>{name}</name>
+  <version>0.1.0</version>
+  <description>{description}</description>
+  <maintainer email="student@example.org">student</maintainer>
+  <license>Apache-2.0</license>
+{depends}
+  <export>
+    <build_type>ament_python</build_type>
+  </export>
+</package>
+"""
+_SETUP_PY = """\
+from glob import glob
+
+from setuptools import setup
+
+setup(
+    name="{name}",
+    version="0.1.0",
+    packages=["{name}"],
+    data_files=[
+        ("share/ament_index/resource_index/packages", ["resource/{name}"]),
+        ("share/{name}", ["package.xml"]),
+        ("share/{name}/launch", glob("launch/*")),
+        ("share/{name}/config", glob("config/*")),
+    ],
+    install_requires=["setuptools"],
+    entry_points={{
+        "console_scripts": [
+{scripts}
+        ]
+    }},
+)
+"""
+_SETUP_CFG = """\
+[develop]
+script_dir=$base/lib/{name}
+[install]
+install_scripts=$base/lib/{name}
+"""
+_INIT_PY = '''\
+"""The programs of this package: each function starts the file of its name as a script."""
+
+import runpy
+import sys
+from pathlib import Path
+
+_FOLDER = Path(__file__).resolve().parent
+
+
+def _start(name: str) -> None:
+    sys.path.insert(0, str(_FOLDER))
+    runpy.run_path(str(_FOLDER / f"{{name}}.py"), run_name="__main__")
+{functions}'''
+
+
+def package_name(lab: Lab) -> str:
+    """The package that the lab's launch files name; the lab's own name if they name none."""
+    for cell in lab.cells:
+        match = _PACKAGE_OF_CHECKS.search(cell.source)
+        if match:
+            return match[1]
+    return lab.name
+
+
+def lab_files(lab: Lab, notebook: Path | None) -> dict[str, str]:
+    """The programs and files of a lab by their names: as students receive it, or as a student's notebook has them.
+
+    Raises:
+        KitError: the notebook cannot be read.
+    """
+    if notebook is None:
+        blank = {answer.file.file_name: answer.file.text for answer in lab.answers.values() if answer.file}
+        return {**lab.given, **blank}
+    submission = read_submission(notebook, lab)
+    if not submission.readable:
+        raise KitError(f"{notebook}: {submission.problems[0].because}", "Name a notebook of this lab.")
+    return submission.files
+
+
+def write_package(name: str, title: str, files: Mapping[str, str], folder: Path) -> Path:
+    """Write a package and return its folder.
+
+    Args:
+        name: of the package.
+        title: one line for its description.
+        files: programs (`NAME.py`) and other files by their names.
+        folder: where the package's folder is made, such as the `src` of a workspace.
+
+    Raises:
+        KitError: something is there already, which is left as it is; or there are no programs.
+    """
+    target = folder / name
+    if target.exists():
+        raise KitError(f"{target} exists already and stays as it is.", "Move it away, or name another folder.")
+    programs = sorted(file.removesuffix(".py") for file in files if file.endswith(".py"))
+    if not programs:
+        raise KitError("There are no programs to make a package of.", "Programs are cells with `%%node NAME`.")
+    texts = {
+        "package.xml": _package_xml(name, title, files),
+        "setup.py": _SETUP_PY.format(
+            name=name,
+            scripts="\n".join(f'            "{program} = {name}:run_{program}",' for program in programs),
+        ),
+        "setup.cfg": _SETUP_CFG.format(name=name),
+        f"resource/{name}": "",
+        f"{name}/__init__.py": _INIT_PY.format(
+            functions="".join(f'\n\ndef run_{program}() -> None:\n    _start("{program}")\n' for program in programs)
+        ),
+        **{f"{_place(file, text, name)}/{file}": text for file, text in files.items()},
+    }
+    for path, text in texts.items():
+        (target / path).parent.mkdir(parents=True, exist_ok=True)
+        (target / path).write_text(text, encoding="utf-8")
+    return target
+
+
+def _place(file: str, text: str, name: str) -> str:
+    """The folder in the package that a file belongs into."""
+    if file.endswith(".py"):
+        return name
+    return "launch" if re.search(r"\.launch\.ya?ml$", file) or node_keys(text) else "config"
+
+
+def _package_xml(name: str, title: str, files: Mapping[str, str]) -> str:
+    used = {found for file, text in files.items() if file.endswith(".py") for found in _IMPORT.findall(text)}
+    depends = {"rclpy"} | {package for package in used if _ROS_PACKAGE.fullmatch(package)}
+    depends |= {"launch_ros", "launch_yaml", "ros2launch"} if any(".launch." in file for file in files) else set()
+    lines = "\n".join(f"  <exec_depend>{package}</exec_depend>" for package in sorted(depends))
+    return _PACKAGE_XML.format(name=name, description=escape(title), depends=lines)

@@ -1,0 +1,44 @@
+"""`labs/README.md`: the page that a student's JupyterLab opens, made from the labs themselves."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+from autograder.course.lab import source_of
+
+START_PAGE = "README.md"
+
+_TOP = """\
+# The labs
+
+Open a lab with a click on its name, and work through it from the top: run each cell with Shift+Enter. A cell that
+begins with `%%node NAME` or `%%file NAME` writes your program or file. The check below it runs that and says at once
+what holds, and what does not and why.
+
+| lab | about |
+|---|---|
+"""
+
+_BOTTOM = """
+- After a change run the cell again, and then its check.
+- After a restart of the kernel run the first code cell again, and then the cells of your programs.
+- Your programs lie in the folder `nodes` of the lab, below the name of the notebook. What you write in cells is what is
+  graded; a file that you put into that folder yourself stays yours, but is not handed in.
+- Hand in the notebook, the file with the ending `.ipynb`, once you have saved it.
+"""
+
+
+def start_page(labs: Path) -> str:
+    """Return the page for the labs in a folder, by the first heading of each and the line below it."""
+    rows = []
+    for path in sorted(labs.glob("*/*.ipynb")):
+        if path.parent.name != path.stem:
+            continue
+        first = source_of(json.loads(path.read_text(encoding="utf-8"))["cells"][0])
+        heading = re.search(r"^#\s+(.+?)\s*$", first, re.MULTILINE)
+        below = first[heading.end() :].strip().split("\n")[0] if heading else ""
+        title = heading[1] if heading else path.stem
+        rows.append(f"| [{title}]({path.stem}/{path.name}) | {below} |\n")
+    return _TOP + "".join(rows) + _BOTTOM

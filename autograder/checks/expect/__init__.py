@@ -1,0 +1,1 @@
+"""The expectations that a check states about a running launch."""

@@ -1,0 +1,296 @@
+"""Expectations of names: nodes, topics, endpoints and their QoS."""
+
+from __future__ import annotations
+
+import contextlib
+from collections import Counter
+from dataclasses import replace
+from typing import Any, Literal
+
+from rcl_interfaces.srv import ListParameters
+from rclpy.topic_endpoint_info import TopicEndpointInfo
+
+from autograder import diagnosis
+from autograder.checks import outcomes
+from autograder.checks.expect.expectations import SETTLE, WITHIN, ExpectationBase
+from autograder.core.errors import KitError
+from autograder.diagnosis import Diagnosis
+from autograder.graph import qos
+from autograder.graph.names import full_name, type_name
+from autograder.graph.services import ServiceMissing, call_all
+
+End = Literal["publisher", "subscription"]
+
+GONE_WITHIN = 2.0
+"""Seconds that an absence may take to show, for example after a node was stopped."""
+
+
+class GraphExpectations(ExpectationBase):
+    """What must be on the graph, and what must not."""
+
+    def prepare(self) -> None:
+        """Set up what is known of the nodes."""
+        super().prepare()
+        self._built: set[str] = set()
+        """Nodes that have answered, or had their time to."""
+
+    def expect_node(self, name: str, *, within: float = WITHIN, hint: str = "") -> None:
+        """The node with this full name is on the graph, exactly once."""
+        title = f"The node `{name}` is on the graph"
+        if not self.wait_for_graph(lambda: name in self.observer.nodes(), within):
+            self.fail(
+                title,
+                diagnosis.why_no_node(self.scene(), name),
+                expected=name,
+                observed=", ".join(self.observer.nodes()) or "no node",
+                hint=hint,
+            )
+        self._settle(name)
+        if name not in self.observer.nodes() or self.gone_program():
+            # A program that dies takes its node off the graph first and prints its traceback after that.
+            self.observer.wait(self.gone_program, SETTLE)
+            self.fail(
+                title,
+                diagnosis.why_no_node(self.scene(), name),
+                expected=name,
+                observed="it was there, and went away",
+                hint=hint,
+            )
+        if self.observer.nodes().count(name) > 1:
+            self.fail(
+                title,
+                diagnosis.why_doubled(self.scene(), name),
+                expected="one node of this name",
+                observed=", ".join(self.observer.nodes()),
+                hint=hint,
+            )
+        outcomes.passed(title, observed=name)
+
+    def _settle(self, name: str) -> None:
+        """Wait for proof that a node which was just made also lives on: an answer from it.
+
+        A program that fails a few lines after it made its node shows the node for a moment. Whether the observer sees
+        that moment is chance, and a verdict must not depend on it. A node that nobody spins cannot answer; for it a
+        while without an end of the program has to do.
+        """
+        with contextlib.suppress(ServiceMissing):
+            call_all(
+                self.observer,
+                f"{name}/list_parameters",
+                ListParameters,
+                [ListParameters.Request()],
+                SETTLE / 2,
+                lambda: self.gone_program() is not None,
+            )
+
+    def expect_no_node(self, name: str, *, within: float = GONE_WITHIN, hint: str = "") -> None:
+        """No node has this full name; use it after a positive expectation, which proves that the graph is known."""
+        gone = self.observer.wait(lambda: name not in self.observer.nodes(), within)
+        self.expect_that(
+            gone,
+            f"No node is called `{name}`",
+            lambda: Diagnosis(f"`{name}` is still on the graph.", "node-present"),
+            observed=", ".join(self.observer.nodes()),
+            hint=hint,
+        )
+
+    def expect_topic(self, topic: str, msg_type: type, *, within: float = WITHIN, hint: str = "") -> None:
+        """The topic exists with this message type."""
+        wanted = type_name(msg_type)
+        found = self.wait_for_graph(lambda: wanted in self.observer.topics().get(topic, []), within)
+        self.expect_that(
+            found,
+            f"The topic `{topic}` carries {wanted}",
+            lambda: diagnosis.why_no_endpoint(self.scene(), topic, msg_type, "publisher"),
+            expected=f"{topic} ({wanted})",
+            observed=lambda: self._topics(),
+            hint=hint,
+        )
+
+    def expect_no_topic(self, topic: str, *, within: float = GONE_WITHIN, hint: str = "") -> None:
+        """Nobody publishes or subscribes to this topic."""
+        gone = self.observer.wait(lambda: topic not in self.observer.topics(), within)
+        self.expect_that(
+            gone,
+            f"Nobody uses the topic `{topic}`",
+            lambda: diagnosis.why_topic_present(self.scene(), topic),
+            observed=lambda: self._topics(),
+            hint=hint,
+        )
+
+    def _topics(self) -> str:
+        own = [t for t in sorted(self.observer.topics()) if t not in ("/rosout", "/parameter_events")]
+        return ", ".join(own) or "no topic"
+
+    def _ends(self, topic: str, msg_type: type | None, kind: End, node: str) -> list[TopicEndpointInfo]:
+        ends = self.observer.publishers(topic) if kind == "publisher" else self.observer.subscriptions(topic)
+        return [
+            end
+            for end in ends
+            if (msg_type is None or end.topic_type == type_name(msg_type))
+            and (not node or full_name(end.node_namespace, end.node_name) == node)
+        ]
+
+    def _expect_end(
+        self, topic: str, msg_type: type, kind: End, node: str, count: int, within: float, hint: str
+    ) -> None:
+        title = f"{f'`{node}`' if node else 'A node'} has a {kind} on `{topic}` ({type_name(msg_type)})"
+        if count != 1:
+            title = f"{f'`{node}`' if node else 'The topic'} has {count} {kind}s on `{topic}` ({type_name(msg_type)})"
+
+        def number() -> int:
+            return len(self._ends(topic, msg_type, kind, node))
+
+        found = self.wait_for_graph(lambda: number() >= count, within)
+        if found and number() == count:
+            outcomes.passed(title, observed=topic)
+            return
+        those = f"{number()} {kind}{'s' * (number() != 1)}"
+        owners = self._owners(topic, kind, msg_type, node)
+        reason = Diagnosis(f"`{topic}` has {those}, not {count}: {owners}.", "count")
+        if found:
+            reason = replace(reason, code=f"extra-{kind}")
+        elif not number():
+            reason = diagnosis.why_no_endpoint(self.scene(), topic, msg_type, kind, node)
+        self.fail(
+            title,
+            reason,
+            expected=f"{count} {kind}{'s' * (count != 1)} on {topic} ({type_name(msg_type)})",
+            observed=f"{those}: {owners}" if owners else f"none; topics: {self._topics()}",
+            hint=hint,
+        )
+
+    def expect_publisher(
+        self, topic: str, msg_type: type, *, node: str = "", count: int = 1, within: float = WITHIN, hint: str = ""
+    ) -> None:
+        """The topic has exactly `count` publishers of this type, of the node `node` if one is given."""
+        self._expect_end(topic, msg_type, "publisher", node, count, within, hint)
+
+    def expect_subscription(
+        self, topic: str, msg_type: type, *, node: str = "", count: int = 1, within: float = WITHIN, hint: str = ""
+    ) -> None:
+        """The topic has exactly `count` subscriptions of this type, of the node `node` if one is given."""
+        self._expect_end(topic, msg_type, "subscription", node, count, within, hint)
+
+    def _owners(self, topic: str, kind: End, msg_type: type | None = None, node: str = "") -> str:
+        """Whose ends of this kind are on the topic, with their number where a node has several."""
+        owners = Counter(
+            full_name(end.node_namespace, end.node_name) for end in self._ends(topic, msg_type, kind, node)
+        )
+        return ", ".join(owner if times == 1 else f"{owner} ({times})" for owner, times in sorted(owners.items()))
+
+    def _expect_no_end(self, topic: str, kind: End, within: float, hint: str) -> None:
+        gone = self.observer.wait(lambda: not self._ends(topic, None, kind, ""), within)
+        self.expect_that(
+            gone,
+            f"`{topic}` has no {kind}",
+            lambda: Diagnosis(
+                f"A {kind} on `{topic}` is still there, of {self._owners(topic, kind)}.",
+                f"{kind}-present",
+            ),
+            hint=hint,
+        )
+
+    def expect_no_publisher(self, topic: str, *, within: float = GONE_WITHIN, hint: str = "") -> None:
+        """Nobody publishes on the topic."""
+        self._expect_no_end(topic, "publisher", within, hint)
+
+    def expect_no_subscription(self, topic: str, *, within: float = GONE_WITHIN, hint: str = "") -> None:
+        """Nobody subscribes to the topic."""
+        self._expect_no_end(topic, "subscription", within, hint)
+
+    def expect_qos(
+        self,
+        topic: str,
+        *,
+        of: End = "publisher",
+        node: str = "",
+        within: float = WITHIN,
+        hint: str = "",
+        **policies: str | float | None,
+    ) -> None:
+        """The endpoint has these QoS policies.
+
+        Args:
+            topic: full name.
+            of: which end.
+            node: full name of its node, if the topic has several such ends.
+            within: seconds to wait for the endpoint.
+            hint: a pointer for the student.
+            policies: any of reliability, durability, liveliness (in words) and deadline, lifespan, lease (seconds, or
+                None for "never"). History and depth are not on the graph.
+        """
+        unknown = sorted(policies.keys() - qos.POLICIES)
+        if unknown or not policies:
+            raise KitError(
+                f"expect_qos knows no policy called {', '.join(unknown) or 'nothing'}.",
+                f"Policies on the graph are {', '.join(sorted(qos.POLICIES))}.",
+            )
+        wanted = ", ".join(f"{policy} {qos.in_words(value)}" for policy, value in policies.items())
+        title = f"The {of} on `{topic}` has {wanted}"
+        if not self.wait_for_graph(lambda: self._ends(topic, None, of, node), within):
+            self.fail(
+                title,
+                diagnosis.why_no_endpoint(self.scene(), topic, None, of, node),
+                expected=f"a {of} on {topic}",
+                observed=self._topics(),
+                hint=hint,
+            )
+        self._all_there(topic, of)
+        seen, wrong = [], []
+        for end in self._ends(topic, None, of, node):
+            owner, have = full_name(end.node_namespace, end.node_name), qos.describe(end.qos_profile)
+            seen.append(", ".join(f"{policy} {qos.in_words(have[policy])}" for policy in policies))
+            wrong += [
+                (
+                    policy,
+                    f"The {of} of `{owner}`: its {policy} is {qos.in_words(have[policy])}, not {qos.in_words(value)}.",
+                )
+                for policy, value in policies.items()
+                if not _same(have[policy], value)
+            ]
+        self.expect_that(
+            not wrong,
+            title,
+            lambda: Diagnosis(" ".join(dict.fromkeys(said for _, said in wrong)), f"qos-{wrong[0][0]}"),
+            expected=wanted,
+            observed="; ".join(seen),
+            hint=hint,
+        )
+
+    def _all_there(self, topic: str, kind: End) -> None:
+        """Wait until the nodes at this end are built: their constructors may be about to make further ends."""
+        for owner in {full_name(end.node_namespace, end.node_name) for end in self._ends(topic, None, kind, "")}:
+            if owner not in self._built:
+                self._built.add(owner)
+                self._settle(owner)
+
+    def expect_match(self, topic: str, *, within: float = WITHIN, hint: str = "") -> None:
+        """Every subscription to the topic accepts the QoS that every publisher of it offers."""
+        title = f"Publishers and subscriptions on `{topic}` match"
+
+        def ends(kind: End) -> list[TopicEndpointInfo]:
+            return self._ends(topic, None, kind, "")
+
+        if not self.wait_for_graph(lambda: ends("publisher") and ends("subscription"), within):
+            missing: End = "subscription" if ends("publisher") else "publisher"
+            self.fail(
+                title,
+                diagnosis.why_no_endpoint(self.scene(), topic, None, missing),
+                expected=f"a publisher and a subscription on {topic}",
+                observed=self._topics(),
+                hint=hint,
+            )
+        self._all_there(topic, "publisher")
+        self._all_there(topic, "subscription")
+        reasons = [
+            diagnosis.why_not_matched(self.scene(), topic, end.qos_profile, "publisher") for end in ends("subscription")
+        ]
+        reason = next((found for found in reasons if found), None)
+        self.expect_that(not reason, title, lambda: reason, hint=hint)
+
+
+def _same(have: Any, want: Any) -> bool:
+    if isinstance(want, (int, float)) and isinstance(have, (int, float)):
+        return abs(have - want) <= 1e-6 + 0.001 * abs(want)
+    return bool(have == want)

@@ -1,0 +1,162 @@
+"""Expectations of lifecycle nodes: states, transitions, and the steps they take."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import NoReturn
+
+from autograder import diagnosis
+from autograder.checks import outcomes
+from autograder.checks.expect.expectations import WITHIN
+from autograder.checks.expect.graph import GraphExpectations
+from autograder.diagnosis import Diagnosis
+from autograder.graph.lifecycle import Change, LifecycleClient, Requested, in_order
+from autograder.graph.parameters import NoAnswer
+from autograder.graph.services import ServiceMissing
+
+WORD_FROM_INSIDE = 0.5
+"""Seconds that a failed check waits for what the student's process says about it."""
+
+
+class LifecycleExpectations(GraphExpectations):
+    """What state a node must be in, and how it got there."""
+
+    def prepare(self) -> None:
+        """Set up the lifecycle clients."""
+        super().prepare()
+        self._lifecycle_clients: dict[str, LifecycleClient] = {}
+
+    def watch_transitions(self, node: str) -> LifecycleClient:
+        """Record a node's state changes from now on; its events are volatile, so watch before it starts."""
+        if node not in self._lifecycle_clients:
+            self._lifecycle_clients[node] = LifecycleClient(self.observer, node)
+        return self._lifecycle_clients[node]
+
+    def _unreachable(self, title: str, node: str, error: Exception, hint: str) -> NoReturn:
+        scene = self.scene()
+        if isinstance(error, NoAnswer):
+            reason = diagnosis.why_no_answer(scene, f"{node}/get_state")
+        elif node in self.observer.nodes():
+            reason = diagnosis.program_trouble(scene) or Diagnosis(
+                f"`{node}` is not a lifecycle node: it offers no `{node}/get_state`.", "not-lifecycle"
+            )
+        else:
+            reason = diagnosis.why_no_node(scene, node)
+        self.fail(title, reason, expected=node, observed=", ".join(self.observer.nodes()), hint=hint)
+
+    def state(self, node: str, *, within: float = WITHIN) -> str:
+        """Label of a node's current state."""
+        try:
+            return self.watch_transitions(node).state(within, self.without_node(node))
+        except (ServiceMissing, NoAnswer) as error:
+            self._unreachable(f"`{node}` tells its lifecycle state", node, error, "")
+
+    def expect_state(
+        self, node: str, state: str, *, within: float = WITHIN, because: str = "", code: str = "", hint: str = ""
+    ) -> None:
+        """A lifecycle node is in this state, or gets there within `within` seconds."""
+        title = f"`{node}` is {state}"
+        try:
+            seen = self.watch_transitions(node).wait_for_state(state, within, self.without_node(node))
+        except (ServiceMissing, NoAnswer) as error:
+            self._unreachable(title, node, error, hint)
+        self.expect_that(
+            seen == state,
+            title,
+            lambda: Diagnosis(because, code or "state") if because else self._why_state(node, seen, state),
+            expected=state,
+            observed=seen,
+            hint=hint,
+        )
+
+    def _why_state(self, node: str, seen: str, wanted: str) -> Diagnosis:
+        return self._what_they_say() or Diagnosis(f"`{node}` is {seen}, not {wanted}.", "state")
+
+    def _what_they_say(self) -> Diagnosis | None:
+        """What the programs say of themselves: it takes another way than the node's answer, and may come later."""
+
+        def look() -> Diagnosis | None:
+            return diagnosis.program_trouble(self.scene()) or diagnosis.inside_reason(self.scene())
+
+        self.observer.wait(look, WORD_FROM_INSIDE)
+        return look()
+
+    def available_transitions(self, node: str, *, within: float = WITHIN) -> Mapping[str, str]:
+        """Labels of the transitions that a node offers now, each with the state it leads to."""
+        try:
+            return self.watch_transitions(node).available(within, self.without_node(node))
+        except (ServiceMissing, NoAnswer) as error:
+            self._unreachable(f"`{node}` tells its transitions", node, error, "")
+
+    def transition(
+        self, node: str, label: str, *, expect: str | None = "success", within: float = WITHIN, hint: str = ""
+    ) -> Requested:
+        """Request a transition by its label.
+
+        Args:
+            node: full name.
+            label: `configure`, `activate`, `deactivate`, `cleanup` or `shutdown`.
+            expect: `success`, `failure` (the node answers that it did not succeed), or None: look only, no outcome.
+            within: seconds.
+            hint: a pointer for the student.
+        """
+        title = f"`{node}`: {label}" + {"success": " succeeds", "failure": " does not succeed", None: ""}[expect]
+        try:
+            done = self.watch_transitions(node).transition(label, within, self.without_node(node))
+        except (ServiceMissing, NoAnswer) as error:
+            self._unreachable(title, node, error, hint)
+        if expect is None:
+            return done
+        if not done.offered:
+            self.fail(
+                title,
+                Diagnosis(
+                    f"`{node}` is {done.before}; from there it offers {', '.join(done.available) or 'nothing'}.",
+                    "state",
+                ),
+                expected=label,
+                observed=done.before,
+                hint=hint,
+            )
+        if expect == "success" and not done.success:
+            self.fail(
+                title,
+                self._what_they_say()
+                or Diagnosis(
+                    f"The callback of {label} did not return SUCCESS; the node is {done.after} now.",
+                    "transition-failed",
+                ),
+                expected="success",
+                observed=f"no success, {done.after}",
+                hint=hint,
+            )
+        if expect == "failure" and done.success:
+            self.fail(
+                title,
+                Diagnosis(f"It succeeded; the node is {done.after} now.", "transition-succeeded"),
+                expected="no success",
+                observed=f"success, {done.after}",
+                hint=hint,
+            )
+        outcomes.passed(title, observed=done.after)
+        return done
+
+    def changes(self, *nodes: str) -> list[Change]:
+        """State changes so far of the nodes (by default of all that are watched), in the order of publication."""
+        return in_order([self.watch_transitions(node) for node in nodes or self._lifecycle_clients])
+
+    def expect_transitions(
+        self, node: str, steps: Sequence[tuple[str, str]], *, within: float = WITHIN, hint: str = ""
+    ) -> None:
+        """A node took exactly these steps (state left, state entered) since it is watched."""
+        client = self.watch_transitions(node)
+        seen = [change.step for change in client.wait_for_changes(len(steps), within, self.without_node(node))]
+        told = ", ".join(f"{a} to {b}" for a, b in seen) or "no step"
+        self.expect_that(
+            seen == list(steps),
+            f"`{node}` goes " + ", ".join(f"{a} to {b}" for a, b in steps),
+            lambda: self._what_they_say() or Diagnosis(f"It went {told}.", "transitions"),
+            expected=", ".join(f"{a} to {b}" for a, b in steps),
+            observed=told,
+            hint=hint,
+        )

@@ -1,0 +1,73 @@
+"""A program of the student's and what it is started with, named as in a launch description."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import yaml
+
+from autograder.arguments import remap_rules
+from autograder.checks.command_line import CommandLine
+
+
+@dataclass(frozen=True)
+class Node:
+    """One program of the student's and the ROS arguments it is started with, named as in a launch description."""
+
+    program: str
+    namespace: str = ""
+    name: str = ""
+    remappings: Sequence[tuple[str, str]] = ()
+    parameters: Mapping[str, Any] = field(default_factory=dict)
+    params_file: str = ""
+    """A parameter file of the student's; it comes before `parameters`, which win."""
+    ros_arguments: Sequence[str] | CommandLine = ()
+    """Further words after `--ros-args`, as typed on a command line."""
+    arguments_of_its_own: Sequence[str] = ()
+    """Words before `--ros-args`."""
+    cores: int = 2
+    """CPUs that the program may use: the same number on every machine that has them."""
+    environment: Mapping[str, str] = field(default_factory=dict)
+    """Variables beside those that every program has."""
+    warnings: Sequence[str] = ()
+    """What a launch file names and does not have; the program starts without it."""
+
+    def arguments(self) -> list[str]:
+        """The program's command line."""
+        words: list[str] = []
+        for rule in self.rules():
+            words += ["-r", rule]
+        if self.params_file:
+            words += ["--params-file", self.params_file]
+        for name, value in self.parameters.items():
+            words += ["-p", f"{name}:={_yaml_value(value)}"]
+        words += self._typed()
+        return [*self.arguments_of_its_own, *(["--ros-args", *words] if words else [])]
+
+    def _typed(self) -> Sequence[str]:
+        typed = self.ros_arguments
+        return typed.words() if isinstance(typed, CommandLine) else typed
+
+    def all_rules(self) -> list[str]:
+        """The remap rules, those that were typed included."""
+        return self.rules() + remap_rules.rules_in([*self.arguments_of_its_own, *self._typed()])
+
+    def rules(self) -> list[str]:
+        """The remap rules in the order in which they are given: the first that matches wins."""
+        rules = [f"{old}:={new}" for old, new in self.remappings]
+        if self.namespace:
+            rules.append(f"__ns:={self.namespace}")
+        if self.name:
+            rules.append(f"__node:={self.name}")
+        return rules
+
+
+def _yaml_value(value: Any) -> str:
+    """A parameter value as the command line wants it; strings are quoted so that `40` stays a string."""
+    if isinstance(value, str):
+        return '"' + value.replace("\\", "\\\\").replace('"', '\\"') + '"'
+    if isinstance(value, float):
+        return repr(value)  # keeps the point: 40.0 is a double, 40 an integer
+    return yaml.safe_dump(value, default_flow_style=True, width=10_000).splitlines()[0]

@@ -1,0 +1,97 @@
+"""Where the programs of this process run: their folder, their sandbox, their domains, and the values that vary.
+
+The grading worker says all that once; in a student's notebook the programs lie beside it and run without isolation
+from oneself.
+"""
+
+from __future__ import annotations
+
+import atexit
+import random
+from collections.abc import Mapping
+from pathlib import Path
+
+from autograder.checks import findings
+from autograder.core import front_end
+from autograder.core.front_end import FrontEnd
+from autograder.core.results import Isolation
+from autograder.graph.domains import free_domains
+from autograder.sandbox.nodes import NodeSandbox
+
+
+class Runtime:
+    """The sandbox that the programs of all launches run in, and what it was made with."""
+
+    def __init__(self) -> None:
+        """Start as a student's notebook does."""
+        self._folder: Path | None = None
+        self._answers: Mapping[str, bool] = {}
+        self.isolation = Isolation.NONE
+        self.random = random.Random()
+        self._sandbox: NodeSandbox | None = None
+        self._domains = free_domains()
+
+    def configure(
+        self, folder: Path, isolation: Isolation, seed: int, answers: Mapping[str, bool] | None = None
+    ) -> None:
+        """Say where the programs are and how they are kept apart; the grading worker does so once.
+
+        Args:
+            folder: holds the programs and files of the submission.
+            isolation: for the programs.
+            seed: of all values that vary from run to run.
+            answers: the files that are answers, and of each whether its cell is still as students receive it.
+        """
+        self.close()
+        self._folder, self.isolation, self.random = folder, isolation, random.Random(seed)
+        self._answers = answers or {}
+
+    @property
+    def front_end(self) -> FrontEnd | None:
+        """The student's notebook; None where a submission is graded."""
+        return front_end.active if self._folder is None else None
+
+    @property
+    def folder(self) -> Path:
+        """Where the programs and files are."""
+        if self._folder is not None:
+            return self._folder
+        return front_end.active.programs if front_end.active is not None else Path("nodes")
+
+    def use(self, file_name: str) -> Path:
+        """Return where a file of the student's is, and note that the check uses it."""
+        findings.current.used.add(file_name)
+        return self.folder / file_name
+
+    def has(self, file_name: str) -> bool:
+        """Whether there is such a file; in a notebook, whether a cell wrote it since the kernel began."""
+        here = self.front_end
+        return here.has(file_name) if here is not None else (self.folder / file_name).is_file()
+
+    def blank_answers(self) -> dict[str, bool]:
+        """Of the answers that the check uses, whether each is still as students receive it."""
+        used = findings.current.used
+        if self.front_end is not None:
+            return self.front_end.blank(used)
+        return {name: blank for name, blank in self._answers.items() if name in used}
+
+    @property
+    def sandbox(self) -> NodeSandbox:
+        """The sandbox, made at the first use."""
+        if self._sandbox is None:
+            self._sandbox = NodeSandbox(self.folder.resolve(), self.isolation)
+        return self._sandbox
+
+    def close(self) -> None:
+        """End every program and the sandbox."""
+        if self._sandbox is not None:
+            self._sandbox.close()
+            self._sandbox = None
+
+    def next_domain(self) -> int:
+        """A domain id that no launch used lately and nobody on this machine seems to use."""
+        return next(self._domains)
+
+
+current = Runtime()
+atexit.register(current.close)

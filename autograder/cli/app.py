@@ -1,0 +1,24 @@
+"""The application that the commands register with, and the options that several of them have."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from autograder.core.results import Isolation
+
+app = typer.Typer(
+    add_completion=False,
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+    help="Grade ROS 2 labs: run students' nodes in a sandbox and watch the ROS graph.",
+)
+
+IsolationOption = Annotated[
+    Isolation, typer.Option(help="How programs are kept apart. Where `full` is missing, the command refuses.")
+]
+ForceOption = Annotated[bool, typer.Option("--force", help="Run again even what did not change.")]
+SeedOption = Annotated[int | None, typer.Option(help="Repeat a run with the same varying values.")]
+JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON for a program to read.")]

@@ -1,0 +1,182 @@
+"""`autograder doctor`: what this machine offers for grading, and what to do about each lack."""
+
+from __future__ import annotations
+
+import json
+import os
+import platform
+import shutil
+import subprocess
+import sys
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from autograder.sandbox.environment import profile_environment
+from autograder.setup import bootstrap
+
+GIB = 1 << 30
+NEEDED_SPACE = 2 * GIB
+"""Bytes: results and feedback of a class, and what the programs of all submissions that run at once may write."""
+ROS_TIME_LIMIT = 30.0
+"""Seconds for importing rclpy and receiving one message; it takes about one."""
+
+# A message that arrives is the only proof that rclpy, its middleware and this machine's loopback work together.
+TRY_ROS = """
+import json, importlib.metadata, rclpy
+from rclpy.executors import SingleThreadedExecutor
+from std_msgs.msg import String
+found = {"place": rclpy.__file__, "middleware": rclpy.get_rmw_implementation_identifier(), "version": ""}
+try:
+    found["version"] = importlib.metadata.version("ros-jazzy-rclpy")
+except importlib.metadata.PackageNotFoundError:
+    pass
+rclpy.init()
+node = rclpy.create_node("doctor", start_parameter_services=False, enable_rosout=False)
+received = []
+node.create_subscription(String, "doctor", received.append, 10)
+publisher = node.create_publisher(String, "doctor", 10)
+node.create_timer(0.05, lambda: publisher.publish(String(data="well")))
+executor = SingleThreadedExecutor()
+executor.add_node(node)
+while not received:
+    executor.spin_once(timeout_sec=1.0)
+executor.shutdown()
+node.destroy_node()
+rclpy.try_shutdown()
+print(json.dumps(found))
+"""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing looked at."""
+
+    name: str
+    good: bool
+    found: str
+    do: str = ""
+    """What to do about it: about a lack, or, where `good`, to gain something."""
+
+
+def run(as_json: bool) -> int:
+    """Look at everything and print it; return 0 if the machine can grade, 2 if something is lacking."""
+    looks = (python, environment, foreign_ros, ros, isolation, cores, space)
+    findings: list[Finding] = []
+    for look in looks:
+        try:
+            findings.append(look())
+        except Exception as error:  # the doctor must reach the end, most of all on a broken machine
+            findings.append(Finding(look.__name__, False, f"{type(error).__name__}: {error}", "This is unexpected."))
+    healthy = all(finding.good for finding in findings)
+    if as_json:
+        print(json.dumps({"healthy": healthy, "findings": [asdict(finding) for finding in findings]}, indent=1))
+    else:
+        show(findings, healthy)
+    return 0 if healthy else 2
+
+
+def show(findings: list[Finding], healthy: bool) -> None:
+    """Print the findings as a table, and what to do below it."""
+    console = Console(highlight=False)
+    if not console.is_terminal:
+        console.width = 120
+    table = Table(show_header=False, box=None, padding=(0, 1))
+    for finding in findings:
+        mark = Text("✓", "blue") if finding.good else Text("✗ lack", "bold red")
+        table.add_row(mark, Text(finding.name, "bold"), Text(finding.found))
+    console.print(table)
+    for finding in findings:
+        if finding.do:
+            console.print(Text.assemble("\n", (finding.name, "bold"), ": ", finding.do))
+    console.print()
+    console.print("This machine can grade." if healthy else "This machine cannot grade yet.")
+
+
+def python() -> Finding:
+    """Whether this Python is one that the ROS wheels exist for."""
+    version = platform.python_version()
+    good = bootstrap.OLDEST <= sys.version_info[:2] <= bootstrap.NEWEST
+    do = "" if good else "Use Python 3.11 to 3.14: make setup PYTHON=/path/to/python3.12"
+    return Finding("Python", good, f"{version}  {sys.executable}", do)
+
+
+def environment() -> Finding:
+    """Whether `.venv` is finished and agrees with the lock."""
+    name = "environment"
+    if Path(sys.prefix).resolve() != bootstrap.VENV:
+        return Finding(name, True, f"{sys.prefix} (not the kit's own .venv)")
+    state = bootstrap.read_marker()
+    if not state:
+        return Finding(name, False, f"{bootstrap.VENV} is unfinished, or was moved", "Run: make setup")
+    old = [lock for lock, digest in state["locks"].items() if digest != bootstrap.digest(lock)]
+    if old:
+        return Finding(name, False, f"{bootstrap.VENV} is older than {' and '.join(old)}", "Run: make setup")
+    return Finding(name, True, f"{bootstrap.VENV} agrees with {' and '.join(state['locks'])}")
+
+
+def foreign_ros() -> Finding:
+    """Whether this shell has another ROS distribution sourced."""
+    try:
+        bootstrap.refuse_foreign_ros(os.environ)
+    except bootstrap.SetUpError as error:
+        return Finding("other ROS", False, error.what, error.do)
+    return Finding("other ROS", True, "none is sourced in this shell")
+
+
+def ros() -> Finding:
+    """Whether rclpy really works: it is imported, and one message goes from a publisher to a subscription."""
+    name = "ROS 2"
+    repair = "Make the environment anew: make distclean setup"
+    try:
+        process = subprocess.run(
+            [sys.executable, "-P", "-c", TRY_ROS],
+            env={**os.environ, **profile_environment(), "ROS_DOMAIN_ID": "101"},
+            capture_output=True,
+            text=True,
+            timeout=ROS_TIME_LIMIT,
+            check=False,
+        )
+    except subprocess.TimeoutExpired:
+        return Finding(
+            name, False, f"no message arrived in {ROS_TIME_LIMIT:g} s", "See that no firewall blocks UDP on 127.0.0.1."
+        )
+    if process.returncode:
+        return Finding(name, False, (process.stderr.strip().splitlines() or ["rclpy does not start"])[-1], repair)
+    found = json.loads(process.stdout.strip().splitlines()[-1])
+    place = Path(found["place"])
+    if not (place.is_relative_to(sys.prefix) or place.is_relative_to("/opt/ros/jazzy")):
+        return Finding(name, False, f"rclpy comes from {place.parent}, not from this environment", repair)
+    if found["middleware"] != "rmw_fastrtps_cpp":
+        return Finding(name, False, f"the middleware is {found['middleware']}", "Run: unset RMW_IMPLEMENTATION")
+    return Finding(name, True, f"Jazzy, rclpy {found['version']}, Fast DDS: a message arrived".replace("  ", " "))
+
+
+def isolation() -> Finding:
+    """How well students' programs can be kept apart here."""
+    from autograder.sandbox.isolation import preflight
+
+    level = preflight()
+    if level.full:
+        return Finding("isolation", True, "full: own user, process, IPC and network namespaces")
+    found = f"{'reduced' if level.reduced else 'none'}: {level.why_not_full}"
+    return Finding("isolation", False, found, level.do)
+
+
+def cores() -> Finding:
+    """How many cores this process may use; one is enough, but slow."""
+    count = len(os.sched_getaffinity(0))
+    return Finding("cores", True, str(count), "" if count > 1 else "With two or more, grading is faster.")
+
+
+def space() -> Finding:
+    """Free space where results are written."""
+    folder = bootstrap.ROOT
+    free = shutil.disk_usage(folder).free
+    do = "" if free >= NEEDED_SPACE else f"Free {NEEDED_SPACE // GIB} GiB; make clean removes what was built."
+    if not os.access(folder, os.W_OK):
+        return Finding("free space", False, f"{folder} is not writable", "Work in a copy that is yours.")
+    return Finding("free space", free >= NEEDED_SPACE, f"{free / GIB:.1f} GiB in {folder}", do)

@@ -1,0 +1,85 @@
+"""`autograder grade`: a class."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from autograder.cli.app import ForceOption, IsolationOption, JsonOption, SeedOption, app
+from autograder.core.errors import KitError
+from autograder.core.results import Isolation
+from autograder.course.paths import CoursePaths
+
+if TYPE_CHECKING:
+    from autograder.gradebook.class_run import ClassRun
+
+
+@app.command()
+def grade(
+    lab: Annotated[str, typer.Argument(help="The lab, such as lab2_executors.")],
+    submissions: Annotated[
+        Path | None, typer.Argument(help="Folder or zip with a folder for each student; default: the sample class.")
+    ] = None,
+    force: ForceOption = False,
+    isolation: IsolationOption = Isolation.FULL,
+    jobs: Annotated[int, typer.Option(min=0, help="How many run at once; 0 lets the machine decide.")] = 0,
+    seed: SeedOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Grade a class: gradebook, grades, feedback, and a table of who lost points why."""
+    from autograder.course.folder import course_root
+    from autograder.grading.runner import Settings
+
+    root = course_root()
+    paths = CoursePaths(root)
+    source = submissions or paths.sample_class(lab)
+    if not source.exists():
+        raise KitError(
+            f"There are no submissions at {source}.",
+            "Name a folder or zip." if submissions else f"Build the sample class: python tests/sample_class.py {lab}",
+        )
+    if root.is_relative_to(source.resolve()):
+        raise KitError(
+            f"The working folder lies in the submissions, and {root} would be taken for the course.",
+            "Change to the folder of your course, and name the submissions from there.",
+        )
+    from autograder.gradebook.class_run import grade_class
+    from autograder.sandbox.isolation import choose
+
+    run = grade_class(root, lab, source, Settings(choose(isolation), seed, force, jobs))
+    _show(run, paths, lab, as_json)
+    raise typer.Exit(2 if run.unrecorded else 0)
+
+
+def _show(run: ClassRun, paths: CoursePaths, lab: str, as_json: bool) -> None:
+    from autograder.report.terminal import class_view, console, plain, undecided_view
+
+    left_out = [plain(sentence) for sentence in run.refused]
+    left_out += [f"{plain(name)} is not in the gradebook: {plain(why)}" for name, why in run.unrecorded.items()]
+    if as_json:
+        print("[" + ",\n".join(result.model_dump_json() for result in run.results) + "]")
+        for sentence in left_out:
+            print(sentence, file=sys.stderr)
+        return
+    screen = console()
+    screen.print(class_view(run.results))
+    undecided = undecided_view(run.results)
+    if undecided is not None:
+        screen.print()
+        screen.print(undecided)
+    screen.print()
+    for sentence in left_out:
+        screen.print(sentence, markup=False)
+    screen.print(
+        f"{len(run.results)} submissions in {run.seconds['all']:.0f} s ({run.seconds['recording']:.0f} s in nbgrader)"
+    )
+    for label, path in (
+        ("gradebook", paths.gradebook),
+        ("grades", run.grades),
+        ("feedback", paths.feedback),
+        ("results", paths.results / lab),
+    ):
+        screen.print(f"{label:<10} {path}", markup=False, soft_wrap=True)

@@ -1,0 +1,55 @@
+"""Runs a command: exit status 0 fine, 1 checks failed, 2 usage or set-up error.
+
+Imports stay inside the commands, so that `autograder check` starts at once.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+
+from autograder.cli import check, grade, labs, machine, results  # noqa: F401  each registers its commands
+from autograder.cli.app import app
+from autograder.core.errors import KitError
+from autograder.setup.bootstrap import SetUpError, refuse_foreign_ros
+
+INTERRUPTED = 130
+"""Exit status after Ctrl-C; Typer takes the KeyboardInterrupt and exits with it, saying nothing."""
+
+
+def main() -> None:
+    """Run the command; people get sentences, never a traceback."""
+    try:
+        if sys.argv[1:2] != ["doctor"]:  # which reports it among other things
+            refuse_foreign_ros(os.environ)
+        app()
+    except (KitError, SetUpError) as error:
+        from autograder.report.terminal import plain  # a student may have named the file that it is about
+
+        print(plain(f"error: {error.what}"), file=sys.stderr)
+        if error.do:
+            print(plain(f"  {error.do}"), file=sys.stderr)
+        sys.exit(2)
+    except (KeyboardInterrupt, SystemExit) as end:
+        if isinstance(end, SystemExit) and end.code != INTERRUPTED:
+            raise
+        print("\nInterrupted.", file=sys.stderr)
+        sys.exit(INTERRUPTED)
+    except BrokenPipeError:
+        sys.exit(1)
+    except OSError as error:  # the machine refuses something, which is no defect of the kit
+        print(f"error: {error.filename or 'a file'}: {error.strerror or error}", file=sys.stderr)
+        print(
+            "  See that its folder exists, that you may write there, and that the disk has room.\n"
+            '  What another user left in the course\'s folder becomes yours by: sudo chown -R "$USER" build',
+            file=sys.stderr,
+        )
+        sys.exit(2)
+    except Exception as error:
+        import traceback
+
+        last = traceback.extract_tb(error.__traceback__)[-1]
+        print(f"error: {type(error).__name__}: {error}", file=sys.stderr)
+        print(f"  This is a defect of the kit ({Path(last.filename).name}:{last.lineno}).", file=sys.stderr)
+        sys.exit(2)

@@ -1,0 +1,96 @@
+"""Writing files whole or not at all, and reading those of others without being led elsewhere."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import math
+import os
+import stat
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+
+def write_beside(path: Path, content: str | bytes) -> None:
+    """Write a file beside its place and move it there, so that no reader ever sees half of it.
+
+    Raises:
+        OSError: it cannot be written; its `filename` says which.
+    """
+    beside = path.with_name(f".{path.name}.{os.getpid()}")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        beside.write_bytes(content.encode("utf-8") if isinstance(content, str) else content)
+        beside.replace(path)
+    except OSError as error:
+        with contextlib.suppress(OSError):
+            beside.unlink()
+        error.filename = str(path)  # a full disk names no file, and nobody knows the one beside it
+        raise
+
+
+def modified(path: Path) -> float:
+    """When a file was last written; before all time if it is not there."""
+    try:
+        return path.stat().st_mtime
+    except OSError:
+        return -math.inf
+
+
+def signature(path: Path) -> tuple[int, ...] | None:
+    """Return what tells one state of a file from the next; None if there is none. It follows no link."""
+    try:
+        state = path.lstat()
+    except OSError:
+        return None
+    return state.st_dev, state.st_ino, state.st_size, state.st_mtime_ns, state.st_ctime_ns
+
+
+def read_plain(folder: Path, parts: Sequence[str], most: int) -> bytes:
+    """Read a file that somebody else placed below a folder: never through a link, never from anything but a file.
+
+    Args:
+        folder: where the way begins; how one gets there is the caller's business.
+        parts: the names from there to the file.
+        most: bytes that are read.
+
+    Raises:
+        OSError: it cannot be read, or a part of the way is not what it must be; `strerror` says why, for a person.
+    """
+    passing = os.O_PATH | os.O_DIRECTORY  # a folder may be one that can be entered but not listed
+    here = os.open(folder, passing)
+    try:
+        for number, part in enumerate(parts, start=1):
+            last = number == len(parts)
+            # Looked at first, for opening a device may already do something. O_NOFOLLOW and the second look hold where
+            # the name has come to mean something else since; O_NONBLOCK, since a FIFO would wait for its writer.
+            _refuse_kind(part, os.stat(part, dir_fd=here, follow_symlinks=False).st_mode, last)
+            how = os.O_RDONLY | os.O_NONBLOCK if last else passing
+            there = os.open(part, how | os.O_NOFOLLOW, dir_fd=here)
+            os.close(here)
+            here = there
+            _refuse_kind(part, os.fstat(here).st_mode, last)
+        with os.fdopen(here, "rb", closefd=False) as file:
+            return file.read(most)
+    finally:
+        os.close(here)
+
+
+_KINDS: dict[str, Callable[[int], bool]] = {
+    "a link": stat.S_ISLNK,
+    "a folder": stat.S_ISDIR,
+    "a file": stat.S_ISREG,
+    "a FIFO": stat.S_ISFIFO,
+    "a socket": stat.S_ISSOCK,
+    "a device": lambda mode: stat.S_ISCHR(mode) or stat.S_ISBLK(mode),
+}
+
+
+def _refuse_kind(name: str, mode: int, last: bool) -> None:
+    wanted = stat.S_ISREG if last else stat.S_ISDIR
+    if wanted(mode):
+        return
+    kind = next((word for word, test in _KINDS.items() if test(mode)), "something else")
+    what = "file" if last else "folder"
+    more = "; links are not followed" if stat.S_ISLNK(mode) else ""
+    raise OSError(errno.EINVAL, f"{name[:60]!r} is {kind}, not a {what}{more}")

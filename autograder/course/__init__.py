@@ -1,0 +1,1 @@
+"""A course: its folder, its labs, the marks in their notebooks."""

@@ -1,0 +1,47 @@
+"""Where the course lies: the folder that holds `solutions/`, `labs/` and `build/`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from autograder.core.errors import KitError
+
+_KIT = Path(__file__).resolve().parent.parent.parent
+
+
+def course_root() -> Path:
+    """Return the course that the working folder lies in, for who works on a course; then the kit's own.
+
+    Raises:
+        KitError: there is none.
+    """
+    for folder in (Path.cwd(), *Path.cwd().parents, _KIT):
+        if _is_course(folder):
+            return folder
+    raise KitError(
+        "There is no course here: no folder with `solutions` or `labs`.", "Run it inside the course's folder."
+    )
+
+
+def trusted_course(named: Path | None) -> Path:
+    """Return the course whose checks may be run on a notebook: the one that was named, or the kit's own.
+
+    Never what lies beside the notebook, above it, or in the working folder: whoever handed in the notebook may have put
+    it there, and check cells are trusted code.
+
+    Raises:
+        KitError: there is none.
+    """
+    root = _KIT if named is None else named.resolve()
+    if _is_course(root):
+        return root
+    if named is None:
+        raise KitError(f"There is no course in {_KIT}.", "Name the folder of yours: --course FOLDER")
+    raise KitError(f"There is no course in {root}.", "It needs a folder `solutions` (or `labs`) with NAME/NAME.ipynb.")
+
+
+def _is_course(folder: Path) -> bool:
+    """Whether there is a lab in it; many folders called `labs` hold something else."""
+    return any(
+        path.stem == path.parent.name for name in ("solutions", "labs") for path in (folder / name).glob("*/*.ipynb")
+    )

@@ -1,0 +1,265 @@
+"""A lab as the instructor wrote it: which cells are trusted, which are answers, and what students receive.
+
+The notebook under `solutions/` is the only source. Where there is none, as in a student's copy of the course, the
+notebook under `labs/` serves: it has the same cells without the hidden tests.
+"""
+
+from __future__ import annotations
+
+import copy
+import hashlib
+import json
+import re
+from dataclasses import dataclass
+from functools import cache, cached_property, lru_cache
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel, ConfigDict
+
+from autograder.core.errors import KitError
+from autograder.core.files import signature
+from autograder.core.results import encodable
+from autograder.course.cell_file import BadNameError, CellFile, parse
+from autograder.course.markers import without_hidden_tests, without_region
+
+CODE_STUB = "# YOUR CODE HERE"
+"""What students find in place of a solution: a comment in Python and in YAML."""
+TEXT_STUB = "YOUR ANSWER HERE"
+
+_HEADING = re.compile(r"^#{1,6}\s+(.*?)\s*#*\s*$", re.MULTILINE)
+
+
+@cache
+def _kit_digest() -> str:
+    """SHA-256 over the kit's own source: its version stays the same between two releases, its checks do not."""
+    package = Path(__file__).resolve().parent.parent
+    files = sorted(path for path in package.rglob("*") if path.suffix in (".py", ".html", ".xml"))
+    parts = [(str(path.relative_to(package)), hashlib.sha256(path.read_bytes()).hexdigest()) for path in files]
+    return hashlib.sha256(json.dumps(parts).encode()).hexdigest()
+
+
+class Cell(BaseModel):
+    """One trusted code cell of a lab, in the notebook's order."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    grade_id: str
+    title: str = ""
+    """The nearest heading above it."""
+    points: float | None = None
+    """None: a set-up cell that is run but not graded."""
+    source: str
+    """With the hidden tests and their markers."""
+
+
+@dataclass(frozen=True)
+class Answer:
+    """A cell that students fill in."""
+
+    grade_id: str
+    cell_type: str
+    blank: str
+    """The source that students receive."""
+    solution: str
+    """The source that solves it, without the markers."""
+    file: CellFile | None
+    """The file that the blank cell names; None for an answer in plain text."""
+    points: float | None
+    """What a person can give for it; None if it is not graded by hand."""
+
+
+@dataclass(frozen=True, eq=False)
+class Lab:
+    """A lab, read from its notebook; a file that has not changed gives the same object again."""
+
+    name: str
+    notebook: Path
+    raw: dict[str, Any]
+    """The notebook's JSON."""
+    cells: tuple[Cell, ...]
+    """The trusted code cells in order, set-up cells and check cells."""
+    answers: dict[str, Answer]
+    """By grade_id, in order."""
+    given: dict[str, str]
+    """Files of locked cells, by file name: programs that students use but do not write."""
+    released: tuple[dict[str, Any], ...]
+    """The cells that students receive."""
+
+    @property
+    def checks(self) -> tuple[Cell, ...]:
+        """The cells that give points."""
+        return tuple(cell for cell in self.cells if cell.points is not None)
+
+    @property
+    def max_points(self) -> float:
+        """Points that the checks can give; answers graded by hand come on top."""
+        return sum(cell.points or 0.0 for cell in self.cells)
+
+    @property
+    def max_manual_points(self) -> float:
+        """Points that a person can give for answers in plain text."""
+        return sum(answer.points or 0.0 for answer in self.answers.values())
+
+    @cached_property
+    def digest(self) -> str:
+        """SHA-256 over everything that can change a result: the trusted cells, the files they use, and the kit."""
+        parts = [
+            _kit_digest(),
+            [cell.model_dump(exclude={"title"}) for cell in self.cells],
+            sorted(self.given.items()),
+            [[answer.grade_id, answer.blank] for answer in self.answers.values()],
+        ]
+        return hashlib.sha256(json.dumps(parts).encode()).hexdigest()
+
+    def clean_notebook(self, sources: dict[str, str]) -> dict[str, Any]:
+        """Return the released notebook with these sources in its answer cells: nothing else of a student's is in it."""
+        cells = copy.deepcopy(list(self.released))
+        for cell in cells:
+            grade_id = grade_id_of(cell)
+            if grade_id in self.answers and grade_id in sources:
+                cell["source"] = sources[grade_id]
+        return {
+            "cells": cells,
+            "metadata": copy.deepcopy(self.raw.get("metadata", {})),
+            "nbformat": self.raw.get("nbformat", 4),
+            "nbformat_minor": self.raw.get("nbformat_minor", 5),
+        }
+
+
+def nbgrader_of(cell: dict[str, Any]) -> dict[str, Any]:
+    """Return a cell's nbgrader metadata; empty if it has none, or something else in its place."""
+    metadata = cell.get("metadata")
+    nbgrader = metadata.get("nbgrader") if isinstance(metadata, dict) else None
+    return nbgrader if isinstance(nbgrader, dict) else {}
+
+
+def grade_id_of(cell: dict[str, Any]) -> str:
+    """Return a cell's grade_id; empty if it has none."""
+    grade_id = nbgrader_of(cell).get("grade_id")
+    return encodable(grade_id) if isinstance(grade_id, str) else ""
+
+
+def cell_digest(source: str) -> str:
+    """Return what tells one text of a cell from another; blanks at the ends of lines and of the cell do not count."""
+    lines = [line.rstrip() for line in source.replace("\r\n", "\n").strip().split("\n")]
+    return hashlib.sha256("\n".join(lines).encode("utf-8", "replace")).hexdigest()[:16]
+
+
+def blank_mark(source: str) -> dict[str, str]:
+    """Return metadata for an answer cell, below `autograder`, by which a notebook knows that it is still untouched."""
+    return {"blank": cell_digest(source)}
+
+
+def blank_mark_of(cell: dict[str, Any]) -> str:
+    """Return the digest in a cell's `blank_mark`; empty if it has none."""
+    metadata = cell.get("metadata")
+    mark = metadata.get("autograder") if isinstance(metadata, dict) else None
+    return str(mark.get("blank", "")) if isinstance(mark, dict) else ""
+
+
+def source_of(cell: dict[str, Any]) -> str:
+    """Return a cell's source as one string that can be encoded; notebooks hold it as a string or as lines.
+
+    Raises:
+        ValueError: it is neither.
+    """
+    source = cell.get("source", "")
+    if isinstance(source, list) and all(isinstance(line, str) for line in source):
+        source = "".join(source)
+    if not isinstance(source, str):
+        raise ValueError("a cell's source is neither text nor lines of text")
+    return encodable(source).replace("\r\n", "\n").replace("\r", "\n")
+
+
+def lab_names(root: Path) -> list[str]:
+    """Return the names of the course's labs, sorted."""
+    found = {
+        p.stem for folder in ("solutions", "labs") for p in (root / folder).glob("*/*.ipynb") if p.parent.name == p.stem
+    }
+    return sorted(found)
+
+
+def load_lab(root: Path, name: str) -> Lab:
+    """Read a lab of the course at `root`.
+
+    Raises:
+        KitError: there is no such lab, or its notebook cannot be used; says which cell.
+    """
+    candidates = [root / folder / name / f"{name}.ipynb" for folder in ("solutions", "labs")]
+    notebook = next((path for path in candidates if path.is_file()), None)
+    if notebook is None or not re.fullmatch(r"[A-Za-z0-9_-]+", name):
+        names = ", ".join(lab_names(root)) or "none"
+        raise KitError(f"This course has no lab `{name}`.", f"Labs in {root}: {names}.")
+    return _loaded(name, notebook, signature(notebook), released_only=notebook == candidates[1])
+
+
+@lru_cache(maxsize=32)
+def _loaded(name: str, notebook: Path, _signature: object, released_only: bool) -> Lab:
+    try:
+        raw = json.loads(notebook.read_text(encoding="utf-8"))
+        return _read(name, notebook, raw, released_only)
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        raise KitError(f"{notebook} cannot be used as a lab: {error}", "Repair that cell.") from error
+
+
+def _read(name: str, notebook: Path, raw: dict[str, Any], released_only: bool) -> Lab:
+    cells: list[Cell] = []
+    answers: dict[str, Answer] = {}
+    given: dict[str, str] = {}
+    released: list[dict[str, Any]] = []
+    seen: set[str] = set()
+    title = ""
+    for raw_cell in raw["cells"]:
+        cell = copy.deepcopy(raw_cell)
+        source = source_of(cell)
+        nbgrader = nbgrader_of(cell)
+        grade_id = grade_id_of(cell)
+        if grade_id in seen:
+            raise ValueError(f"two cells have the grade_id `{grade_id}`")
+        if grade_id:
+            seen.add(grade_id)
+        if cell["cell_type"] == "markdown" and not nbgrader.get("solution"):
+            headings = _HEADING.findall(source)
+            title = headings[-1] if headings else title
+        blank = source
+        points = float(nbgrader["points"]) if nbgrader.get("grade") else None
+        if nbgrader.get("solution"):
+            # A released notebook holds no solutions; whatever stands in its answers is what there is to start from.
+            blank = source if released_only else _without_solution(source, cell["cell_type"])
+            answers[grade_id] = Answer(
+                grade_id, cell["cell_type"], blank, _without_markers(source), _file(grade_id, blank), points
+            )
+        elif cell["cell_type"] == "code" and (nbgrader.get("locked") or nbgrader.get("grade")):
+            blank = without_hidden_tests(source)
+            file = _file(grade_id, source)
+            if file is not None:
+                given[file.file_name] = file.text
+            elif not source.lstrip().startswith("%%"):
+                cells.append(Cell(grade_id=grade_id, title=title, points=points, source=source))
+        if grade_id in answers and answers[grade_id].file is not None:
+            cell["metadata"]["autograder"] = blank_mark(blank)
+        cell["source"] = blank
+        if cell["cell_type"] == "code":
+            cell.update(outputs=[], execution_count=None)
+        released.append(cell)
+    return Lab(name, notebook, raw, tuple(cells), answers, given, tuple(released))
+
+
+def _file(grade_id: str, source: str) -> CellFile | None:
+    try:
+        return parse(source)
+    except BadNameError as error:
+        raise ValueError(f"cell `{grade_id}`: {error}") from error
+
+
+def _without_solution(source: str, cell_type: str) -> str:
+    stub = CODE_STUB if cell_type == "code" else TEXT_STUB
+    if "BEGIN SOLUTION" not in source:
+        return stub
+    return without_region(source, "SOLUTION", stub)
+
+
+def _without_markers(source: str) -> str:
+    lines = source.split("\n")
+    return "\n".join(line for line in lines if "BEGIN SOLUTION" not in line and "END SOLUTION" not in line)

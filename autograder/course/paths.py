@@ -1,0 +1,84 @@
+"""Where everything of a course lies: the one place that knows the names below `build`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+
+@dataclass(frozen=True)
+class CoursePaths:
+    """The files and folders of the course at `root`."""
+
+    root: Path
+
+    @property
+    def solutions(self) -> Path:
+        """The labs as the instructor wrote them."""
+        return self.root / "solutions"
+
+    @property
+    def labs(self) -> Path:
+        """What students receive, made from the solutions."""
+        return self.root / "labs"
+
+    @property
+    def build(self) -> Path:
+        """Everything that grading makes."""
+        return self.root / "build"
+
+    @property
+    def submitted(self) -> Path:
+        """What was taken in: `<student>/<lab>/<lab>.ipynb`, as nbgrader wants it."""
+        return self.build / "submitted"
+
+    @property
+    def autograded(self) -> Path:
+        """nbgrader's notebooks with the reports in them."""
+        return self.build / "autograded"
+
+    @property
+    def feedback(self) -> Path:
+        """A page for each student and lab."""
+        return self.build / "feedback"
+
+    @property
+    def results(self) -> Path:
+        """What checking found out: `<lab>/<student>.json`."""
+        return self.build / "results"
+
+    @property
+    def gradebook(self) -> Path:
+        """nbgrader's database."""
+        return self.build / "gradebook.db"
+
+    @property
+    def gradebook_url(self) -> str:
+        """The database's address, as SQLAlchemy wants it."""
+        return f"sqlite:///{self.gradebook}"
+
+    @property
+    def grades(self) -> Path:
+        """The table of grades."""
+        return self.build / "grades.csv"
+
+    @property
+    def report(self) -> Path:
+        """The class report."""
+        return self.build / "report" / "index.html"
+
+    def sample_class(self, lab: str) -> Path:
+        """Where the sample class of a lab is put together."""
+        return self.build / "classes" / lab
+
+    def submitted_notebook(self, student: str, lab: str) -> Path:
+        """The notebook that a student handed in."""
+        return self.submitted / student / lab / f"{lab}.ipynb"
+
+    def autograded_notebook(self, student: str, lab: str) -> Path:
+        """nbgrader's copy of it with the reports."""
+        return self.autograded / student / lab / f"{lab}.ipynb"
+
+    def feedback_page(self, student: str, lab: str) -> Path:
+        """What the student gets to read."""
+        return self.feedback / student / lab / f"{lab}.html"

@@ -1,0 +1,43 @@
+"""What a diagnosis is, and what a program tells that is diagnosed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """Why something did not happen: established, or what was observed instead of a reason."""
+
+    because: str
+    """One or two sentences for the student."""
+    code: str
+    """A short stable word for the reason."""
+    hint: str = ""
+    """What to do or where to read on."""
+
+
+class RunningProgram(Protocol):
+    """What a diagnosis needs of a program."""
+
+    name: str
+    began: float
+
+    def running(self) -> bool:
+        """Whether it is alive."""
+
+    def exit_status(self) -> int | None:
+        """None while it runs; negative: the signal that ended it."""
+
+    def stopped_by(self) -> str:
+        """The limit that ended it, if one did."""
+
+    def output(self) -> str:
+        """What it printed."""
+
+    def events(self) -> list[dict[str, Any]]:
+        """What its probe wrote."""
+
+    def stacks(self, timeout: float = 1.0) -> str:
+        """Where its threads are."""

@@ -1,0 +1,1 @@
+"""Recording results with nbgrader: gradebook, feedback, releases."""

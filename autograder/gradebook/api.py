@@ -1,0 +1,69 @@
+"""nbgrader's API with the course's stages in it."""
+
+from __future__ import annotations
+
+import logging
+import os
+import re
+import sys
+import warnings
+from pathlib import Path
+from typing import Any
+
+from autograder.course.paths import CoursePaths
+
+
+def prepare_nbgrader() -> None:
+    """Make nbgrader importable at a bearable price, and able to find its database tool."""
+    # Without this module jsonschema does not check one format of strings; with it, building its grammar takes 3 s.
+    sys.modules.setdefault("rfc3987_syntax", None)  # type: ignore[arg-type]
+    os.environ["TRAITLETS_APPLICATION_RAISE_CONFIG_FILE_ERROR"] = "1"
+    # nbgrader runs `alembic` by name.
+    tools = str(Path(sys.executable).parent)
+    if tools not in os.environ.get("PATH", "").split(os.pathsep):
+        os.environ["PATH"] = tools + os.pathsep + os.environ.get("PATH", "")
+
+
+def open_api(root: Path, gradebook: bool = True, **directories: Any) -> Any:
+    """Return nbgrader's API with the course's stages.
+
+    Args:
+        root: of the course.
+        gradebook: False generates labs without noting them in it.
+        directories: settings of nbgrader's CourseDirectory to replace.
+    """
+    prepare_nbgrader()
+    from nbgrader.apps import NbGraderAPI
+    from nbgrader.coursedir import CourseDirectory
+    from traitlets.config import Config
+
+    from autograder.gradebook.config import configure, leave_gradebook_alone
+
+    config = Config()
+    configure(config, root)
+    if not gradebook:
+        leave_gradebook_alone(config)
+    config.NbGraderAPI.log_level = logging.ERROR
+    # What nbgrader logs is read from its answers; it shall not also go to the terminal.
+    logging.getLogger("traitlets").addHandler(logging.NullHandler())
+    warnings.filterwarnings("ignore", module=r"nbgrader\.api")
+    config.CourseDirectory.merge(directories)
+    CoursePaths(root).build.mkdir(exist_ok=True)
+    return NbGraderAPI(CourseDirectory(config=config), config=config)
+
+
+def last_error(answer: dict[str, Any]) -> str:
+    """The last telling line of what nbgrader logged."""
+    text = str(answer.get("log", "")) + "\n" + str(answer.get("error", ""))
+    lines: list[str] = [
+        line.strip() for line in text.splitlines() if re.match(r"\s*[\w.]*(Error|Exception|Entry)\b: ", line)
+    ]
+    telling = [line for line in lines if "NbGraderException" not in line]
+    return (telling or lines or ["no reason given"])[-1]
+
+
+def answered(answer: dict[str, Any]) -> dict[str, Any]:
+    """Return nbgrader's answer. It catches even what Ctrl-C raises; that goes on here."""
+    if "KeyboardInterrupt" in str(answer.get("error", "")):
+        raise KeyboardInterrupt
+    return answer

@@ -1,0 +1,142 @@
+"""The course's own stages of `nbgrader autograde`.
+
+nbgrader decides points by luck in too many ways: a cell without output earns them all, a warning on stderr costs them
+all, and tests run in the process that runs the student's code. So nothing is executed here. The submission is rebuilt
+from the released notebook and the text of the answers; the outputs of check cells come from the stored result; a check
+without a result gets no automatic score.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import nbformat
+from nbconvert.exporters import NotebookExporter
+from nbgrader import utils
+from nbgrader.converters import Autograde
+from nbgrader.preprocessors import (
+    AssignLatePenalties,
+    CheckCellMetadata,
+    ClearOutput,
+    DeduplicateIds,
+    NbGraderPreprocessor,
+    OverwriteCells,
+    OverwriteKernelspec,
+    SaveAutoGrades,
+)
+
+from autograder.core.errors import KitError
+from autograder.core.results import CheckResult, Isolation
+from autograder.course.lab import Lab, load_lab
+from autograder.gradebook.inert import UNDECIDED, InertAnswers, inert_text
+from autograder.grading.runner import Settings, run_submission
+from autograder.grading.store import ResultStore
+from autograder.report.html import check_html, render
+from autograder.sandbox.isolation import choose
+from autograder.submission.reader import read_submission
+
+_POINTS = "autograder_points"
+"""Key under which a notebook's resources hold the points by grade_id."""
+
+
+def _submitted(converter: Autograde, resources: dict[str, Any]) -> tuple[Path, str, Lab, Path]:
+    """Find the notebook that was handed in, whichever of nbgrader's two passes is running."""
+    course = converter.coursedir
+    student, name = resources["nbgrader"]["student"], resources["nbgrader"]["assignment"]
+    lab = load_lab(Path(course.root), name)
+    folder = Path(course.format_path(course.submitted_directory, student, name))
+    return Path(course.root), student, lab, folder / f"{name}.ipynb"
+
+
+class SubmissionExporter(NotebookExporter):  # type: ignore[misc]
+    """Opens a submission for nbgrader as the released notebook with only the text of the answers in it.
+
+    It stands before the sanitizing stages because nbgrader would give up on a file that is no notebook, and so that
+    nothing else of a student's notebook, no tag, flag, output or extra cell, gets any further.
+    """
+
+    def __init__(self, *args: Any, **kwargs: Any) -> None:
+        """Refuse to take part in a pipeline with other stages than the course's."""
+        super().__init__(*args, **kwargs)
+        if not isinstance(self.parent, Autograde):
+            return
+        stages = (list(self.parent.sanitize_preprocessors), list(self.parent.autograde_preprocessors))
+        if stages != (SANITIZE, AUTOGRADE):
+            raise KitError(
+                "The stages of `nbgrader autograde` are not this course's; nothing was executed.",
+                "Remove Autograde settings from the command line and from other nbgrader_config files.",
+            )
+
+    def from_filename(self, filename: str, resources: dict[str, Any] | None = None, **kwargs: Any) -> Any:
+        """Rebuild the notebook in nbgrader's first pass; read what that pass wrote in the second."""
+        if not self.parent._sanitizing:
+            return super().from_filename(filename, resources=resources, **kwargs)
+        resources = dict(resources or {})
+        _, _, lab, path = _submitted(self.parent, resources)
+        submission = read_submission(path, lab)
+        resources["metadata"] = {"name": lab.name, "path": str(Path(filename).parent)}
+        return self.from_notebook_node(nbformat.from_dict(submission.notebook), resources=resources, **kwargs)
+
+
+class AttachResults(NbGraderPreprocessor):  # type: ignore[misc]
+    """Puts the stored result into the outputs of the check cells, in place of execution.
+
+    If there is none of these very answers, it runs the submission in the sandbox first.
+    """
+
+    def preprocess(self, nb: Any, resources: dict[str, Any]) -> tuple[Any, dict[str, Any]]:
+        """Attach outputs and note the points for `SaveCheckedGrades`."""
+        root, student, lab, path = _submitted(self.parent.parent, resources)
+        store = ResultStore(root)
+        result = store.fitting(lab, student, read_submission(path, lab).digest)
+        if result is None:
+            result = run_submission(path, student, lab, Settings(isolation=choose(Isolation.FULL)), store)
+        checks = {check.grade_id: check for check in result.checks}
+        points: dict[str, float | None] = {}
+        for cell in nb.cells:
+            if cell.cell_type == "code" and utils.is_grade(cell) and not utils.is_solution(cell):
+                grade_id = cell.metadata.nbgrader["grade_id"]
+                points[grade_id] = _attach(cell, checks.get(grade_id))
+        if result.problems:
+            # It quotes the student: no line of it may be the blank one that ends the HTML, and no word a link.
+            note = inert_text(" ".join(render("problems.html", problems=result.problems).split()))
+            nb.cells.insert(0, nbformat.v4.new_markdown_cell(note, id="problems"))
+        resources[_POINTS] = points
+        return nb, resources
+
+
+def _attach(cell: Any, check: CheckResult | None) -> float | None:
+    """Write a check's outputs into its cell and return its points; None: there is no verdict."""
+    if check is not None and check.max_points != float(cell.metadata.nbgrader["points"]):
+        check = None  # the gradebook knows the check with other points
+    report = check_html(check, title=check.title) if check is not None else ""
+    if check is None or check.points is None:
+        # An error output: whoever grades by outputs alone must not take silence for success.
+        cell.outputs = [nbformat.v4.new_output("error", ename="CouldNotFindOut", evalue="", traceback=[UNDECIDED])]
+        if report:
+            cell.outputs.insert(0, nbformat.v4.new_output("display_data", {"text/html": report}))
+        return None
+    data = {"text/plain": f"{check.points:g}", "text/html": report}
+    cell.outputs = [nbformat.v4.new_output("execute_result", data, execution_count=1)]
+    return check.points
+
+
+class SaveCheckedGrades(SaveAutoGrades):  # type: ignore[misc]
+    """Records points of check cells from their results; without a verdict the cell waits for manual grading."""
+
+    def _add_score(self, cell: Any, resources: dict[str, Any]) -> None:
+        if utils.is_solution(cell) or cell.cell_type != "code":
+            super()._add_score(cell, resources)
+            return
+        grade_id = cell.metadata["nbgrader"]["grade_id"]
+        grade = self.gradebook.find_grade(grade_id, self.notebook_id, self.assignment_id, self.student_id)
+        grade.auto_score = resources[_POINTS].get(grade_id)
+        grade.needs_manual_grade = grade.auto_score is None or grade.manual_score is not None
+        self.gradebook.db.commit()
+
+
+SANITIZE = [ClearOutput, DeduplicateIds, OverwriteKernelspec, OverwriteCells, CheckCellMetadata]
+"""What nbgrader does to the rebuilt notebook; among others it puts the check cells' full source back."""
+AUTOGRADE = [AttachResults, SaveCheckedGrades, AssignLatePenalties, InertAnswers]
+"""In place of nbgrader's execution."""

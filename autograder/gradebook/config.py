@@ -1,0 +1,73 @@
+"""The configuration that puts the course's layout and stages into nbgrader."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from autograder.course.lab import CODE_STUB, TEXT_STUB
+from autograder.course.paths import CoursePaths
+from autograder.gradebook.autograde import AUTOGRADE, SANITIZE, SubmissionExporter
+from autograder.gradebook.feedback import FEEDBACK, FeedbackExporter
+from autograder.gradebook.released_notebook import RELEASE, WITHOUT_GRADEBOOK
+
+_REPORT_TAGS = ["div", "span", "b", "code", "pre", "details", "summary", "br", "p"]
+_REPORT_STYLES = [
+    "background",
+    "border",
+    "border-left",
+    "color",
+    "font-family",
+    "font-size",
+    "font-weight",
+    "line-height",
+    "margin",
+    "margin-left",
+    "margin-top",
+    "max-height",
+    "overflow-wrap",
+    "overflow",
+    "padding",
+    "padding-left",
+    "white-space",
+]
+
+
+def configure(config: Any, root: Path) -> None:
+    """Write the course's layout and stages into an nbgrader configuration.
+
+    Args:
+        config: traitlets' Config, as `get_config()` gives it.
+        root: of the course.
+    """
+    paths = CoursePaths(root)
+    course = config.CourseDirectory
+    course.root = str(root)
+    course.source_directory = str(paths.solutions.relative_to(root))
+    course.release_directory = str(paths.labs.relative_to(root))
+    course.submitted_directory = str(paths.submitted.relative_to(root))
+    course.autograded_directory = str(paths.autograded.relative_to(root))
+    course.feedback_directory = str(paths.feedback.relative_to(root))
+    course.db_url = paths.gradebook_url
+    # Of a submission only the notebook is taken. A file such as ipykernel_launcher.py, lying beside a notebook that an
+    # instructor opens from formgrader, would be imported by that kernel.
+    course.ignore = ["*"]
+    config.Autograde.exporter_class = SubmissionExporter
+    config.Autograde.sanitize_preprocessors = SANITIZE
+    config.Autograde.autograde_preprocessors = AUTOGRADE
+    config.GenerateFeedback.exporter_class = FeedbackExporter
+    config.GenerateFeedback.preprocessors = FEEDBACK
+    config.GenerateAssignment.preprocessors = RELEASE
+    config.Validator.failed_warning = "{num_failed} part(s) did not pass, or could not be checked:"
+    config.ClearSolutions.code_stub = {"python": CODE_STUB}
+    config.ClearSolutions.text_stub = TEXT_STUB
+    config.SanitizeHTML.enabled = True
+    config.SanitizeHTML.tags = _REPORT_TAGS
+    config.SanitizeHTML.attributes = ["style", "role", "aria-label"]
+    config.SanitizeHTML.styles = _REPORT_STYLES
+
+
+def leave_gradebook_alone(config: Any) -> None:
+    """Let labs be generated without a gradebook."""
+    config.GenerateAssignment.no_database = True
+    config.GenerateAssignment.preprocessors = WITHOUT_GRADEBOOK

@@ -1,0 +1,83 @@
+"""The course's own stages of `nbgrader generate_feedback`: the page that a student gets to read."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+from jinja2.bccache import Bucket, BytecodeCache
+from nbconvert.exporters import HTMLExporter
+from nbconvert.filters import Highlight2HTML
+from nbconvert.filters.widgetsdatatypefilter import WidgetsDataTypeFilter
+from nbconvert.preprocessors import CSSHTMLHeaderPreprocessor
+from nbgrader import utils
+from nbgrader.preprocessors import ClearMarkScheme, GetGrades
+
+from autograder.gradebook.inert import SanitizeOutputs
+from autograder.gradebook.released_notebook import HideTests
+
+
+class HideMarkScheme(ClearMarkScheme):  # type: ignore[misc]
+    """Keeps mark schemes out of feedback."""
+
+    def preprocess_cell(self, cell: Any, resources: dict[str, Any], index: int) -> tuple[Any, dict[str, Any]]:
+        """Cut in the lab's own cells; a student who types a marker only types a word."""
+        if utils.is_solution(cell):
+            return cell, resources
+        made: tuple[Any, dict[str, Any]] = super().preprocess_cell(cell, resources, index)
+        return made
+
+
+class _CompiledTemplates(BytecodeCache):
+    """Keeps templates compiled from one feedback page to the next."""
+
+    def __init__(self) -> None:
+        self._codes: dict[str, bytes] = {}
+
+    def load_bytecode(self, bucket: Bucket) -> None:
+        if bucket.key in self._codes:
+            bucket.bytecode_from_string(self._codes[bucket.key])
+
+    def dump_bytecode(self, bucket: Bucket) -> None:
+        self._codes[bucket.key] = bucket.bytecode_to_string()
+
+
+_COMPILED = _CompiledTemplates()
+
+
+_TOO_LONG_TO_COLOUR = re.compile(r"\s{200}|\S{400}")
+"""No program looks like that, and the time that Pygments takes for it grows with the square of its length."""
+
+
+class ColouredCode(Highlight2HTML):  # type: ignore[misc]
+    """nbconvert's colouring of code, for what a person wrote; the rest is shown as plain text."""
+
+    def __call__(self, source: str, language: str | None = None, metadata: Any = None) -> Any:
+        """Return the HTML of a code cell."""
+        return super().__call__(source, "text" if _TOO_LONG_TO_COLOUR.search(source) else language, metadata)
+
+
+class FeedbackExporter(HTMLExporter):  # type: ignore[misc]
+    """nbconvert's HTML in half the time, which is most of what a submission costs here.
+
+    It compiles the templates once, and leaves out the second parsing of the page: that gives images without a
+    description one, and nothing of a student's can become an image.
+    """
+
+    def _create_environment(self) -> Any:
+        environment = super()._create_environment()
+        environment.bytecode_cache = _COMPILED
+        return environment
+
+    def from_notebook_node(self, nb: Any, resources: dict[str, Any] | None = None, **kwargs: Any) -> Any:
+        """Convert a notebook as HTMLExporter does before it parses its own page."""
+        resources = self._init_resources(resources)
+        self.register_filter("highlight_code", ColouredCode(pygments_lexer="ipython3", parent=self))
+        self.register_filter(
+            "filter_data_type",
+            WidgetsDataTypeFilter(notebook_metadata=self._nb_metadata, parent=self, resources=resources),
+        )
+        return super(HTMLExporter, self).from_notebook_node(nb, resources, **kwargs)
+
+
+FEEDBACK = [GetGrades, HideTests, HideMarkScheme, SanitizeOutputs, CSSHTMLHeaderPreprocessor]

@@ -1,0 +1,73 @@
+"""Generates what students receive, and notes a lab's cells in the gradebook."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+
+from autograder.core.errors import KitError
+from autograder.core.files import write_beside
+from autograder.course.paths import CoursePaths
+from autograder.gradebook.api import answered, last_error, open_api
+
+
+def generate(root: Path, lab: str, into: Path, gradebook: bool) -> Path:
+    """Generate what students receive of a lab, and note its cells in the course's gradebook if asked to.
+
+    Returns:
+        The folder of the generated lab.
+
+    Raises:
+        KitError: nbgrader refuses.
+    """
+    api = open_api(root, gradebook, release_directory=str(into), ignore=_NOT_RELEASED)
+    answer = answered(api.generate_assignment(lab, force=True, create=True))
+    if not answer["success"]:
+        if "there are submissions associated" in answer.get("log", "") + answer["error"]:
+            raise KitError(
+                f"The graded cells of {lab} are not those that build/gradebook.db has grades for.",
+                f"Move {CoursePaths(root).gradebook} away, then grade again.",
+            )
+        raise KitError(f"nbgrader could not generate {lab}.", last_error(answer))
+    return into / lab
+
+
+_NOT_RELEASED = [".ipynb_checkpoints", "*.pyc", "__pycache__", ".*", "nodes"]
+"""Files beside a lab's source that are not part of it."""
+
+
+def released_files(root: Path, lab: str) -> dict[Path, bytes]:
+    """Return what students receive of a lab, by path below `labs/<lab>`; equal sources give equal files.
+
+    Raises:
+        KitError: there is no such lab under `solutions`, or nbgrader refuses.
+    """
+    if not (root / "solutions" / lab / f"{lab}.ipynb").is_file():
+        raise KitError(f"There is no solutions/{lab}/{lab}.ipynb.", "Name a folder under `solutions`.")
+    with tempfile.TemporaryDirectory() as folder:
+        made = generate(root, lab, Path(folder), gradebook=False)
+        files = {path.relative_to(made): path.read_bytes() for path in sorted(made.rglob("*")) if path.is_file()}
+    return {
+        path: content if path.suffix != ".ipynb" else content.rstrip(b"\n") + b"\n" for path, content in files.items()
+    }
+
+
+def release(root: Path, lab: str) -> Path:
+    """Write `labs/<lab>` and return that folder.
+
+    Raises:
+        KitError: there is no such lab under `solutions`, or nbgrader refuses.
+    """
+    for path, content in released_files(root, lab).items():
+        write_beside(root / "labs" / lab / path, content)
+    return root / "labs" / lab
+
+
+def register(root: Path, lab: str) -> None:
+    """Note a lab's cells in the course's gradebook; nbgrader needs them there before it grades.
+
+    Raises:
+        KitError: the gradebook has grades for other cells.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        generate(root, lab, Path(folder), gradebook=True)

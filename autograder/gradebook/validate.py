@@ -1,0 +1,102 @@
+"""nbgrader's Validate, as a command and in JupyterLab: the verdicts of `autograder check`, found in the same way.
+
+nbgrader's own validation runs the notebook in the session of whoever asks, an instructor's too, and judges by outputs.
+"""
+
+from __future__ import annotations
+
+import os
+import textwrap
+from pathlib import Path
+from typing import Any
+
+from nbconvert.filters import ansi2html
+from nbgrader.converters.generate_solution import GenerateSolution
+from nbgrader.preprocessors import Execute
+from nbgrader.validator import Validator
+
+from autograder.core.errors import KitError
+from autograder.core.results import Isolation, Outcome, Status
+from autograder.grading.runner import Settings, run_submission
+from autograder.report import words
+from autograder.report.audience import result_for
+from autograder.report.terminal import plain
+from autograder.sandbox.isolation import choose
+from autograder.setup.bootstrap import SetUpError, refuse_foreign_ros
+from autograder.submission.reader import lab_of
+
+_WIDTH = 80
+"""Columns; nbgrader cuts what is longer."""
+
+
+def install(root: Path) -> None:
+    """Put the course's way in place of nbgrader's, for this process.
+
+    nbgrader has no setting for it: the stages of its validator are not configurable. Its stage that executes is closed
+    as well, so that no other setting and no other door leads to it; only solutions, which are the instructor's own, may
+    still be executed.
+
+    Args:
+        root: of the course whose checks are run.
+    """
+    execute = Execute.preprocess
+
+    def validate(self: Any, filename: str) -> dict[str, list[dict[str, str]]]:
+        return verdicts(root, Path(filename), invert=self.invert)
+
+    def refuse(self: Any, nb: Any, resources: Any = None, km: Any = None) -> Any:
+        if isinstance(self.parent, GenerateSolution):
+            return execute(self, nb, resources, km)
+        raise KitError(
+            "nbgrader's own execution is closed in this course: it would run students' code in your session.",
+            "Use `autograder grade`, or nbgrader's commands without settings for their stages.",
+        )
+
+    Validator.validate = validate
+    if execute.__name__ != refuse.__name__:
+        Execute.preprocess = refuse
+
+
+def verdicts(root: Path, notebook: Path, invert: bool) -> dict[str, list[dict[str, str]]]:
+    """Check a notebook in the sandbox, and return what did not pass in the form that nbgrader shows.
+
+    Args:
+        root: of the course.
+        notebook: to check.
+        invert: return what passed instead.
+    """
+    try:
+        refuse_foreign_ros(os.environ)
+        lab = lab_of(notebook, None, root)
+        settings = Settings(isolation=choose(Isolation.FULL))
+        result = run_submission(notebook, notebook.resolve().parent.name, lab, settings)
+    except (KitError, SetUpError) as error:
+        return {"failed": [_entry(f"{notebook.name} was not checked", [error.what, error.do])]}
+    result = result_for(result, "student")
+    if invert:
+        return {"passed": [{"source": check.title} for check in result.checks if check.status is Status.PASSED]}
+    failed = [_entry(problem.title, _lines(problem)) for problem in result.problems]
+    for check in result.checks:
+        if check.status is not Status.PASSED:
+            untouched = [text for text in (words.not_attempted(check),) if text]
+            said = [found for found in check.outcomes if found.status in (Status.FAILED, Status.UNKNOWN)]
+            lines = untouched or [line for found in said or check.outcomes for line in _lines(found)]
+            failed.append(_entry(f"{check.title or check.grade_id}: {words.points(check)}", lines))
+    return {"failed": failed} if failed else {}
+
+
+def _lines(outcome: Outcome) -> list[str]:
+    parts = {
+        "": f"{outcome.title} ({outcome.status.value})",
+        "expected: ": outcome.expected,
+        "observed: ": outcome.observed,
+        "because: ": outcome.because,
+        "try: ": outcome.hint,
+    }
+    return [f"{label}{text}" for label, text in parts.items() if text]
+
+
+def _entry(title: str, lines: list[str]) -> dict[str, str]:
+    rows = [row for line in lines for part in plain(line).splitlines() for row in textwrap.wrap(part, _WIDTH)]
+    text = "\n".join(rows)
+    return {"source": plain(title), "error": ansi2html(text), "raw_error": text}

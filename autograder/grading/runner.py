@@ -1,0 +1,114 @@
+"""Runs one submission: reads it, has its checks run in the sandbox, and says what came of it.
+
+The instructor's process only reads text here. What a student wrote runs in the sandbox, and comes back as a result that
+is checked against the lab before anyone believes it.
+"""
+
+from __future__ import annotations
+
+import os
+import random
+import threading
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+from autograder.core.results import Isolation, SubmissionResult
+from autograder.course.lab import Lab
+from autograder.grading.job import Job
+from autograder.grading.store import ResultStore
+from autograder.grading.supervisor import run_in_worker
+from autograder.grading.validation import all_for_one_reason, lacks_a_result
+from autograder.submission.reader import read_submission
+from autograder.submission.submission import Submission
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How submissions are run."""
+
+    isolation: Isolation = Isolation.FULL
+    seed: int | None = None
+    """Seed of the values that vary; None draws one for each run."""
+    force: bool = False
+    """Run again even what did not change."""
+    jobs: int = 0
+    """How many run at once; 0 lets the machine decide."""
+
+    @property
+    def parallel(self) -> int:
+        """How many run at once. A run mostly waits for messages, so a core carries several."""
+        return self.jobs or min(20, 5 * len(os.sched_getaffinity(0)))
+
+
+def stored(
+    student: str, submission: Submission, lab: Lab, settings: Settings, store: ResultStore
+) -> SubmissionResult | None:
+    """Return the stored result of a submission if running it again could say nothing new."""
+    if settings.force:
+        return None
+    result = store.fitting(lab, student, submission.digest, settings.isolation, settings.seed)
+    return None if result is None or lacks_a_result(result) else result
+
+
+def run_submission(
+    path: Path,
+    student: str,
+    lab: Lab,
+    settings: Settings,
+    store: ResultStore | None = None,
+    stop: threading.Event | None = None,
+) -> SubmissionResult:
+    """Read one submission, run its checks in the sandbox, and return what came of it.
+
+    Args:
+        path: of the submitted notebook.
+        student: who handed it in.
+        lab: that it answers.
+        settings: how to run it.
+        store: to keep the result in, and to take it from if nothing changed; None keeps nothing.
+        stop: when it is set, the run is ended.
+
+    Raises:
+        KitError: this machine cannot isolate programs as asked.
+        Stopped: by `stop`; nothing is kept.
+    """
+    began = time.monotonic()
+    submission = read_submission(path, lab)
+    known = stored(student, submission, lab, settings, store) if store is not None else None
+    if known is not None:
+        return known
+    result = _run(submission, student, lab, settings, stop)
+    result.seconds["total"] = round(time.monotonic() - began, 3)
+    if store is not None:
+        store.save(result)
+    return result
+
+
+def _run(
+    submission: Submission, student: str, lab: Lab, settings: Settings, stop: threading.Event | None
+) -> SubmissionResult:
+    job = job_of(submission, student, lab, settings)
+    if not submission.readable:
+        problem = submission.problems[-1].model_copy(update={"title": "there is a notebook to check"})
+        return job.result([all_for_one_reason(cell, problem, points=0.0) for cell in lab.checks])
+    return run_in_worker(job, stop)
+
+
+def job_of(submission: Submission, student: str, lab: Lab, settings: Settings) -> Job:
+    """Return what a worker needs to run a submission."""
+    return Job(
+        student=student,
+        lab=lab.name,
+        digest=submission.digest,
+        isolation=settings.isolation,
+        seed=random.SystemRandom().getrandbits(32) if settings.seed is None else settings.seed,
+        files=submission.files,
+        answers={
+            answer.file.file_name: submission.sources[answer.grade_id] == answer.blank
+            for answer in lab.answers.values()
+            if answer.file is not None
+        },
+        cells=list(lab.cells),
+        problems=submission.problems,
+    )

@@ -1,0 +1,64 @@
+"""The stored results of a course: a JSON file for each submission, written whole or not at all."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from autograder.core.results import SCHEMA_VERSION, Isolation, SubmissionResult
+from autograder.course.lab import Lab
+from autograder.course.paths import CoursePaths
+from autograder.grading.validation import validated
+
+
+class ResultStore:
+    """The results of the course at `root`.
+
+    Args:
+        root: of the course.
+    """
+
+    def __init__(self, root: Path) -> None:
+        """Nothing is read or written before it is asked for."""
+        self._folder = CoursePaths(root).results
+
+    def path(self, lab: str, student: str) -> Path:
+        """Where the result of a submission is kept."""
+        return self._folder / lab / f"{student}.json"
+
+    def save(self, result: SubmissionResult) -> None:
+        """Keep a result in place of an earlier one of the same student and lab.
+
+        Raises:
+            OSError: it cannot be written; the earlier one is still there.
+        """
+        result.save(self.path(result.lab, result.student))
+
+    def fitting(
+        self, lab: Lab, student: str, digest: str, isolation: Isolation | None = None, seed: int | None = None
+    ) -> SubmissionResult | None:
+        """Return the stored result if it is of these very answers and this very kit; otherwise None.
+
+        Args:
+            lab: that was graded.
+            student: who handed it in.
+            digest: of the submission as it is now.
+            isolation: that it must have been run with; None accepts any.
+            seed: that it must have been run with; None accepts any.
+        """
+        try:
+            result = SubmissionResult.load(self.path(lab.name, student))
+        except (OSError, ValueError):
+            return None
+        same = result.digest == digest and result.schema_version == SCHEMA_VERSION
+        fits = same and isolation in (None, result.isolation) and seed in (None, result.seed)
+        return validated(result, lab.checks) if fits else None
+
+    def all(self, lab: str | None = None) -> list[SubmissionResult]:
+        """Return every stored result, or those of one lab, sorted by lab and student; unreadable ones are left out."""
+        results = []
+        for path in sorted(self._folder.glob(f"{lab or '*'}/*.json")):
+            try:
+                results.append(SubmissionResult.load(path))
+            except (OSError, ValueError):
+                continue
+        return results

@@ -1,0 +1,62 @@
+"""What is believed of a result: only what belongs to the job, check by check. The rest is undecided.
+
+A result comes from a worker that was close to a student's programs, or from a file: neither decides how many points a
+check has.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from autograder.core.results import CheckResult, Outcome, Status, SubmissionResult
+from autograder.course.lab import Cell
+
+NO_RESULT = "no-result"
+"""The reason code of a check at which the worker died, or about which it said nothing."""
+_LINES, _CHARACTERS = 7, 1000
+"""As much of what the worker printed last is kept."""
+
+
+def validated(result: SubmissionResult, checks: Sequence[Cell]) -> SubmissionResult:
+    """Return the result with exactly the lab's checks; one that is missing or impossible is undecided."""
+    by_id = {check.grade_id: check for check in result.checks}
+    kept = []
+    for cell in checks:
+        check = by_id.get(cell.grade_id)
+        possible = check is not None and (check.points is None or 0.0 <= check.points <= check.max_points)
+        if check is None or not possible or check.max_points != cell.points:
+            check = undecided(cell, "The grader returned no usable result for this check.")
+        kept.append(check.model_copy(update={"title": cell.title}))
+    return result.model_copy(update={"checks": kept})
+
+
+def undecided(cell: Cell, because: str, printed: str = "", code: str = NO_RESULT) -> CheckResult:
+    """Return the result of a check that nobody could decide.
+
+    Args:
+        cell: the check.
+        because: why, as a sentence.
+        printed: what the worker printed.
+        code: the reason's.
+    """
+    outcome = Outcome(
+        status=Status.UNKNOWN,
+        title="the grader finished this check",
+        because=because,
+        observed="\n".join(printed.strip().splitlines()[-_LINES:])[-_CHARACTERS:],
+        hint="No points are taken. Your instructor decides.",
+        code=code,
+    )
+    return all_for_one_reason(cell, outcome, points=None)
+
+
+def all_for_one_reason(cell: Cell, outcome: Outcome, points: float | None) -> CheckResult:
+    """Return a check's result that consists of one outcome."""
+    return CheckResult(
+        grade_id=cell.grade_id, title=cell.title, max_points=cell.points or 0.0, points=points, outcomes=[outcome]
+    )
+
+
+def lacks_a_result(result: SubmissionResult) -> bool:
+    """Whether a worker died and kept back a result. What was decided, and a check that gets stuck, stands."""
+    return any(outcome.code == NO_RESULT for check in result.checks for outcome in check.outcomes)

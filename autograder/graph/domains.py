@@ -1,0 +1,34 @@
+"""Which ROS domains are in use on this machine: DDS derives a participant's ports from its domain's number."""
+
+from __future__ import annotations
+
+import itertools
+import random
+import socket
+from collections.abc import Iterator
+
+LAST = 101
+"""The highest domain id whose ports lie below those that Linux hands out to others (ROS 2 documentation, The
+ROS_DOMAIN_ID)."""
+_FIRST_PORT, _PORTS_PER_DOMAIN, _UNICAST = 7400, 250, 10
+"""RTPS 2.5, 9.6.2.4: the first participant of a domain takes the port `first + per domain * domain + 10`."""
+
+
+def is_free(domain: int) -> bool:
+    """Whether no participant of this machine is alive in a domain, as far as can be seen from here."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        try:
+            probe.bind(("0.0.0.0", _FIRST_PORT + _PORTS_PER_DOMAIN * domain + _UNICAST))
+        except OSError:
+            return False
+    return True
+
+
+def free_domains() -> Iterator[int]:
+    """Give domains that nobody on this machine seems to use, without end; one that was given comes again late."""
+    order = random.SystemRandom().sample(range(1, LAST + 1), LAST)
+    taken_anyway = itertools.cycle(order)
+    candidates = itertools.cycle(order)
+    while True:
+        found = next((domain for domain in itertools.islice(candidates, LAST) if is_free(domain)), None)
+        yield next(taken_anyway) if found is None else found

@@ -1,0 +1,1 @@
+"""The IPython extension: what a student sees and uses in a notebook."""

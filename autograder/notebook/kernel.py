@@ -1,0 +1,201 @@
+"""The Jupyter kernel that the checks run in: its cells, its files, and where to show what happens.
+
+To the checks it is their `autograder.core.front_end`.
+"""
+
+from __future__ import annotations
+
+import atexit
+import contextlib
+import os
+import re
+import sys
+import threading
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from autograder.notebook.program_folder import ProgramFolder, Written, notebook_of, shown
+
+if TYPE_CHECKING:
+    from autograder.graph.observer import Observer
+    from autograder.notebook.saved_notebook import SavedNotebook
+    from autograder.notebook.watch import Watch
+    from autograder.sandbox.program import Program
+
+_SCORED = re.compile(r"\bscore\(")
+
+
+class Kernel:
+    """One IPython shell with the kit's extension.
+
+    Args:
+        shell: IPython's.
+    """
+
+    def __init__(self, shell: Any) -> None:
+        """Find the notebook's folder, and load in the background what a first launch needs."""
+        self.shell = shell
+        notebook = notebook_of(shell.user_ns, dict(os.environ))
+        self.folder = ProgramFolder(notebook, notebook.parent if notebook else Path.cwd())
+        self.cell, self.cell_id = "", ""
+        self._warmed = threading.Thread(target=_warm_up, name="warm-up")
+
+    def start(self) -> None:
+        """Begin to load; apart from the rest, for this needs `active`."""
+        self._warmed.start()
+        atexit.register(self.folder.close)
+
+    def ready(self) -> None:
+        """Wait until the loading is done."""
+        self._warmed.join()
+
+    # What runs.
+
+    def begin_cell(self, info: Any) -> None:
+        """Note the cell that begins, and forget what the last one found."""
+        self.cell = str(info.raw_cell or "")
+        self.cell_id = str(getattr(info, "cell_id", "") or "")
+        findings = _findings()
+        if findings is not None:
+            findings.reset()
+
+    def end_cell(self, _result: object) -> None:
+        """Show what was expected in a cell that asked for no score."""
+        findings = _findings()
+        if findings is not None and findings.outcomes:
+            from autograder.checks.scoring import unscored
+
+            report = unscored()
+            if report is not None:
+                from IPython.display import display
+
+                display(report)
+
+    @property
+    def scored(self) -> bool:
+        """Whether the cell that runs is a check: it asks for a score."""
+        return bool(_SCORED.search(self.cell))
+
+    @property
+    def programs(self) -> Path:
+        """The folder in which the programs and files of the cells lie."""
+        return self.folder.path
+
+    def watch(self, observer: Observer, programs: Callable[[], Sequence[Program]]) -> Watch:
+        """Begin to show what goes on in a launch; what programs print is shown where no check is made of it."""
+        from autograder.notebook.watch import Watch
+
+        return Watch(observer, programs, streams=not self.scored, updates=self.updates_outputs)
+
+    @property
+    def number(self) -> int:
+        """The number in the brackets beside the cell that runs."""
+        return int(self.shell.execution_count)
+
+    @property
+    def updates_outputs(self) -> bool:
+        """Whether what a cell shows can change while it runs; a terminal can only add to it."""
+        return getattr(self.shell, "kernel", None) is not None
+
+    # What cells wrote.
+
+    def has(self, file_name: str) -> bool:
+        """Whether a cell wrote this file since the kernel began."""
+        return file_name in self.folder.written and (self.folder.path / file_name).is_file()
+
+    def saved(self) -> SavedNotebook | None:
+        """Return the notebook as it is on disk; None where nobody knows which it is."""
+        from autograder.notebook.saved_notebook import SavedNotebook
+
+        return SavedNotebook(self.folder.notebook) if self.folder.notebook else None
+
+    def why_missing(self, magic: str, name: str) -> tuple[str, str]:
+        """Why there is no such file, and what to do."""
+        first = f"%%{magic} {name}"
+        saved = self.saved()
+        file_name = f"{name}.py" if magic == "node" else name
+        if saved is not None and not saved.has(file_name):
+            return (
+                f"There is no `{name}`: no cell of the saved notebook begins with `{first}`.",
+                "Compare the name with the first line of its cell. If the cell is new, run it first.",
+            )
+        because = f"The cell `{first}` has not been run since the kernel started, so there is no `{name}` yet."
+        return because, f"Run the cell `{first}` first, then this one."
+
+    def used(self, file_names: set[str]) -> list[Written]:
+        """Return what cells wrote of these files, and of the modules among the cells' files that they import."""
+        found: dict[str, Written] = {}
+        front = sorted(file_names)
+        while front:
+            name = front.pop()
+            written = self.folder.written.get(name)
+            if written is None or name in found:
+                continue
+            found[name] = written
+            front += [other for other in self.folder.written if _imports(written, other)]
+        return sorted(found.values(), key=lambda written: written.number)
+
+    def blank(self, file_names: set[str]) -> dict[str, bool]:
+        """Return of each of these files that is an answer whether its cell is still as students receive it."""
+        saved = self.saved()
+        if saved is None:
+            return {}
+        written = [self.folder.written[name] for name in file_names if name in self.folder.written]
+        return {one.file.file_name: saved.is_blank(one) for one in written if saved.is_answer(one)}
+
+    def origin(self, file_names: set[str]) -> str:
+        """Name the cells that these files came from: `heartbeat from cell [7], run at 14:03:12`."""
+        saved = self.saved()
+        return "; ".join(
+            f"`{written.file.name}` from {written.origin}"
+            + (", not saved yet" if saved and saved.lacks(written) else "")
+            for written in self.used(file_names)
+        )
+
+    def remarks(self, file_names: set[str]) -> list[str]:
+        """Say where what was run differs from what would be graded."""
+        saved = self.saved()
+        used = self.used(file_names)
+        told = [remark for written in used if saved and (remark := saved.remark(written))]
+        for written in used:
+            if self.folder.changed_by_hand(written.file.file_name):
+                path = shown(self.folder.path / written.file.file_name)
+                told.append(f"{path} is no longer what its cell wrote. Grading takes the cell: run it again.")
+        for name in self.folder.foreign():
+            if any(_imports(written, name) for written in used):
+                path = shown(self.folder.path / name)
+                first = f"%%node {name.removesuffix('.py')}"
+                told.append(f"{path} was written by no cell: grading does not have it. Put it into a cell `{first}`.")
+        return told
+
+
+def _imports(written: Written, file_name: str) -> bool:
+    if not file_name.endswith(".py") or written.file.magic != "node":
+        return False
+    module = re.escape(file_name.removesuffix(".py"))
+    return bool(re.search(rf"^\s*(?:from|import)\b.*\b{module}\b", written.file.text, re.MULTILINE))
+
+
+def _findings() -> Any:
+    """What the cell's checks have found; None before somebody has imported them, and while that is under way."""
+    return getattr(sys.modules.get("autograder.checks.findings"), "current", None)
+
+
+def now() -> float:
+    """Seconds since 1970."""
+    return time.time()
+
+
+def _warm_up() -> None:
+    """Load the launcher, the checks and the middleware, so that the first launch need not wait for them."""
+    with contextlib.suppress(Exception):
+        from autograder.checks.runtime import current
+        from autograder.graph.observer import Observer
+        from autograder.sandbox.environment import profile_environment
+
+        os.environ.update(profile_environment())
+        os.environ.pop("ROS_AUTOMATIC_DISCOVERY_RANGE", None)
+        _ = current.sandbox
+        Observer(current.next_domain()).close()

@@ -1,0 +1,98 @@
+"""The notebook on disk, as grading would get it, held against what a cell wrote in the kernel."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from autograder.course.cell_file import BadNameError, parse
+from autograder.course.lab import blank_mark_of, cell_digest, grade_id_of, nbgrader_of, source_of
+from autograder.notebook.program_folder import Written
+from autograder.submission.notebook_file import UnreadableError, cells_of
+
+
+@dataclass(frozen=True)
+class _Cell:
+    source: str
+    cell_id: str
+    grade_id: str
+    blank: str
+    file_name: str
+
+
+class SavedNotebook:
+    """The code cells of a notebook that name files, as saved last."""
+
+    def __init__(self, path: Path) -> None:
+        """Read it; a notebook that cannot be read has no cells, and so there is nothing to say."""
+        self.cells: list[_Cell] = []
+        self.saved_at = 0.0
+        try:
+            self.saved_at = path.stat().st_mtime
+            raw = cells_of(path)
+        except (OSError, UnreadableError):
+            return
+        for cell in raw:
+            self._take(cell)
+
+    def _take(self, cell: dict[str, Any]) -> None:
+        if cell.get("cell_type") != "code":
+            return
+        try:
+            source = source_of(cell)
+            file = parse(source)
+        except (ValueError, BadNameError):
+            return
+        if file is None:
+            return
+        grade_id = grade_id_of(cell) if nbgrader_of(cell).get("solution") or nbgrader_of(cell).get("locked") else ""
+        self.cells.append(_Cell(source, str(cell.get("id", "")), grade_id, blank_mark_of(cell), file.file_name))
+
+    def has(self, file_name: str) -> bool:
+        """Whether a cell names this file."""
+        return any(cell.file_name == file_name for cell in self.cells)
+
+    def _graded(self, file_name: str) -> _Cell | None:
+        """The cell that grading takes this file from."""
+        naming = [cell for cell in self.cells if cell.file_name == file_name]
+        return next((cell for cell in reversed(naming) if cell.grade_id), naming[-1] if naming else None)
+
+    def is_answer(self, written: Written) -> bool:
+        """Whether a student's answer is in this file."""
+        cell = self._graded(written.file.file_name)
+        return cell is not None and bool(cell.blank)
+
+    def is_blank(self, written: Written) -> bool:
+        """Whether an answer is still as students receive it."""
+        cell = self._graded(written.file.file_name)
+        return cell is not None and bool(cell.blank) and cell.blank == cell_digest(written.source)
+
+    def remark(self, written: Written) -> str:
+        """Say why what was run is not what would be graded; empty if it is, or will be once it is saved."""
+        graded = self._graded(written.file.file_name)
+        if graded is None or _same(graded.source, written.source):
+            return ""
+        first = f"%%{written.file.magic} {written.file.name}"
+        known = written.cell_id and graded.cell_id
+        if known and graded.cell_id != written.cell_id and graded.grade_id:
+            return (
+                f"This `{written.file.name}` comes from a cell of your own, cell [{written.number}]. Grading ignores"
+                f" that cell: it takes the lab's cell that begins with `{first}`. Move your text there."
+            )
+        if self.saved_at > written.at:
+            return (
+                f"The cell `{first}` has been changed since it was run, and this report is about the earlier text. Run"
+                " that cell, then this one."
+            )
+        return ""
+
+    def lacks(self, written: Written) -> bool:
+        """Whether what was run is not in the saved notebook, because nothing has been saved since."""
+        name = written.file.file_name
+        saved = any(cell.file_name == name and _same(cell.source, written.source) for cell in self.cells)
+        return not saved and self.saved_at <= written.at
+
+
+def _same(one: str, other: str) -> bool:
+    return cell_digest(one) == cell_digest(other)

@@ -1,0 +1,102 @@
+"""What a student sees in the notebook while a launch runs: what is waited for, and what the programs print."""
+
+from __future__ import annotations
+
+import re
+import time
+from collections.abc import Callable, Sequence
+from html import escape
+from typing import Any
+
+from autograder.core.output import tidy
+from autograder.graph.observer import Observer
+from autograder.sandbox.program import Program
+
+_MUTE = 0.7
+"""Seconds of waiting after which a line says what for: most waits are over by then."""
+_EACH = 0.25
+"""Seconds between two looks at what the programs have printed."""
+_LINES = 100
+"""Lines of one program that are shown while it runs; `ros.log()` has more."""
+
+
+class Watch:
+    """Shows what goes on in one launch, from the thread of the cell that waits.
+
+    Args:
+        observer: whose waiting gives the occasions to look.
+        programs: gives the programs that run.
+        streams: whether their output is shown as it comes.
+        updates: whether what a cell shows can change while it runs.
+    """
+
+    def __init__(
+        self, observer: Observer, programs: Callable[[], Sequence[Program]], streams: bool, updates: bool
+    ) -> None:
+        """Begin to watch."""
+        self._programs = programs
+        self._streams, self._updates = streams, updates
+        self._shown: dict[int, int] = {}
+        self._lines: dict[int, int] = {}
+        self._sentence, self._since, self._looked = "", 0.0, 0.0
+        self._line: Any = None
+        self._said = ""
+        observer.meanwhile = self.look
+
+    def begin(self, sentence: str) -> bool:
+        """Something is waited for from now on; whether nothing else was."""
+        if self._sentence:
+            return False
+        self._sentence, self._since = sentence, time.monotonic()
+        return True
+
+    def end(self) -> None:
+        """It is there, or will not come."""
+        self._sentence = self._said = ""
+        if self._line is not None:
+            self._line.update({"text/plain": ""}, raw=True)
+
+    def close(self) -> None:
+        """The programs have ended: show the rest of what they printed."""
+        if self._streams:
+            self.print_new(rest=True)
+
+    def look(self) -> None:
+        """Show what is new."""
+        now = time.monotonic()
+        if now - self._looked < _EACH:
+            return
+        self._looked = now
+        if self._streams:
+            self.print_new()
+        if self._sentence and now - self._since > _MUTE and self._updates:
+            said = f"Waiting for {self._sentence}: {now - self._since:.0f} s"
+            if said != self._said:
+                self._said = said
+                self._say(said)
+
+    def _say(self, said: str) -> None:
+        from IPython.display import display
+
+        html = re.sub(r"`([^`]*)`", r"<code>\1</code>", escape(said))
+        data = {"text/plain": said, "text/html": f'<span style="opacity:0.8">{html}</span>'}
+        if self._line is None:
+            self._line = display(data, raw=True, display_id=True)
+        else:
+            self._line.update(data, raw=True)
+
+    def print_new(self, rest: bool = False) -> None:
+        """Print the lines that the programs have printed since; with `rest` also one that has no end yet."""
+        for number, program in enumerate(self._programs()):
+            if program.truncated():
+                continue
+            text = program.output()
+            new = text[self._shown.get(number, 0) :]
+            whole = new if rest else new[: new.rfind("\n") + 1]
+            self._shown[number] = self._shown.get(number, 0) + len(whole)
+            for line in tidy(whole).splitlines():
+                count = self._lines[number] = self._lines.get(number, 0) + 1
+                if count <= _LINES:
+                    print(f"{program.name} | {line}")
+                elif count == _LINES + 1:
+                    print(f"{program.name} | [more is in ros.log()]")

@@ -1,0 +1,129 @@
+"""Takes the answers out of a submitted notebook: the source of the lab's own cells, found by grade_id."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from typing import Any
+
+from autograder.course.cell_file import CELL_BYTES
+from autograder.course.lab import Lab, grade_id_of, nbgrader_of, source_of
+from autograder.submission.cell_files import names
+from autograder.submission.notebook_file import UnreadableError, problem
+from autograder.submission.submission import Submission
+
+
+def take_answers(cells: list[dict[str, Any]], lab: Lab, submission: Submission) -> None:
+    """Put the sources of a notebook's answer cells into a submission.
+
+    Raises:
+        UnreadableError: no cell of it belongs to the lab.
+    """
+    released = {grade_id_of(cell): cell for cell in lab.released if grade_id_of(cell)}
+    found: dict[str, list[dict[str, Any]]] = defaultdict(list)
+    for cell in cells:
+        if grade_id_of(cell):
+            found[grade_id_of(cell)].append(cell)
+    if not found.keys() & released.keys():
+        raise UnreadableError(
+            problem(
+                "wrong-notebook",
+                f"the notebook is {lab.name}",
+                f"No cell of it belongs to {lab.name}: it is another notebook, or every graded cell was deleted.",
+                f"Start from labs/{lab.name}/{lab.name}.ipynb and submit that notebook.",
+            )
+        )
+    forged = sorted(found.keys() - released.keys())
+    if forged:
+        names = ", ".join(f"`{grade_id[:40]}`" for grade_id in forged[:5]) + (", …" if len(forged) > 5 else "")
+        submission.problems.append(
+            problem(
+                "forged-cell",
+                "every graded cell belongs to the lab",
+                f"The lab has no graded cell {names}: ignored.",
+                "Use ordinary cells for your own notes and experiments.",
+            )
+        )
+    for grade_id, original in released.items():
+        _take_cell(grade_id, original, found.get(grade_id, []), lab, submission)
+
+
+def _take_cell(
+    grade_id: str, original: dict[str, Any], copies: list[dict[str, Any]], lab: Lab, submission: Submission
+) -> None:
+    answer = lab.answers.get(grade_id)
+    if answer is not None:
+        # A copy that was given another name is a file of the student's own.
+        copies = [cell for cell in copies if names(cell, answer)] or copies
+    if len(copies) > 1:
+        which = "the last one counts" if answer else "none of them is run; the lab's own cell is"
+        submission.problems.append(
+            problem(
+                "duplicated-cell",
+                f"there is one cell `{grade_id}`",
+                f"There are {len(copies)} copies of the cell `{grade_id}`: {which}.",
+                "Delete the copies: a copied cell takes its grading mark along.",
+            )
+        )
+    flags = ("grade", "solution", "locked")
+    meant = {flag: bool(nbgrader_of(original).get(flag, False)) for flag in flags}
+    if any({flag: bool(nbgrader_of(cell).get(flag, False)) for flag in flags} != meant for cell in copies):
+        submission.problems.append(
+            problem(
+                "forged-flags",
+                f"the cell `{grade_id}` is marked as in the lab",
+                f"The grading marks of the cell `{grade_id}` were changed; the lab's own marks count.",
+            )
+        )
+    if answer is None:
+        _compare(grade_id, copies, lab, submission)
+        return
+    if not copies:
+        submission.problems.append(
+            problem(
+                "missing-cell",
+                f"the answer cell `{grade_id}` is there",
+                f"The answer cell `{grade_id}` was deleted: there is no answer to grade.",
+                f"Copy the cell from a fresh labs/{lab.name}/{lab.name}.ipynb.",
+            )
+        )
+        return
+    try:
+        source = source_of(copies[-1])
+    except ValueError:
+        submission.problems.append(
+            problem("not-a-notebook", f"the cell `{grade_id}` holds text", f"The cell `{grade_id}` holds no text.")
+        )
+        return
+    if len(source.encode("utf-8")) > CELL_BYTES:
+        submission.problems.append(
+            problem(
+                "oversized-cell",
+                f"the cell `{grade_id}` is at most {CELL_BYTES // 1024} KiB",
+                f"The cell `{grade_id}` is larger than {CELL_BYTES // 1024} KiB; it is not graded.",
+            )
+        )
+        return
+    submission.sources[grade_id] = source
+
+
+def _compare(grade_id: str, copies: list[dict[str, Any]], lab: Lab, submission: Submission) -> None:
+    """Report an edited check cell; a deleted one does no harm, for the lab's own cell is run anyway.
+
+    Not edited is also the cell of the lab's source, hidden lines included: who writes a lab checks that notebook.
+    """
+
+    def text(cell: dict[str, Any]) -> list[str]:
+        try:
+            return [line.rstrip() for line in source_of(cell).rstrip().split("\n")]
+        except ValueError:
+            return []
+
+    originals = [text(cell) for cell in (*lab.released, *lab.raw["cells"]) if grade_id_of(cell) == grade_id]
+    if any(text(cell) not in originals for cell in copies):
+        submission.problems.append(
+            problem(
+                "changed-cell",
+                f"the cell `{grade_id}` is as in the lab",
+                f"The cell `{grade_id}` was edited; the lab's own cell is run instead.",
+            )
+        )

@@ -1,0 +1,118 @@
+"""Takes the files out of a submitted notebook that its cells name: answers, and a student's own modules."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from autograder.core.results import Outcome
+from autograder.course.cell_file import CELL_BYTES, BadNameError, CellFile, check_free, parse
+from autograder.course.lab import Answer, Lab, grade_id_of, source_of
+from autograder.submission.notebook_file import problem
+from autograder.submission.submission import Submission
+
+OWN_FILES = 50
+"""As many files of cells that a student added are taken along; a program and its modules need a few."""
+
+
+def take_files(lab: Lab, submission: Submission) -> None:
+    """Put the files that the answers name, and the lab's own, into a submission."""
+    owners: dict[str, str] = {}
+    for grade_id, answer in lab.answers.items():
+        if answer.file is None:
+            continue
+        title = f"the cell `{grade_id}` names its file"
+        wanted = f"%%{answer.file.magic} {answer.file.name}"
+        try:
+            file = parse(submission.sources[grade_id])
+        except BadNameError as error:
+            submission.problems.append(problem("bad-file-name", title, str(error), f"Begin the cell with `{wanted}`."))
+            continue
+        if file is None:
+            because = f"The cell `{grade_id}` does not begin with `{wanted}`, so it is no file."
+            submission.problems.append(problem("no-file-name", title, because, f"Begin the cell with `{wanted}`."))
+            continue
+        if file.file_name in lab.given:
+            because = f"`{file.file_name}` belongs to the lab and cannot be replaced."
+            submission.problems.append(problem("given-file", title, because, f"Begin the cell with `{wanted}`."))
+            continue
+        try:
+            if file.file_name != answer.file.file_name:
+                check_free(file)
+        except BadNameError as error:
+            submission.problems.append(problem("bad-file-name", title, str(error), f"Begin the cell with `{wanted}`."))
+            continue
+        if file.file_name != answer.file.file_name:
+            because = f"The cell `{grade_id}` names {file.file_name}; the lab asks for {answer.file.file_name}."
+            submission.problems.append(problem("renamed-file", title, because, f"Begin the cell with `{wanted}`."))
+        if file.file_name in owners:
+            because = (
+                f"The cells `{owners[file.file_name]}` and `{grade_id}` both name {file.file_name}: the later counts."
+            )
+            submission.problems.append(problem("same-file", title, because, f"Begin the cell with `{wanted}`."))
+        owners[file.file_name] = grade_id
+        submission.files[file.file_name] = file.text
+    submission.files.update(lab.given)
+
+
+def _named(cell: dict[str, Any]) -> CellFile | None:
+    """Return the file that a code cell names, if it does so in a way that the notebook's magics accept."""
+    if cell.get("cell_type") != "code":
+        return None
+    try:
+        source = source_of(cell)
+        return None if len(source.encode("utf-8")) > CELL_BYTES else parse(source)
+    except ValueError:  # BadNameError is one: in the notebook, too, such a cell wrote nothing
+        return None
+
+
+def names(cell: dict[str, Any], answer: Answer) -> bool:
+    """Whether a copy of an answer cell still names the answer's file."""
+    file = _named(cell)
+    return answer.file is None or (file is not None and file.file_name == answer.file.file_name)
+
+
+def take_own_files(cells: list[dict[str, Any]], lab: Lab, submission: Submission) -> dict[str, str]:
+    """Take along what cells of the student's own hold, as in the notebook; an answer's name belongs to its own cell."""
+    answers = {answer.file.file_name: answer.grade_id for answer in lab.answers.values() if answer.file is not None}
+    taken = dict(submission.files)
+    own: dict[str, str] = {}
+    for cell in cells:
+        file = _named(cell)
+        if file is None or taken.get(file.file_name) == file.text:
+            continue
+        if file.file_name in taken or file.file_name in answers:
+            # Cells with a grading mark have been looked at: as copies, as forged ones, as answers.
+            if not grade_id_of(cell):
+                submission.problems.append(_ignored(file, answers.get(file.file_name, ""), lab, submission))
+            continue
+        try:
+            check_free(file)
+        except BadNameError as error:
+            submission.problems.append(
+                problem(
+                    "bad-file-name", f"`%%{file.magic} {file.name}` can be a file", f"{error} The cell is ignored."
+                )
+            )
+            continue
+        own[file.file_name] = file.text
+    if len(own) > OWN_FILES:
+        because = f"There are {len(own)} cells of your own that name files; the first {OWN_FILES} are taken along."
+        submission.problems.append(problem("too-many-files", "the notebook's files are few", because))
+        own = dict(list(own.items())[:OWN_FILES])
+    submission.files.update(own)
+    return own
+
+
+def _ignored(file: CellFile, answer: str, lab: Lab, submission: Submission) -> Outcome:
+    """What to say of a cell of the student's own with a name that belongs to an answer or to the lab."""
+    first, title = f"%%{file.magic} {file.name}", f"one cell names {file.file_name}"
+    hint = "Delete the other cell, or give its file another name."
+    if not answer:
+        because = f"Another cell also begins with `{first}`. It is ignored: {file.file_name} belongs to the lab."
+        return problem("ignored-cell", title, because, hint)
+    blank = ", still as you received it" if submission.sources[answer] == lab.answers[answer].blank else ""
+    because = (
+        f"Another cell also begins with `{first}`. It is ignored: what counts is the cell for this answer, `{answer}`,"
+        f" as it stands{blank}."
+    )
+    return problem("ignored-cell", title, because, f"Move what is to be graded into the cell `{answer}`. {hint}")

@@ -1,0 +1,95 @@
+"""Reads a notebook file as somebody placed it: bounded, through no link, and its cells as plain data."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from autograder.core.files import read_plain
+from autograder.core.results import Outcome, Status
+from autograder.course.lab import grade_id_of
+
+NOTEBOOK_BYTES = 8 * 1024 * 1024
+"""The largest notebook that is read, in bytes."""
+
+
+class UnreadableError(Exception):
+    """There is no notebook to read; `problem` says why."""
+
+    def __init__(self, problem: Outcome) -> None:
+        """Keep what to say of it."""
+        super().__init__(problem.title)
+        self.problem = problem
+
+
+def problem(code: str, title: str, because: str, hint: str = "") -> Outcome:
+    """Return an outcome that says what is wrong with a submission."""
+    return Outcome(status=Status.FAILED, title=title, because=because, hint=hint, code=code)
+
+
+def cells_of(path: Path) -> list[dict[str, Any]]:
+    """Return a notebook's cells.
+
+    Raises:
+        UnreadableError: it is no notebook.
+    """
+    return _cells(_bytes(path))
+
+
+def grade_ids_in(path: Path) -> set[str]:
+    """Return the grade_ids in a notebook; none if it cannot be read."""
+    try:
+        return {grade_id_of(cell) for cell in _cells(_bytes(path))} - {""}
+    except UnreadableError:
+        return set()
+
+
+def _way(path: Path) -> tuple[Path, tuple[str, ...]]:
+    """The folder that a path is trusted up to, and the names below it, none of which may be a link.
+
+    A submission is `<student>/<lab>/<lab>.ipynb`. A link in place of any of the three could lead to the solution, or to
+    what another student handed in.
+    """
+    first = max(len(path.parts) - 3, path.parts.index(path.anchor) + 1 if path.anchor else 0)
+    while ".." in path.parts[first:]:
+        first += 1
+    return Path(*path.parts[:first]), path.parts[first:]
+
+
+def _bytes(path: Path) -> bytes:
+    title = "the notebook can be read"
+    try:
+        content = read_plain(*_way(path), NOTEBOOK_BYTES + 1)
+    except OSError as error:
+        because = f"There is no file {path.name} to read ({error.strerror or error})."
+        raise UnreadableError(problem("no-notebook", title, because, f"Submit {path.name}.")) from error
+    if not content.strip():
+        raise UnreadableError(
+            problem("no-notebook", title, f"No {path.name} was handed in.", f"Submit the file {path.name} itself.")
+        )
+    if len(content) > NOTEBOOK_BYTES:
+        raise UnreadableError(
+            problem(
+                "oversized-notebook",
+                title,
+                f"The notebook is larger than {NOTEBOOK_BYTES // 1024**2} MiB.",
+                "Clear all outputs, save, and submit again.",
+            )
+        )
+    return content
+
+
+def _cells(content: bytes) -> list[dict[str, Any]]:
+    title = "the file is a Jupyter notebook"
+    hint = "Open it in JupyterLab, save it there, and submit that file."
+    try:
+        notebook = json.loads(content.decode("utf-8-sig"))
+    except (ValueError, RecursionError) as error:
+        because = "The file is not a notebook: it is not valid JSON."
+        raise UnreadableError(problem("not-json", title, because, hint)) from error
+    cells = notebook.get("cells") if isinstance(notebook, dict) else None
+    if not isinstance(cells, list) or notebook.get("nbformat") != 4 or not all(isinstance(c, dict) for c in cells):
+        because = "The file is JSON, but not a notebook of format 4: it has no list of cells."
+        raise UnreadableError(problem("not-a-notebook", title, because, hint))
+    return cells
