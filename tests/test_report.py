@@ -14,9 +14,10 @@ from rich.console import Console
 
 from autograder.core.results import CheckResult, Isolation, NodeLog, Outcome, Part, Status, SubmissionResult
 from autograder.report.audience import Audience, result_for
-from autograder.report.export import to_csv, to_gradescope
+from autograder.report.export.csv_table import to_csv
+from autograder.report.export.gradescope import to_gradescope
+from autograder.report.export.junit import junit_xml
 from autograder.report.html import check_html, submission_html
-from autograder.report.junit import junit_xml
 from autograder.report.terminal import check_text, check_view, class_view, submission_view, undecided_view
 
 NASTY = "<img src=x onerror=alert(1)>\x1b[31m\x00 `code` & [link](javascript:alert(2))"

@@ -47,7 +47,7 @@ def check(
     audience: Audience = "instructor" if instructor else "student"
     if junit is not None:
         from autograder.core.files import write_beside
-        from autograder.report.junit import junit_xml
+        from autograder.report.export.junit import junit_xml
 
         write_beside(junit, junit_xml([result], audience))
     if as_json:

@@ -9,6 +9,7 @@ import typer
 
 from autograder.cli.app import app
 from autograder.core.errors import KitError
+from autograder.report.export import FORMATS  # small, and the command's help names them all
 
 
 @app.command()
@@ -28,7 +29,7 @@ def report() -> None:
 
 @app.command()
 def export(
-    form: Annotated[str, typer.Argument(metavar="FORMAT", help="csv, junit or gradescope.")],
+    form: Annotated[str, typer.Argument(metavar="FORMAT", help=f"One of: {', '.join(FORMATS)}.")],
     lab: Annotated[str | None, typer.Option(help="Only this lab.")] = None,
     output: Annotated[Path | None, typer.Option("--output", "-o", help="File to write; default: print it.")] = None,
 ) -> None:
@@ -36,7 +37,6 @@ def export(
     from autograder.core.files import write_beside
     from autograder.course.folder import course_root
     from autograder.grading.store import ResultStore
-    from autograder.report.export import FORMATS
 
     if form not in FORMATS:
         raise KitError(f"There is no format `{form}`.", f"Name one of: {', '.join(FORMATS)}.")
