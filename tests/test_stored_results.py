@@ -52,7 +52,7 @@ def test_only_a_worker_without_a_result_is_asked_again(
     notebook = toy.hand_in(tmp_path, "ann", lab.clean_notebook({"talker": "%%node talker\ndie\n"})["cells"])
     asked: list[Job] = []
 
-    def worker(job: Job, _: object) -> SubmissionResult:
+    def worker(job: Job, *_: object) -> SubmissionResult:
         asked.append(job)
         return validated(toy.judge(job), job.checks) if gives_a_result else supervisor.unknown(job, "It died.")
 

@@ -101,6 +101,16 @@ def test_a_check_at_which_the_worker_dies_is_tried_once_more(tmp_path: Path, dea
     assert seen.read_text() == "xx"
 
 
+def test_workers_that_share_the_checks_find_what_one_finds() -> None:
+    drawn = "from autograder.checks import vary\noutcomes.passed(vary.token(12))\nscore(1)"
+    given = job(drawn, drawn, "outcomes.passed('x') or score(0.5)", drawn, drawn)
+    alone, together = run_in_worker(given), run_in_worker(given, workers=3)
+    assert [check.grade_id for check in together.checks] == [f"check{number}" for number in range(5)]
+    assert [check.points for check in together.checks] == [1.0, 1.0, None, 1.0, 1.0]
+    titles = [[check.outcomes[0].title for check in result.checks] for result in (alone, together)]
+    assert titles[0] == titles[1] and len(set(titles[0])) == 5
+
+
 def test_logs_share_the_room_there_is() -> None:
     logs = [
         NodeLog(program=name, text=text, truncated=False, exit_status=0, stopped_by="")

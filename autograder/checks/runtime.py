@@ -46,6 +46,10 @@ class Runtime:
         self._folder, self.isolation, self.random = folder, isolation, random.Random(seed)
         self._answers = answers or {}
 
+    def vary_for(self, seed: str) -> None:
+        """Let the values that vary be those of one check: they do not depend on which checks ran before it."""
+        self.random = random.Random(seed)
+
     @property
     def front_end(self) -> FrontEnd | None:
         """The student's notebook; None where a submission is graded."""

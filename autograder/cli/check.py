@@ -31,7 +31,7 @@ def check(
         raise KitError(f"There is no notebook {notebook}.", "Name an .ipynb file.")
     from autograder.core.results import Status
     from autograder.course.folder import trusted_course
-    from autograder.grading.runner import Settings, run_submission
+    from autograder.grading.runner import WORKERS_FOR_ONE, Settings, run_submission
     from autograder.report.audience import Audience, result_for
     from autograder.report.terminal import working
     from autograder.sandbox.isolation import choose
@@ -43,7 +43,9 @@ def check(
         print(f"note: {note}", file=sys.stderr)
     settings = Settings(isolation=choose(isolation), seed=seed)
     with working(f"Running the {len(found.checks)} checks of {found.name}: each waits until its evidence has come"):
-        result = run_submission(notebook, notebook.parent.resolve().name, found, settings)
+        result = run_submission(
+            notebook, notebook.parent.resolve().name, found, settings, workers=WORKERS_FOR_ONE
+        )
     audience: Audience = "instructor" if instructor else "student"
     if junit is not None:
         from autograder.core.files import write_beside

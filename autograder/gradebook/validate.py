@@ -17,7 +17,7 @@ from nbgrader.validator import Validator
 
 from autograder.core.errors import KitError
 from autograder.core.results import Isolation, Outcome, Status
-from autograder.grading.runner import Settings, run_submission
+from autograder.grading.runner import WORKERS_FOR_ONE, Settings, run_submission
 from autograder.report import words
 from autograder.report.audience import result_for
 from autograder.report.terminal import plain
@@ -69,7 +69,8 @@ def verdicts(root: Path, notebook: Path, invert: bool) -> dict[str, list[dict[st
         refuse_foreign_ros(os.environ)
         lab = lab_of(notebook, None, root)
         settings = Settings(isolation=choose(Isolation.FULL))
-        result = run_submission(notebook, notebook.resolve().parent.name, lab, settings)
+        student = notebook.resolve().parent.name
+        result = run_submission(notebook, student, lab, settings, workers=WORKERS_FOR_ONE)
     except (KitError, SetUpError) as error:
         return {"failed": [_entry(f"{notebook.name} was not checked", [error.what, error.do])]}
     result = result_for(result, "student")

@@ -22,6 +22,9 @@ from autograder.grading.validation import all_for_one_reason, lacks_a_result
 from autograder.submission.reader import read_submission
 from autograder.submission.submission import Submission
 
+WORKERS_FOR_ONE = 3
+"""Workers that share the checks of a submission for which somebody waits: two cores carry them."""
+
 
 @dataclass(frozen=True)
 class Settings:
@@ -58,6 +61,7 @@ def run_submission(
     settings: Settings,
     store: ResultStore | None = None,
     stop: threading.Event | None = None,
+    workers: int = 1,
 ) -> SubmissionResult:
     """Read one submission, run its checks in the sandbox, and return what came of it.
 
@@ -68,6 +72,7 @@ def run_submission(
         settings: how to run it.
         store: to keep the result in, and to take it from if nothing changed; None keeps nothing.
         stop: when it is set, the run is ended.
+        workers: that share its checks and run at once.
 
     Raises:
         KitError: this machine cannot isolate programs as asked.
@@ -78,7 +83,7 @@ def run_submission(
     known = stored(student, submission, lab, settings, store) if store is not None else None
     if known is not None:
         return known
-    result = _run(submission, student, lab, settings, stop)
+    result = _run(submission, student, lab, settings, stop, workers)
     result.seconds["total"] = round(time.monotonic() - began, 3)
     if store is not None:
         store.save(result)
@@ -86,13 +91,13 @@ def run_submission(
 
 
 def _run(
-    submission: Submission, student: str, lab: Lab, settings: Settings, stop: threading.Event | None
+    submission: Submission, student: str, lab: Lab, settings: Settings, stop: threading.Event | None, workers: int
 ) -> SubmissionResult:
     job = job_of(submission, student, lab, settings)
     if not submission.readable:
         problem = submission.problems[-1].model_copy(update={"title": "there is a notebook to check"})
         return job.result([all_for_one_reason(cell, problem, points=0.0) for cell in lab.checks])
-    return run_in_worker(job, stop)
+    return run_in_worker(job, stop, workers)
 
 
 def job_of(submission: Submission, student: str, lab: Lab, settings: Settings) -> Job:

@@ -57,6 +57,7 @@ def run_job(job: Job, folder: Path, stacks: TextIO = sys.stderr) -> Iterator[Che
         for number, cell in enumerate(job.cells):
             started = time.monotonic()
             findings.current.reset()
+            runtime.current.vary_for(f"{job.seed} {cell.grade_id}")
             faulthandler.dump_traceback_later(CELL_SECONDS + STUCK_SECONDS, exit=True, file=stacks)
             error, value = _run_cell(cell, number, namespace)
             faulthandler.cancel_dump_traceback_later()
