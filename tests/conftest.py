@@ -18,6 +18,11 @@ CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", 
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Add what `make test-all` asks for."""
+    parser.addoption("--complete", action="store_true", help="run every check on every sample student")
+
+
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
     """Print which mistake is caught by which check, where the sample classes were graded."""
     reports = terminalreporter.getreports("passed") + terminalreporter.getreports("failed")

@@ -17,8 +17,9 @@ from typing import Any
 import kill_matrix
 import sample_class
 import yaml
-from mutation.generate import handed_in, mutants, reached
+from mutation.generate import handed_in, mutants
 from mutation.source import Mutant
+from reach import reached
 from rich.progress import track
 from sample_class import ROOT
 
@@ -53,7 +54,7 @@ def grade(lab: Lab, mutant: Mutant, seed: int) -> SubmissionResult:
         isolation=Isolation.FULL,
         seed=seed,
         files=handed_in(lab, mutant),
-        cells=reached(lab, mutant.answer),
+        cells=reached(lab, [mutant.answer]),
     )
     return run_in_worker(job)
 

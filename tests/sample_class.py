@@ -29,6 +29,8 @@ class Expected:
     about: str
     points: dict[str, float | None]
     """By grade_id of the check; None: could not find out."""
+    from_solution: bool = False
+    """Whether the answers that are not changed are the solution's; otherwise they are blank."""
     codes: dict[str, str] = field(default_factory=dict)
     """Code of the first failed outcome, by grade_id of the check."""
     because: dict[str, str] = field(default_factory=dict)
@@ -70,6 +72,7 @@ def expected(lab: Lab, student: str, folder: Path | None = None) -> Expected:
     _only(told.get("checks") or {}, set(full), path)
     points: dict[str, float | None] = {name: told.get("rest", top) for name, top in full.items()}
     result = Expected(student, told["about"], points, problems=sorted(told.get("problems") or []))
+    result.from_solution = told.get("base") == "solution"
     result.flagged = sorted(told.get("flagged") or [])
     for name, check in (told.get("checks") or {}).items():
         _only(check, {"points", "code", "because", "lost"}, path)

@@ -6,11 +6,12 @@ import ast
 
 import mutants
 import pytest
-from mutation.generate import handed_in, reached
+from mutation.generate import handed_in
 from mutation.generate import mutants as made_from
 from mutation.python_rules import changes, swaps
 from mutation.source import Source
 from mutation.text_rules import text_changes
+from reach import reached
 from sample_class import ROOT
 
 from autograder.course.lab import load_lab
@@ -89,7 +90,7 @@ def test_mutants_of_a_lab_differ_from_the_solution_are_programs_and_reach_a_chec
     for mutant in found:
         file = lab.answers[mutant.answer].file
         assert mutant.source != lab.answers[mutant.answer].solution
-        assert any(cell.points for cell in reached(lab, mutant.answer)), mutant.answer
+        assert any(cell.points for cell in reached(lab, [mutant.answer])), mutant.answer
         if file is not None and file.magic == "node":
             ast.parse(handed_in(lab, mutant)[file.file_name])
 

@@ -1,4 +1,4 @@
-"""The mutants of a lab, and the checks that each can reach."""
+"""The mutants of a lab."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ from collections.abc import Iterator
 
 from autograder.course.cell_file import parse
 from autograder.course.lab import Answer, Lab, grade_id_of, source_of
-from autograder.grading.job import Cell
 from mutation.python_rules import changes, swaps
 from mutation.source import Mutant, Source
 from mutation.text_rules import text_changes
@@ -64,22 +63,6 @@ def _difference(before: str, after: str) -> tuple[str, str]:
     shorter = len(new) < len(old)
     then = "(dropped)" if shorter and new[first].strip() != "pass" and new[first:] == old[first + 1 :] else new[first]
     return old[first].strip(), then.strip()
-
-
-def reached(lab: Lab, answer_id: str) -> list[Cell]:
-    """The cells to run for a changed answer: set-up, and the checks that use its file or one that mentions it."""
-    names = {answer_id}
-    files = {answer.grade_id: answer.file for answer in lab.answers.values() if answer.file is not None}
-    grown = True
-    while grown:
-        grown = False
-        for other in files:
-            text = lab.answers[other].solution
-            if other not in names and any(files[name].name in text.split("\n", 1)[1] for name in names):
-                names.add(other)
-                grown = True
-    words = [word for name in names for word in (f'"{files[name].name}"', f"'{files[name].name}'")]
-    return [cell for cell in lab.cells if cell.points is None or any(word in cell.source for word in words)]
 
 
 def handed_in(lab: Lab, mutant: Mutant) -> dict[str, str]:
