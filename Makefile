@@ -18,7 +18,7 @@ echo "No Python was found. The kit needs Python 3.11 to 3.14." >&2; \
 echo "What to do: sudo apt-get install python3 python3-venv   or name one: make PYTHON=/path/to/python3.12" >&2; exit 2
 endef
 
-.PHONY: help setup setup-dev doctor grade check test lint jupyter lectures release soak mutants bench lock clean distclean
+.PHONY: help setup setup-dev doctor grade check test test-all lint jupyter lectures release soak mutants bench lock clean distclean
 
 help: ## this list
 	@echo 'make TARGET [LAB=$(LAB)] [PYTHON=python3.12] [ARGS="more options"]'; echo
@@ -53,7 +53,10 @@ lectures: setup-dev ## build the book and the slides into build/lectures
 	@echo build/lectures/book/index.html build/lectures/slides/index.html
 
 test: setup-dev ## run every test, ruff and mypy among them
-	@$(RUN) python -m pytest -n 2 --dist loadfile $(ARGS)  # grading a class mostly waits, so another file runs beside it
+	@$(RUN) python -m pytest -n 2 --dist loadfile --no-loadscope-reorder $(ARGS)
+
+test-all: setup-dev ## the same, with every check run on every sample student
+	@$(RUN) python -m pytest -n 2 --dist loadfile --no-loadscope-reorder --complete $(ARGS)
 
 lint: setup-dev ## ruff and mypy --strict
 	@$(RUN) ruff check .

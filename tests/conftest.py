@@ -13,6 +13,8 @@ import pytest
 
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 
+LONGEST = ("test_classes", "test_browser", "test_checks", "test_lectures", "test_nbgrader", "test_setup", "test_sandbox")
+"""Files that take minutes, the longest first."""
 
 # A shell starts what it puts into the background deaf to Ctrl-C, and so would be every program that a test interrupts.
 signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -21,6 +23,11 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 def pytest_addoption(parser: pytest.Parser) -> None:
     """Add what `make test-all` asks for."""
     parser.addoption("--complete", action="store_true", help="run every check on every sample student")
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Begin with what takes longest, so that no worker is left alone with it in the end."""
+    items.sort(key=lambda item: (*LONGEST, item.path.stem).index(item.path.stem))
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:

@@ -55,7 +55,7 @@ def jupyter(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Path, st
     environment |= {
         "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}",
         "HOME": str(home),
-        "JUPYTER_CONFIG_PATH": str(ROOT / "autograder" / "jupyter"),
+        "JUPYTER_CONFIG_PATH": str(ROOT / "autograder" / "notebook" / "jupyter"),
         "JUPYTER_RUNTIME_DIR": str(home / "runtime"),
         "JUPYTERLAB_SETTINGS_DIR": str(home / "settings"),
     }
