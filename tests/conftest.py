@@ -13,7 +13,15 @@ import pytest
 
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 
-LONGEST = ("test_classes", "test_browser", "test_checks", "test_lectures", "test_nbgrader", "test_setup", "test_sandbox")
+LONGEST = (
+    "test_classes",
+    "test_browser",
+    "test_checks",
+    "test_lectures",
+    "test_nbgrader",
+    "test_setup",
+    "test_sandbox",
+)
 """Files that take minutes, the longest first."""
 
 # A shell starts what it puts into the background deaf to Ctrl-C, and so would be every program that a test interrupts.
