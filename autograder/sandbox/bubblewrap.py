@@ -8,7 +8,7 @@ import subprocess
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
-from autograder.sandbox.environment import HERE, SYSTEM_FILES, SYSTEM_FOLDERS, python_places
+from autograder.sandbox.environment import HERE, INSIDE, SYSTEM_FILES, SYSTEM_FOLDERS, python_places
 from autograder.sandbox.limits import Limits
 
 PACKAGE = HERE.parent
@@ -98,11 +98,7 @@ def inner_options(folder: Path, limits: Limits, variables: Mapping[str, str]) ->
     the launch itself gives that up, and takes the filter of system calls, before anything of a student's starts.
     """
     size = str(limits.disk)
-    kit = [
-        part
-        for name in ("launcher.py", "probe.py", "fastdds.xml")
-        for part in ("--ro-bind", str(HERE / name), f"{KIT_FOLDER}/{name}")
-    ]
+    kit = ["--ro-bind", str(INSIDE), KIT_FOLDER]
     return [
         *_NAMESPACES, "--cap-add", "CAP_SYS_ADMIN", "--cap-add", "CAP_SETPCAP", "--disable-userns",
         "--as-pid-1", *_LIFE,

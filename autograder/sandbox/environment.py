@@ -11,7 +11,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
-FASTDDS_PROFILE = HERE / "fastdds.xml"
+INSIDE = HERE / "inside"
+"""What the launcher consists of, which stands alone: a sandbox shows it and nothing else of the kit."""
+FASTDDS_PROFILE = INSIDE / "fastdds.xml"
 
 
 def profile_environment() -> dict[str, str]:

@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from autograder.sandbox import seccomp
-from autograder.sandbox.environment import HERE, SYSTEM_FILES, SYSTEM_FOLDERS, python_places
+from autograder.sandbox.environment import HERE, INSIDE, SYSTEM_FILES, SYSTEM_FOLDERS, python_places
 
 NEEDED_VERSION = 6
 """The first that also keeps signals and abstract sockets inside."""
@@ -38,8 +38,7 @@ def version() -> int:
 
 def confined(command: Sequence[str], folder: Path, scratch: Path) -> list[str]:
     """Return `command` so that it sees Python, ROS and `folder`, and writes only to `scratch`."""
-    readable = [*SYSTEM_FOLDERS, *SYSTEM_FILES, *map(str, python_places().paths), str(folder), "/proc"]
-    readable += [str(HERE / name) for name in ("launcher.py", "probe.py", "fastdds.xml")]
+    readable = [*SYSTEM_FOLDERS, *SYSTEM_FILES, *map(str, python_places().paths), str(folder), "/proc", str(INSIDE)]
     return [
         sys.executable, "-I", "-c", f"import sys; sys.path.append({str(HERE.parent.parent)!r}); "
         "from autograder.sandbox.landlock import main; main()",

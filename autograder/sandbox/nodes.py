@@ -19,7 +19,7 @@ from pathlib import Path
 from autograder.core.errors import KitError
 from autograder.core.results import Isolation
 from autograder.sandbox import bubblewrap, seccomp
-from autograder.sandbox.environment import HERE, python_environment
+from autograder.sandbox.environment import INSIDE, python_environment
 from autograder.sandbox.group import GroupLost, ProgramGroup
 from autograder.sandbox.limits import Limits
 from autograder.sandbox.loop import Loop
@@ -175,7 +175,7 @@ class NodeSandbox:
                     stderr=self._said,
                 )
             else:
-                command = [*python, str(HERE / "launcher.py"), end, str(self._scratch.folder)]
+                command = [*python, str(INSIDE / "launcher.py"), end, str(self._scratch.folder)]
                 if self.isolation is Isolation.REDUCED:
                     from autograder.sandbox.landlock import confined
 

@@ -1,0 +1,76 @@
+"""A /tmp, a /dev/shm and a /proc of a launch's own, in a mount namespace of its own."""
+
+import os
+import re
+
+from .kernel import (
+    MS_BIND,
+    MS_NODEV,
+    MS_NOEXEC,
+    MS_NOSUID,
+    MS_PRIVATE,
+    MS_RDONLY,
+    MS_REC,
+    MS_REMOUNT,
+    checked,
+    libc,
+)
+
+
+def make(disk: int, inodes: int) -> None:
+    """An empty /tmp and /dev/shm of limited size and number of files, and a /proc that shows this launch alone.
+
+    Raises:
+        OSError: the kernel refuses.
+    """
+    checked(libc.mount(None, b"/", None, MS_REC | MS_PRIVATE, None))
+    options = f"size={disk},nr_inodes={inodes},mode=1777".encode()
+    python = _python_below("/tmp")
+    for place in (b"/tmp", b"/dev/shm"):
+        checked(libc.mount(b"tmpfs", place, b"tmpfs", MS_NOSUID | MS_NODEV, options))
+    _put_back(*python)
+    checked(libc.mount(b"proc", b"/proc", b"proc", MS_NOSUID | MS_NODEV | MS_NOEXEC, None))
+    # Settings of the namespaces, some of which would be the programs' own.
+    checked(libc.mount(b"/proc/sys", b"/proc/sys", None, MS_BIND, None))
+    read_only = MS_BIND | MS_REMOUNT | MS_RDONLY | MS_NOSUID | MS_NODEV | MS_NOEXEC
+    checked(libc.mount(None, b"/proc/sys", None, read_only, None))
+
+
+def _python_below(place: str) -> tuple[list[str], list[tuple[str, str]], list[tuple[str, bool, int]]]:
+    """Folders, links and mounts below a place: where the environment itself lies there, Python must stay in sight."""
+    with open("/proc/self/mountinfo", encoding="utf-8", errors="surrogateescape") as table:
+        lines = [line.split(" ")[4] for line in table]
+    mounts = {re.sub(r"\\([0-7]{3})", lambda code: chr(int(code[1], 8)), line) for line in lines}
+    folders: list[str] = []
+    links: list[tuple[str, str]] = []
+    held: list[tuple[str, bool, int]] = []
+    waiting = [place]
+    while waiting:
+        for entry in os.scandir(waiting.pop()):
+            if entry.path in mounts:
+                held.append((entry.path, entry.is_dir(), os.open(entry.path, os.O_PATH | os.O_CLOEXEC)))
+            elif entry.is_symlink():
+                links.append((os.readlink(entry.path), entry.path))
+            elif entry.is_dir():
+                folders.append(entry.path)
+                waiting.append(entry.path)
+    return folders, links, held
+
+
+def _put_back(folders: list[str], links: list[tuple[str, str]], held: list[tuple[str, bool, int]]) -> None:
+    """Make what `_python_below` found once more, read-only as it was."""
+    for folder in folders:
+        os.mkdir(folder, 0o755)
+    for target, link in links:
+        os.symlink(target, link)
+    for path, is_folder, handle in held:
+        if is_folder:
+            os.mkdir(path, 0o755)
+        else:
+            os.close(os.open(path, os.O_CREAT | os.O_WRONLY | os.O_CLOEXEC, 0o644))
+        where = os.fsencode(path)
+        checked(libc.mount(f"/proc/self/fd/{handle}".encode(), where, None, MS_BIND | MS_REC, None))
+        os.close(handle)
+        if not os.statvfs(path).f_flag & os.ST_RDONLY:
+            flags = MS_BIND | MS_REMOUNT | MS_RDONLY | MS_NOSUID | MS_NODEV
+            checked(libc.mount(None, where, None, flags, None))

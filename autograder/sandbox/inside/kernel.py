@@ -1,0 +1,74 @@
+"""The system calls that Python has no function for, and the numbers that they take."""
+
+import contextlib
+import ctypes
+import os
+import resource
+import struct
+
+CLONE_NEWNS, CLONE_NEWPID = 0x20000, 0x20000000
+MS_RDONLY, MS_NOSUID, MS_NODEV, MS_NOEXEC = 1, 2, 4, 8
+MS_REMOUNT, MS_BIND, MS_REC, MS_PRIVATE = 0x20, 0x1000, 0x4000, 1 << 18
+PR_SET_PDEATHSIG, PR_SET_DUMPABLE, PR_SET_CHILD_SUBREAPER = 1, 4, 36
+_PR_SET_SECCOMP, _PR_SET_NO_NEW_PRIVS = 22, 38
+_PR_CAPBSET_DROP, _PR_CAP_AMBIENT, _PR_CAP_AMBIENT_CLEAR_ALL = 24, 47, 4
+
+libc = ctypes.CDLL(None, use_errno=True)
+prctl = libc.prctl
+
+
+def checked(result: int) -> None:
+    """Raise what a call has left in errno, unless it returned 0.
+
+    Raises:
+        OSError: it did not.
+    """
+    if result != 0:
+        raise OSError(ctypes.get_errno(), os.strerror(ctypes.get_errno()))
+
+
+class _FilterProgram(ctypes.Structure):
+    _fields_ = (("length", ctypes.c_ushort), ("filter", ctypes.c_char_p))
+
+
+def filter_calls(content: bytes) -> None:
+    """Put this process under a filter of system calls, an array of `struct sock_filter`.
+
+    Raises:
+        OSError: the kernel refuses.
+    """
+    program = _FilterProgram(len(content) // 8, content)
+    prctl(_PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0)
+    if prctl(_PR_SET_SECCOMP, 2, ctypes.byref(program), 0, 0) != 0:
+        raise OSError("the filter of system calls was refused")
+
+
+def give_up_privileges() -> None:
+    """Give up every capability, in this process and in all that it ever starts, and make sure of it.
+
+    Raises:
+        OSError: one is left.
+    """
+    number = 0
+    while prctl(_PR_CAPBSET_DROP, number, 0, 0, 0) == 0:
+        number += 1  # fails after the last that the kernel knows
+    checked(prctl(_PR_CAP_AMBIENT, _PR_CAP_AMBIENT_CLEAR_ALL, 0, 0, 0))
+    header = struct.pack("II", 0x20080522, 0)  # capset(2), version 3
+    checked(libc.capset(header, bytes(24)))
+    checked(prctl(_PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0))
+    with open("/proc/self/status") as status:
+        left = [line for line in status if line.startswith("Cap") and int(line.split()[1], 16) != 0]
+    if left:
+        raise OSError(f"privileges are left: {' '.join(left)}")
+
+
+def limit(name: str, value: int) -> None:
+    """Set a limit of this process, by its name in the `resource` module; one that is lower already stays."""
+    which = getattr(resource, name)
+    _, hard = resource.getrlimit(which)
+    if hard != resource.RLIM_INFINITY:
+        value = min(value, hard)
+    # Of CPU time one second more: at the soft limit comes a signal that says so, at the hard one the end.
+    most = value + 1 if which == resource.RLIMIT_CPU and hard == resource.RLIM_INFINITY else value
+    with contextlib.suppress(ValueError, OSError):
+        resource.setrlimit(which, (value, most))

@@ -1,0 +1,99 @@
+"""The launcher's own work: it makes the first process of each launch, and ends everything at the end of its socket."""
+
+import contextlib
+import os
+import shutil
+import signal
+import socket
+
+from . import fresh_places
+from .kernel import (
+    CLONE_NEWNS,
+    CLONE_NEWPID,
+    PR_SET_CHILD_SUBREAPER,
+    checked,
+    filter_calls,
+    give_up_privileges,
+    libc,
+    limit,
+    prctl,
+)
+from .requests import Launch, answer, hand_over
+
+_PARENT = os.getppid()
+"""Who started the launcher; this module is loaded before anything that takes time."""
+
+
+def serve_launches(channel: socket.socket, scratch: str) -> Launch:
+    """Start the first process of each launch that is asked for. Returns only in such a process."""
+    signal.signal(signal.SIGCHLD, signal.SIG_IGN)  # nobody asks how a first process ended
+    while True:
+        packet, passed, _, _ = socket.recv_fds(channel, 1 << 20, 1)
+        if not packet:
+            _end_everything(scratch)
+        between = os.fork()
+        if between == 0:
+            channel.close()
+            launch = Launch(packet, socket.socket(fileno=passed[0]))
+            _fork_first_process(launch)
+            return launch
+        os.close(passed[0])
+        with contextlib.suppress(ChildProcessError):
+            os.waitpid(between, 0)
+
+
+def _fork_first_process(launch: Launch) -> None:
+    """Become the first process of a launch: by one more fork, since a process never changes its own PID namespace."""
+    try:
+        if launch.namespaces:
+            checked(libc.unshare(CLONE_NEWPID | CLONE_NEWNS))
+        first = os.fork()
+    except OSError as error:
+        answer(launch.channel, {"broken": str(error)})
+        os._exit(1)
+    if first != 0:
+        hand_over(launch.channel, {"first": True}, os.pidfd_open(first))
+        os._exit(0)
+    try:
+        prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
+        if launch.namespaces:
+            fresh_places.make(launch.disk, launch.inodes)
+            give_up_privileges()
+        for name, value in launch.limits.items():
+            if name != "RLIMIT_CPU":
+                limit(name, value)
+        if launch.filter:
+            filter_calls(launch.filter)
+    except OSError as error:
+        answer(launch.channel, {"broken": str(error)})
+        os._exit(1)
+
+
+def _end_everything(scratch: str) -> None:
+    """End every program and then this process. Where no PID namespace does it, descendants are found one by one."""
+    me = os.getpid()
+    while me != 1:
+        parents = _parents()
+        family = {me}
+        while grown := {pid for pid, parent in parents.items() if parent in family} - family:
+            family |= grown
+        if family == {me}:
+            break
+        for pid in family - {me}:
+            with contextlib.suppress(ProcessLookupError, PermissionError):
+                os.kill(pid, signal.SIGKILL)
+    if scratch and os.getppid() != _PARENT:  # whoever lives looks after its own folder
+        shutil.rmtree(scratch, ignore_errors=True)
+    os._exit(0)
+
+
+def _parents() -> dict[int, int]:
+    """Every living process and its parent."""
+    parents: dict[int, int] = {}
+    for entry in os.listdir("/proc"):
+        with contextlib.suppress(OSError, ValueError, IndexError):
+            with open(f"/proc/{int(entry)}/stat") as stat:
+                fields = stat.read().rpartition(")")[2].split()
+            if fields[0] != "Z":
+                parents[int(entry)] = int(fields[1])
+    return parents

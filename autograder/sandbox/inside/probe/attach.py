@@ -1,0 +1,63 @@
+"""Attaching the probe: to rclpy once, in the launcher; to a program's pipe after the fork."""
+
+import atexit
+import importlib
+from typing import Any
+
+from . import own_lines, rclpy_names
+from .watch_actions import watch_actions
+from .watch_calls import watch_blocking, watch_callbacks, watch_threads
+from .watch_executors import watch_executors
+from .watch_lifecycle import watch_lifecycle
+from .watch_messages import watch_messages
+from .watch_nodes import watch_nodes, watch_things
+from .watch_parameters import watch_parameters
+from .writing import emit, ledger, open_channel, quiet
+
+_MODULES = (
+    "action", "action.client", "action.server", "client", "executors", "lifecycle", "node", "publisher", "service",
+    "timer",
+)  # fmt: skip
+_PARTS = (
+    watch_nodes,
+    watch_things,
+    watch_executors,
+    watch_blocking,
+    watch_callbacks,
+    watch_messages,
+    watch_parameters,
+    watch_actions,
+    watch_lifecycle,
+)
+_failed: list[str] = []
+
+
+def prepare() -> list[str]:
+    """Put the notes around rclpy's functions; return what of rclpy cannot be watched, a sentence each."""
+    rclpy: Any = importlib.import_module("rclpy")
+    for name in _MODULES:
+        importlib.import_module(f"rclpy.{name}")
+    _failed.extend(rclpy_names.moved(rclpy))
+    for part in _PARTS:
+        try:
+            part(rclpy)
+        except Exception as error:
+            _failed.append(f"The probe's {part.__name__} does not fit the installed rclpy: {error}.")
+    return list(_failed)
+
+
+def begin(descriptor: int, folder: str) -> None:
+    """Begin to write to a descriptor; the program's own lines are those of files in `folder`."""
+    open_channel(descriptor)
+    own_lines.own_files_are_in(folder)
+    for what in _failed:
+        emit({"e": "probe_failed", "what": what})
+    emit({"e": "attached"})
+    with quiet():
+        watch_threads()
+        atexit.register(ledger.write)
+
+
+def note_memory_error() -> None:
+    """Say that the program ends for want of memory."""
+    emit({"e": "memory_error"})

@@ -1,0 +1,121 @@
+"""Calls that may block: from which line, how often one was begun, and how often it came back."""
+
+import _thread
+import functools
+import time
+from collections.abc import Callable
+from typing import Any
+
+from . import forms
+from .executor import Executor, executor_of
+from .own_lines import own_line
+from .thing import Thing, thing_of
+from .thread_state import here
+from .writing import ledger, quiet
+
+
+class Call:
+    """A call that may block, by its line."""
+
+    dirty = False
+
+    def __init__(self, what: str, target: int, where: forms.Where, callback: Thing | None) -> None:
+        """Begin with none; `target` is the number of the thing that is called."""
+        self.key = f"call{next(ledger.numbers)}"
+        self.what, self.target, self.where, self.callback = what, target, where, callback
+        self.begun = self.ended = 0
+        self.since = 0.0
+        self.thread = 0
+
+    def event(self) -> forms.Call:
+        """Return its line as it is now."""
+        return {
+            "e": "call",
+            "what": self.what,
+            "in_callback": self.callback is not None,
+            "callback": self.callback.number if self.callback else 0,
+            "target": self.target,
+            "begun": self.begun,
+            "ended": self.ended,
+            "since": self.since,
+            "thread": self.thread,
+            **self.where,
+        }
+
+    def begin(self) -> None:
+        """Note that it begins once more."""
+        with ledger.lock:
+            self.begun += 1
+            self.since, self.thread = time.monotonic(), _thread.get_ident()
+        ledger.touch(self)
+
+    def end(self) -> None:
+        """Note that it came back."""
+        with ledger.lock:
+            self.ended += 1
+        ledger.touch(self)
+
+
+_calls: dict[tuple[Any, ...], Call] = {}
+
+
+def _call(what: str, target: Any) -> Call:
+    """The record of a call from the line where this thread is, in the callback that it runs."""
+    where, thing = own_line(), None
+    with quiet():
+        thing = thing_of(target)
+    number = thing.number if thing is not None else 0
+    key = (what, number, where["line"], here.callback.number if here.callback else 0)
+    if key not in _calls:
+        _calls[key] = Call(what, number, where, here.callback)
+        ledger.add(_calls[key])
+    return _calls[key]
+
+
+def wrap_blocking(
+    owner: Any,
+    name: str,
+    what: str,
+    spins: Callable[..., Any] | None = None,
+    seen: bool = False,
+    long: bool = False,
+) -> None:
+    """As `wrapping.wrap`, for a call that may block.
+
+    Args:
+        owner: what has the function.
+        name: its name there.
+        what: what the event calls it.
+        spins: returns the executor that it spins, from its arguments.
+        seen: it is noted outside a callback as well.
+        long: it spins until the end.
+    """
+    original = getattr(owner, name)
+
+    @functools.wraps(original)
+    def call(*args: Any, **kwargs: Any) -> Any:
+        noted: Call | None = None
+        spun: Executor | None = None
+        if here.depth == 0:
+            with quiet():
+                if spins is not None:
+                    spun = executor_of(spins(*args, **kwargs))
+                if seen or here.callback is not None:
+                    noted = _call(what, args[0] if args and spins is None else None)
+        here.depth += 1
+        try:
+            with quiet():
+                if noted is not None:
+                    noted.begin()
+                if spun is not None:
+                    spun.spin(1, long)
+            return original(*args, **kwargs)
+        finally:
+            here.depth -= 1
+            with quiet():
+                if noted is not None:
+                    noted.end()
+                if spun is not None:
+                    spun.spin(-1, long)
+
+    setattr(owner, name, call)

@@ -1,0 +1,160 @@
+"""Callbacks while they run: on which thread, how they end, what they return, what they await."""
+
+import functools
+import inspect
+import time
+import weakref
+from collections.abc import Callable
+from typing import Any
+
+from . import forms
+from .executor import Executor
+from .own_lines import awaited_line, callback_line, error_line
+from .thing import Thing
+from .thread_state import here
+from .writing import PAUSE, emit, emit_once, ledger, quiet
+
+must_return: dict[Any, type] = {}
+"""Callback of an action server -> what it must return."""
+
+asked_by: "weakref.WeakKeyDictionary[Any, int]" = weakref.WeakKeyDictionary()
+"""Future of a service call -> number of the client."""
+
+_by_line: dict[tuple[str, ...], Thing] = {}
+
+
+class _OnThread:
+    """While a callback is on a thread; an error that leaves it is noted."""
+
+    def __init__(self, thing: Thing, executor: Executor | None) -> None:
+        self.thing, self.executor = thing, executor
+        self.before: tuple[Thing | None, int] = (None, 0)
+
+    def __enter__(self) -> None:
+        self.before = here.callback, here.depth
+        here.callback, here.depth = self.thing, 0
+        if self.executor is not None:
+            self.executor.step(1)
+
+    def __exit__(self, kind: Any, error: BaseException | None, trace: Any) -> None:
+        here.callback, here.depth = self.before
+        if self.executor is not None:
+            self.executor.step(-1)
+        if not isinstance(error, Exception) or isinstance(error, StopIteration):
+            return
+        with quiet():
+            if type(error).__name__ != "ExternalShutdownException":
+                event: forms.CallbackError = {
+                    "e": "callback_error",
+                    "kind": self.thing.about.get("kind", ""),
+                    "type": type(error).__name__,
+                    "text": str(error),
+                    **error_line(error),
+                }
+                emit(event)
+
+
+class _Steps:
+    """Awaits a coroutine callback; between its steps the thread is not inside the callback."""
+
+    def __init__(self, coroutine: Any, thing: Thing, executor: Executor | None) -> None:
+        self.coroutine, self.thing, self.executor = coroutine, thing, executor
+
+    def __await__(self) -> Any:
+        # rclpy asks a coroutine that awaits again and again, without a pause, so most of these steps must cost little.
+        steps, sent, thing, look = self.coroutine.__await__(), None, self.thing, 0.0
+        while True:
+            try:
+                with _OnThread(thing, self.executor):
+                    wanted = steps.send(sent)
+            except StopIteration as end:
+                return end.value
+            now = time.monotonic()
+            if now >= look:
+                look = now + PAUSE
+                with quiet():
+                    self._note(now)
+            sent = yield wanted
+
+    def _note(self, now: float) -> None:
+        thing = self.thing
+        where, target = awaited_line(self.coroutine)
+        client = asked_by.get(target, 0) if target is not None else 0
+        if where["line"] != thing.awaits.get("line"):
+            thing.awaits = {"line": where["line"], "code": where["code"], "client": client, "since": now}
+            thing.awaited = where["line"]
+            ledger.touch(thing)
+
+
+async def await_or_execute(callback: Any, *args: Any) -> Any:
+    """As rclpy's own function of this name, with a note of what goes on."""
+    taken, here.taken = here.taken, None
+    thing, executor = taken or (_unknown(callback), None)
+    run = thing.begin()
+    raised = True
+    try:
+        if inspect.iscoroutinefunction(callback):
+            result = await _Steps(callback(*args), thing, executor)
+        else:
+            with _OnThread(thing, executor):
+                result = callback(*args)
+        raised = False
+    finally:
+        with quiet():
+            thing.awaits = {}
+            thing.end(run, raised)
+    with quiet():
+        _check_return(callback, thing.about.get("kind", ""), args, result)
+    return result
+
+
+def _unknown(callback: Any) -> Thing:
+    """A callback of something that rclpy does not let us see: it is not written down, only used on this thread."""
+    with quiet():
+        return Thing({"kind": "action" if callback in must_return else ""})
+    return Thing({"kind": ""})
+
+
+def _check_return(callback: Any, kind: str, args: tuple[Any, ...], result: Any) -> None:
+    if kind == "service" and len(args) == 2:
+        expected: Any = type(args[1])
+    elif kind == "action":
+        expected = must_return.get(callback)
+    else:
+        return
+    if isinstance(expected, type) and not isinstance(result, expected):
+        _bad_return(kind, callback, result, expected)
+
+
+def _bad_return(kind: str, callback: Any, result: Any, expected: type) -> None:
+    text = f"{type(result).__name__} instead of {expected.__name__}".replace("NoneType", "None")
+    event: forms.BadReturn = {"e": "bad_return", "kind": kind, "text": text, **callback_line(callback)}
+    emit_once(event)
+
+
+def noted(kind: str, callback: Callable[..., Any], node: str, expected: type | None) -> Callable[..., Any]:
+    """The callback with notes; `expected` is the type that it must return."""
+    where = callback_line(callback)
+    key = (kind, node, where["line"])
+    if key not in _by_line:
+        _by_line[key] = Thing({"kind": kind, "node": node, "line": where["line"], "code": where["code"]})
+        ledger.add(_by_line[key])
+    thing = _by_line[key]
+
+    @functools.wraps(callback)
+    def call(*args: Any, **kwargs: Any) -> Any:
+        run = thing.begin()
+        raised = True
+        try:
+            with _OnThread(thing, None):
+                result = callback(*args, **kwargs)
+            raised = False
+        finally:
+            with quiet():
+                thing.end(run, raised)
+        with quiet():
+            if expected is not None and not isinstance(result, expected):
+                _bad_return(kind, callback, result, expected)
+        return result
+
+    return call

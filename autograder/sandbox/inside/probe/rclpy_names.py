@@ -1,0 +1,88 @@
+"""Every private name of rclpy that the probe uses, and whether the installed rclpy still has them.
+
+Written for rclpy 7.1, the one of Jazzy. What rclpy promises to everyone is used where it is needed.
+"""
+
+import inspect
+from collections.abc import Iterator
+from typing import Any
+
+TAKES = ("_take_timer", "_take_subscription", "_take_service")
+"""Methods of `Executor` that take what is ready and return the coroutine function that runs its callback."""
+TAKE_ANSWER = "_take_client"
+SET_PARAMETERS = "_set_parameters_atomically"
+"""Of `Node`: what every way of setting parameters comes to."""
+REGISTER_TRANSITION = "_LifecycleNodeMixin__register_callback"
+RUN_CALLBACK = "await_or_execute"
+"""What runs a callback: a function, imported by name into each module that uses it."""
+
+
+def callers_of_callbacks(rclpy: Any) -> tuple[Any, ...]:
+    """Return the modules that have `RUN_CALLBACK`."""
+    return rclpy.executors, rclpy.action.server, rclpy.action.client
+
+
+def nodes_of(executor: Any) -> list[Any]:
+    """Return an executor's nodes; its own `get_nodes` would wait for its lock."""
+    return list(executor._nodes)
+
+
+def thread_count(executor: Any) -> int | None:
+    """Return how many threads a multi-threaded executor has."""
+    count: int | None = getattr(getattr(executor, "_executor", None), "_max_workers", None)
+    return count
+
+
+def is_of_a_rate(group: Any, node: Any) -> bool:
+    """Whether a callback group is the one of the timers below the `Rate`s of a node."""
+    return group is not None and group is getattr(node, "_rate_group", None)
+
+
+def action_callbacks(server: Any) -> tuple[Any, Any, Any]:
+    """Return what runs a goal of an action server, what accepts one, and what cancels one."""
+    return server._execute_callback, server._goal_callback, server._cancel_callback
+
+
+def lifecycle_state(node: Any) -> str:
+    """Return the name of a lifecycle node's state."""
+    return str(node._state_machine.current_state[1])
+
+
+def moved(rclpy: Any) -> list[str]:
+    """Return a sentence for each of these names that the installed rclpy does not have, or has otherwise.
+
+    Asked before anything is wrapped.
+    """
+    return [
+        f"The probe uses {name} of rclpy, which the installed version {what}." for name, what in _differences(rclpy)
+    ]
+
+
+def _differences(rclpy: Any) -> Iterator[tuple[str, str]]:
+    functions = [(rclpy.executors.Executor, name, 2) for name in (*TAKES, TAKE_ANSWER)]
+    functions += [(module, RUN_CALLBACK, 2) for module in callers_of_callbacks(rclpy)]
+    functions += [(rclpy.lifecycle.LifecycleNodeMixin, REGISTER_TRANSITION, 3)]
+    for owner, name, count in functions:
+        function = getattr(owner, name, None)
+        if function is None:
+            yield f"{owner.__name__}.{name}", "does not have"
+        elif len(inspect.signature(function).parameters) != count:
+            yield f"{owner.__name__}.{name}", "calls with other arguments"
+    if not hasattr(rclpy.node.Node, SET_PARAMETERS):
+        yield f"Node.{SET_PARAMETERS}", "does not have"
+    if not hasattr(rclpy.lifecycle.node._rclpy.LifecycleStateMachine, "current_state"):
+        yield "LifecycleStateMachine.current_state", "does not have"
+    # What an object only gets when it is made is found among the names that the code which makes it uses.
+    for owner, method, name in (
+        (rclpy.executors.Executor, "__init__", "_nodes"),
+        (rclpy.executors.MultiThreadedExecutor, "__init__", "_executor"),
+        (rclpy.executors.ThreadPoolExecutor, "__init__", "_max_workers"),
+        (rclpy.node.Node, "__init__", "_rate_group"),
+        (rclpy.action.ActionServer, "register_execute_callback", "_execute_callback"),
+        (rclpy.action.ActionServer, "register_goal_callback", "_goal_callback"),
+        (rclpy.action.ActionServer, "register_cancel_callback", "_cancel_callback"),
+        (rclpy.lifecycle.LifecycleNodeMixin, "__init__", "_state_machine"),
+    ):
+        code = getattr(getattr(owner, method, None), "__code__", None)
+        if code is None or name not in code.co_names:
+            yield f"{owner.__name__}.{name}", "does not have"

@@ -1,0 +1,108 @@
+"""Becoming a program: a forked process turns into the one that `python NAME.py` would be, and runs the file."""
+
+import builtins
+import contextlib
+import faulthandler
+import fcntl
+import importlib
+import linecache
+import os
+import signal
+import sys
+import traceback
+import types
+
+from .kernel import PR_SET_DUMPABLE, filter_calls, limit, prctl
+from .probe import attach
+from .requests import Start
+
+STACK_SIGNAL = signal.SIGRTMIN + 10
+"""At this signal a program writes its threads' stacks. `sandbox/running_program.py` sends it."""
+
+_EVENTS, _STACKS = 3, 4
+"""The descriptors that the probe and the stacks are written to."""
+
+_OWN = os.path.dirname(os.path.abspath(__file__)) + os.sep
+
+
+def become(start: Start) -> None:
+    """Turn this forked child into the process that the program expects: descriptors, limits, environment."""
+    os.setsid()
+    if not start.hidden:
+        prctl(PR_SET_DUMPABLE, 1)
+    _take_descriptors(start)
+    with contextlib.suppress(OSError):
+        os.sched_setaffinity(0, start.cpus)
+    if len(start.cpus) < start.cores:  # rclpy takes as many threads as this says: the same number on every machine
+        pretended = set(range(start.cores))
+        os.sched_getaffinity = lambda _pid: pretended
+    os.environ.clear()
+    os.environ.update(start.env)
+    os.chdir(os.path.dirname(start.path))
+    for name, value in start.limits.items():
+        limit(name, value)
+    sys.stdin = open(0, closefd=False)
+    sys.stdout = open(1, "w", encoding="utf-8", errors="backslashreplace", buffering=1, closefd=False)
+    sys.stderr = open(2, "w", encoding="utf-8", errors="backslashreplace", buffering=1, closefd=False)
+    vars(sys).update(__stdin__=sys.stdin, __stdout__=sys.stdout, __stderr__=sys.stderr)
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    faulthandler.register(STACK_SIGNAL, file=_STACKS, all_threads=True, chain=False)
+    filter_calls(start.filter)
+
+
+def _take_descriptors(start: Start) -> None:
+    """Put the program's descriptors where it looks for them, and close all others."""
+    spare = [os.dup(descriptor) for descriptor in (start.output, start.events, start.stacks)]
+    nothing = os.open(os.devnull, os.O_RDONLY)
+    moved = [fcntl.fcntl(descriptor, fcntl.F_DUPFD_CLOEXEC, 64) for descriptor in (nothing, *spare)]
+    os.dup2(moved[0], 0)
+    os.dup2(moved[1], 1)
+    os.dup2(moved[1], 2)
+    os.dup2(moved[2], _EVENTS, inheritable=False)
+    os.dup2(moved[3], _STACKS, inheritable=False)
+    os.closerange(_STACKS + 1, 4096)
+
+
+def run(start: Start) -> None:
+    """Run the program as `python NAME.py` would: its own `__main__`, its own frames in a traceback."""
+    folder = os.path.dirname(start.path)
+    sys.argv = [start.path, *start.args]
+    sys.orig_argv = [sys.executable, *sys.argv]
+    sys.path.insert(0, folder)  # not before: what the launcher loads is never one of a student's files
+    linecache.clearcache()
+    importlib.invalidate_caches()
+    sys.excepthook = _print_own_frames
+    main = types.ModuleType("__main__")
+    main.__file__ = start.path
+    main.__builtins__ = builtins  # type: ignore[attr-defined]
+    sys.modules["__main__"] = main
+    with contextlib.suppress(Exception):
+        attach.begin(_EVENTS, folder)
+    with open(start.path, "rb") as file:
+        source = file.read()
+    exec(compile(source, start.path, "exec", dont_inherit=True), main.__dict__)
+
+
+def _print_own_frames(kind: type[BaseException], error: BaseException, trace: types.TracebackType | None) -> None:
+    if isinstance(error, MemoryError):
+        attach.note_memory_error()
+    seen: set[int] = set()
+    link: BaseException | None = error
+    while link is not None and id(link) not in seen:
+        seen.add(id(link))
+        link.__traceback__ = _without_kit(link.__traceback__)
+        link = link.__cause__ or link.__context__
+    traceback.print_exception(kind, error, error.__traceback__)
+
+
+def _without_kit(trace: types.TracebackType | None) -> types.TracebackType | None:
+    """The traceback without the frames of the launcher and the probe."""
+    kept: list[types.TracebackType] = []
+    while trace is not None:
+        if not trace.tb_frame.f_code.co_filename.startswith(_OWN):
+            kept.append(trace)
+        trace = trace.tb_next
+    result: types.TracebackType | None = None
+    for entry in reversed(kept):
+        result = types.TracebackType(result, entry.tb_frame, entry.tb_lasti, entry.tb_lineno)
+    return result

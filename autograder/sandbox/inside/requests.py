@@ -1,0 +1,73 @@
+"""What is said on the sockets: JSON, one packet each, with descriptors beside it.
+
+To the launcher, with one end of a further SOCK_SEQPACKET pair, on which the first process of the new launch answers:
+    {"namespaces", "disk", "inodes", "limits", "filter", "program_filter"}
+To a first process, with the descriptors (output, events, stacks):
+    {"id", "path", "args", "env", "cpus", "cores"}
+Its answers: {"first": true} with its pidfd, {"ready": true} or {"broken": why}, {"started": id} with a pidfd,
+    {"failed": id, "why"}, {"ended": id, "status"}.
+"""
+
+import contextlib
+import json
+import os
+import socket
+from typing import Any
+
+
+class Launch:
+    """A launch that was asked for, and the socket on which its first process answers."""
+
+    def __init__(self, packet: bytes, channel: socket.socket) -> None:
+        """Read the request.
+
+        Raises:
+            KeyError: it lacks something.
+        """
+        request = json.loads(packet)
+        self.channel = channel
+        self.namespaces: bool = request["namespaces"]
+        self.disk: int = request["disk"]
+        self.inodes: int = request["inodes"]
+        self.limits: dict[str, int] = request["limits"]
+        self.filter = bytes.fromhex(request["filter"])
+        self.program_filter = bytes.fromhex(request["program_filter"])
+
+
+class Start:
+    """A program that was asked for, and the descriptors that came with it."""
+
+    def __init__(self, packet: bytes, descriptors: list[int], launch: Launch) -> None:
+        """Read the request; the rest holds for the whole launch.
+
+        Raises:
+            KeyError: it lacks something.
+        """
+        request = json.loads(packet)
+        self.id: int = request["id"]
+        self.path: str = request["path"]
+        self.args: list[str] = request["args"]
+        self.env: dict[str, str] = request["env"]
+        self.cpus: list[int] = request["cpus"]
+        self.cores: int = request["cores"]
+        self.limits = launch.limits
+        self.filter = launch.program_filter
+        # From the other programs of the launch: its memory and its settings. Without namespaces the limits of memory
+        # could not be held: who counts it is no more than its equal there.
+        self.hidden = launch.namespaces
+        self.output, self.events, self.stacks = descriptors
+
+
+def answer(channel: socket.socket, said: dict[str, Any]) -> None:
+    """Send an answer. Ends this process if nobody is left to answer to."""
+    try:
+        channel.send(json.dumps(said).encode())
+    except OSError:
+        os._exit(0)
+
+
+def hand_over(channel: socket.socket, said: dict[str, Any], handle: int) -> None:
+    """Send an answer with a pidfd, if the kernel takes it, and close the pidfd."""
+    with contextlib.suppress(OSError):
+        socket.send_fds(channel, [json.dumps(said).encode()], [handle])
+    os.close(handle)

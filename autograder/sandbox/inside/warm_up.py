@@ -1,0 +1,53 @@
+"""Loading, once and before any fork, what every program needs."""
+
+import contextlib
+import gc
+import importlib
+
+from .kernel import PR_SET_CHILD_SUBREAPER, PR_SET_DUMPABLE, libc, prctl
+from .probe import attach
+
+_MODULES = (
+    "rclpy",
+    "rclpy.action",
+    "rclpy.callback_groups",
+    "rclpy.executors",
+    "rclpy.lifecycle",
+    "rclpy.node",
+    "rclpy.parameter",
+    "rclpy.qos",
+    "builtin_interfaces.msg",
+    "geometry_msgs.msg",
+    "lifecycle_msgs.srv",
+    "rcl_interfaces.srv",
+    "sensor_msgs.msg",
+    "std_msgs.msg",
+    "std_srvs.srv",
+)
+_TYPES = ("std_msgs.msg:String", "std_msgs.msg:Int32", "std_srvs.srv:Trigger", "std_srvs.srv:SetBool")
+
+
+def warm_up() -> None:
+    """Load what programs need, without joining a ROS domain."""
+    prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
+    # The ROS libraries' tracer (LTTng) starts threads when it is loaded, and ends them when the process exits. A fork
+    # has not got them, and crashes at its very end. Handlers run last in first out: this one, from before anything
+    # was loaded, runs after every destructor of C++ objects and before the libraries' own finish.
+    libc.on_exit(libc._exit, None)
+    for name in _MODULES:
+        with contextlib.suppress(ImportError):
+            importlib.import_module(name)
+    with contextlib.suppress(Exception):
+        import rclpy
+
+        rclpy.get_rmw_implementation_identifier()  # loads the middleware
+        for name in _TYPES:
+            module, kind = name.split(":")
+            # Private to the message packages' generator; without it the first message loads it, in every program.
+            getattr(importlib.import_module(module), kind).__class__.__import_type_support__()
+    with contextlib.suppress(Exception):
+        attach.prepare()
+    gc.collect()
+    gc.freeze()  # the collector would write to every object, and so unshare every page
+    # After the imports: no program can trace a process of these, or open their memory or descriptors, from here on.
+    prctl(PR_SET_DUMPABLE, 0)
