@@ -367,19 +367,19 @@ def test_an_action_is_followed_from_the_goal_to_its_end(grade: Grade) -> None:
         with launch("counter") as ros:
             short = ros.send_goal("/count", Fibonacci, Fibonacci.Goal(order=30))
             ended = short.wait_for_result(within=10)
-            ros.expect_that(ended and short.status == "succeeded", "it succeeds", observed=short.status)
-            ros.expect_that(list(short.result.sequence) == list(range(30)), "its result", observed=short.result)
+            ros._expect_that(ended and short.status == "succeeded", "it succeeds", observed=short.status)
+            ros._expect_that(list(short.result.sequence) == list(range(30)), "its result", observed=short.result)
             lengths = [len(feedback.sequence) for feedback in short.feedback]
-            ros.expect_that(lengths == list(range(1, 31)), "all feedback, in order", observed=lengths)
+            ros._expect_that(lengths == list(range(1, 31)), "all feedback, in order", observed=lengths)
             endless = ros.send_goal("/count", Fibonacci, Fibonacci.Goal(order=100_000))
-            ros.expect_that(endless.wait_for_feedback(3, within=10), "feedback while it runs")
-            ros.expect_that(endless.result is None, "no result while it runs")
-            ros.expect_that(endless.cancel() and endless.wait_for_result(within=10), "cancelling is agreed to")
-            ros.expect_that(endless.status == "canceled", "and done", observed=endless.status)
-            ros.expect_that(len(endless.result.sequence) >= 3, "with what was counted", observed=endless.result)
+            ros._expect_that(endless.wait_for_feedback(3, within=10), "feedback while it runs")
+            ros._expect_that(endless.result is None, "no result while it runs")
+            ros._expect_that(endless.cancel() and endless.wait_for_result(within=10), "cancelling is agreed to")
+            ros._expect_that(endless.status == "canceled", "and done", observed=endless.status)
+            ros._expect_that(len(endless.result.sequence) >= 3, "with what was counted", observed=endless.result)
             refused = ros.send_goal("/count", Fibonacci, Fibonacci.Goal(order=-1))
-            ros.expect_that(refused.accepted is False, "a goal below zero is rejected")
-            ros.expect_that(not refused.cancel(), "and cannot be cancelled")
+            ros._expect_that(refused.accepted is False, "a goal below zero is rejected")
+            ros._expect_that(not refused.cancel(), "and cannot be cancelled")
         ros.score(2)
         """,
         counter__py=COUNTER,
@@ -457,8 +457,8 @@ def test_what_is_true_in_another_form_holds_and_none_at_all_means_silence(grade:
             ros.expect_messages("/chatter", String, where=lambda m: re.match("hello", m.data),
                                 values=lambda heard: np.all([m.data for m in heard]))
             ros.expect_messages("/chatter", String, values=lambda heard: re.match("hello", heard[0].data))
-            ros.expect_messages("/nothing", String, at_most=0, window=0.2)
-            ros.expect_messages("/chatter", String, at_most=0, window=2)
+            ros.expect_messages("/nothing", String, at_most=0, for_seconds=0.2)
+            ros.expect_messages("/chatter", String, at_most=0, for_seconds=2)
         ros.score(2)
         """,
         talker__py=TALKER,
@@ -496,7 +496,7 @@ def test_a_launch_file_starts_the_course_s_program_in_place_of_a_student_s(grade
         course = Node("talker", arguments_of_its_own=("first",))
         with launch_file("a.launch.yaml", {"side": "left"}, package="lab", programs={"robot": course}) as ros:
             ros.expect_node("/left_robot")
-            ros.require(ros.nodes[0].arguments()[:2] == ["first", "word"], "Both have their words")
+            ros.require(ros.descriptions()[0].arguments()[:2] == ["first", "word"], "Both have their words")
         ros.score(2)
         """
     result = grade(check, talker__py=TALKER, robot__py="raise ValueError(1)\n", a__launch__yaml=LAUNCHED % "")
@@ -663,7 +663,7 @@ def test_what_a_message_sets_off_is_heard_from_the_first_one_on(grade: Grade) ->
             with launch("echo") as ros:
                 ros.listen("/heard", String)
                 ros.publish("/say", String(data="once"))
-                ros.expect_messages("/heard", String, exactly=1, window=0.05, within=3)
+                ros.expect_messages("/heard", String, exactly=1, for_seconds=0.05, within=3)
         ros.score(2)
         """,
         echo__py=ECHO,

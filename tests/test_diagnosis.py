@@ -45,10 +45,10 @@ def answers(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, tupl
     for start in range(0, len(names), TOGETHER):
         batch = names[start : start + TOGETHER]
         with launch(*batch) as ros:
-            programs = {node.program: program for node, program in ros.programs}
+            programs = {node.program: program for node, program in ros._running.programs}
 
             def scene_of(name: str) -> Scene:
-                return Scene(ros.observer, [programs[name]], [], folder, [[]])  # noqa: B023
+                return Scene(ros._running.observer, [programs[name]], [], folder, [[]])  # noqa: B023
 
             def answered(name: str) -> bool:
                 case, scene = CASES[name], scene_of(name)
@@ -60,7 +60,7 @@ def answers(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, tupl
                 return (said.code if said else "") == case.says
 
             for name in batch:
-                ros.observer.wait(lambda: answered(name), 8.0)  # noqa: B023
+                ros.wait(lambda: answered(name), 8.0)  # noqa: B023
     yield found
     runtime.current.close()
 
@@ -121,9 +121,10 @@ def test_where_a_program_runs_twice_the_node_of_one_is_not_the_misplaced_node_of
     (tmp_path / "twin.py").write_text(LATE)
     runtime.current.configure(tmp_path, Isolation.NONE, 7)
     with launch(Node("twin", namespace="/first"), Node("twin", namespace="/late"), Node("twin")) as ros:
-        ros.observer.wait(lambda: {"/first/twin", "/twin"} <= set(ros.observer.nodes()), 20.0)
-        ros.observer.wait(lambda: all(inside.attached for inside in ros.scene().insides), 20.0)
-        late, astray = [autograder.diagnosis.why_no_node(ros.scene(), f"/{where}/twin") for where in ("late", "astray")]
+        ros.wait(lambda: {"/first/twin", "/twin"} <= set(ros.nodes()), 20.0)
+        ros.wait(lambda: all(inside.attached for inside in ros._running.scene().insides), 20.0)
+        scene = ros._running.scene()
+        late, astray = [autograder.diagnosis.why_no_node(scene, f"/{where}/twin") for where in ("late", "astray")]
     runtime.current.close()
     assert late.code == "no-node" and "runs, but" in late.because
     assert astray.code == "namespace" and "namespace: `/twin`." in astray.because

@@ -138,8 +138,8 @@ def test_an_observer_keeps_what_it_has_room_for_and_lets_the_rest_go_by() -> Non
         "from autograder.checks import launch\nfrom autograder.graph import observer\nfrom std_msgs.msg import String\n"
         "observer.RECORDED = 600_000\n"
         "with launch('flood', listen=[('/flood', String)]) as ros:\n"
-        "    full = ros.observer.wait(lambda: not ros.observer.room_for(0), 20)\n"
-        "    texts = [len(one.msg.data) for one in ros.observer.record('/flood', String).messages]\n"
+        "    full = ros.wait(lambda: not ros._running.observer.room_for(0), 20)\n"
+        "    texts = [len(one.msg.data) for one in ros._running.observer.record('/flood', String).messages]\n"
         "    outcomes.passed(f'{full} {0 < len(texts) < 11} {set(texts)}')\n"
         "score(1)"
     )

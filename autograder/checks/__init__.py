@@ -4,7 +4,7 @@ from autograder.checks import vary
 from autograder.checks.answers import answers
 from autograder.checks.command_line import command_line
 from autograder.checks.forms import NAME_OR_NONE
-from autograder.checks.launch import launch, launch_file
+from autograder.checks.launching import launch, launch_file
 from autograder.checks.program import Node
 
 __all__ = ["NAME_OR_NONE", "Node", "answers", "command_line", "launch", "launch_file", "vary"]

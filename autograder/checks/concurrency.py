@@ -33,7 +33,7 @@ class _Event:
     stamp: float
 
 
-class Activity:
+class Concurrency:
     """The begins and ends on one topic of `std_msgs/String`."""
 
     def __init__(self, received: Sequence[Received]) -> None:

@@ -13,12 +13,16 @@ from types import FrameType
 from typing import NoReturn
 
 from autograder.checks import findings, runtime
+from autograder.checks.misuse import place_of
 from autograder.core.results import Outcome, Status
 from autograder.course.markers import MORE_AT_GRADING, hidden_lines
 from autograder.graph.observer import ForgedGraph
 
 _PACKAGE = str(Path(__file__).resolve().parent.parent)
 
+
+_NOT_CELLS = (_PACKAGE, sys.base_prefix, "<frozen")
+"""How the names of files begin that are the kit's or the standard library's."""
 
 _FORGED = "A program has announced a node or a topic whose name is no text, below ROS, which allows no such name."
 
@@ -45,7 +49,8 @@ def ends_block(error: BaseException | None) -> bool:
         return True
     if runtime.current.front_end is not None or not isinstance(error, Exception):
         return False
-    unknown("The check itself broke", f"{type(error).__name__}: {error}")
+    place = place_of(error, lambda name: not name.startswith(_NOT_CELLS))
+    unknown("The check itself broke", f"{type(error).__name__}: {error}" + (f" ({place})" if place else ""))
     return True
 
 
@@ -130,7 +135,7 @@ def _check_frame() -> FrameType | None:
     frame: FrameType | None = sys._getframe(1)
     while frame is not None:
         filename = frame.f_code.co_filename
-        if not filename.startswith((_PACKAGE, sys.base_prefix, "<frozen")):
+        if not filename.startswith(_NOT_CELLS):
             return frame
         frame = frame.f_back
     return None
@@ -159,7 +164,7 @@ def _part_around(lines: Sequence[str], number: int) -> str:
     return ""
 
 
-_EXPECTS = re.compile(r"expect_|require$")
+_EXPECTS = re.compile(r"expect_|require(_equal)?$")
 _PART = re.compile(r"""\.part\(\s*("[^"]*"|'[^']*')""")
 
 

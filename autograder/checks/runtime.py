@@ -30,6 +30,8 @@ class Runtime:
         self.random = random.Random()
         self._sandbox: NodeSandbox | None = None
         self._domains = free_domains()
+        self.launched = False
+        """Whether a launch runs: one at a time."""
 
     def configure(
         self, folder: Path, isolation: Isolation, seed: int, answers: Mapping[str, bool] | None = None

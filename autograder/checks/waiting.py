@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 from typing import Any
 
+from autograder.checks.misuse import refuse_times
 from autograder.diagnosis import Diagnosis
 
 _WAITS_FOR = {
@@ -20,6 +21,7 @@ _WAITS_FOR = {
     "expect_match": "both ends of `{}`",
     "expect_messages": "messages on `{}`",
     "expect_silence": "silence on `{}`",
+    "expect_period": "runs of callbacks, told on `{}`",
     "expect_runs": "runs of callbacks, told on `{}`",
     "expect_overlap": "callbacks that overlap, told on `{}`",
     "expect_no_overlap": "runs of callbacks, told on `{}`",
@@ -42,6 +44,7 @@ _WAITS_FOR = {
     "set_parameter": "an answer of `{}`",
     "send_goal": "the action `{}`",
     "publish": "a subscription on `{}`",
+    "wait_for_graph": "what `ros.wait_for_graph` asks for",
     "wait": "what `ros.wait` asks for",
 }
 
@@ -66,14 +69,17 @@ def watched(launch: type) -> type:
 
 
 def _says(method: Any, sentence: str) -> Any:
+    look_at_times = refuse_times(method)
+
     @functools.wraps(method)
     def call(self: Any, *args: Any, **kwargs: Any) -> Any:
+        look_at_times(args, kwargs)
         first = next(iter([*args, *kwargs.values()]), "")
-        if self.watch is None or not self.watch.begin(sentence.format(first if isinstance(first, str) else "it")):
+        if self._watch is None or not self._watch.begin(sentence.format(first if isinstance(first, str) else "it")):
             return method(self, *args, **kwargs)
         try:
             return method(self, *args, **kwargs)
         finally:
-            self.watch.end()
+            self._watch.end()
 
     return call

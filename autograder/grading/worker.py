@@ -15,12 +15,12 @@ import resource
 import signal
 import sys
 import time
-import traceback
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, TextIO
 
 from autograder.checks import findings, runtime
+from autograder.checks.misuse import place_of
 from autograder.checks.scoring import Score
 from autograder.core.results import CellResult, CheckResult, NodeLog, Outcome, Status
 from autograder.course.lab import Cell
@@ -134,8 +134,8 @@ def _run_cell(cell: Cell, number: int, namespace: dict[str, Any]) -> tuple[str, 
         if isinstance(last, ast.Expr):
             value = eval(compile(ast.Expression(last.value), filename, "eval"), namespace)
     except Exception as error:
-        where = traceback.extract_tb(error.__traceback__)[-1]
-        return f"{type(error).__name__}: {error} ({where.name}, line {where.lineno})", None
+        place = place_of(error, lambda name: name == filename)
+        return f"{type(error).__name__}: {error}" + (f" ({place})" if place else ""), None
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0.0)
     return "", value

@@ -5,17 +5,17 @@ from __future__ import annotations
 import contextlib
 from collections import Counter
 from dataclasses import replace
-from typing import Any, Literal
+from functools import cached_property
+from typing import Literal
 
 from rcl_interfaces.srv import ListParameters
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from autograder import diagnosis
 from autograder.checks import outcomes
-from autograder.checks.expect.expectations import SETTLE, WITHIN, ExpectationBase
-from autograder.core.errors import KitError
+from autograder.checks.expect.expectations import WITHIN, Expectations
+from autograder.checks.running import SETTLE
 from autograder.diagnosis import Diagnosis
-from autograder.graph import qos
 from autograder.graph.names import full_name, type_name
 from autograder.graph.services import ServiceMissing, call_all
 
@@ -25,43 +25,42 @@ GONE_WITHIN = 2.0
 """Seconds that an absence may take to show, for example after a node was stopped."""
 
 
-class GraphExpectations(ExpectationBase):
+class GraphExpectations(Expectations):
     """What must be on the graph, and what must not."""
 
-    def prepare(self) -> None:
-        """Set up what is known of the nodes."""
-        super().prepare()
-        self._built: set[str] = set()
+    @cached_property
+    def _built(self) -> set[str]:
         """Nodes that have answered, or had their time to."""
+        return set()
 
     def expect_node(self, name: str, *, within: float = WITHIN, hint: str = "") -> None:
         """The node with this full name is on the graph, exactly once."""
         title = f"The node `{name}` is on the graph"
-        if not self.wait_for_graph(lambda: name in self.observer.nodes(), within):
-            self.fail(
+        if not self.wait_for_graph(lambda: name in self._observer.nodes(), within):
+            self._fail(
                 title,
-                diagnosis.why_no_node(self.scene(), name),
+                diagnosis.why_no_node(self._scene(), name),
                 expected=name,
-                observed=", ".join(self.observer.nodes()) or "no node",
+                observed=", ".join(self._observer.nodes()) or "no node",
                 hint=hint,
             )
         self._settle(name)
-        if name not in self.observer.nodes() or self.gone_program():
+        if name not in self._observer.nodes() or self._running.gone_program():
             # A program that dies takes its node off the graph first and prints its traceback after that.
-            self.observer.wait(self.gone_program, SETTLE)
-            self.fail(
+            self._observer.wait(self._running.gone_program, SETTLE)
+            self._fail(
                 title,
-                diagnosis.why_no_node(self.scene(), name),
+                diagnosis.why_no_node(self._scene(), name),
                 expected=name,
                 observed="it was there, and went away",
                 hint=hint,
             )
-        if self.observer.nodes().count(name) > 1:
-            self.fail(
+        if self._observer.nodes().count(name) > 1:
+            self._fail(
                 title,
-                diagnosis.why_doubled(self.scene(), name),
+                diagnosis.why_doubled(self._scene(), name),
                 expected="one node of this name",
-                observed=", ".join(self.observer.nodes()),
+                observed=", ".join(self._observer.nodes()),
                 hint=hint,
             )
         outcomes.passed(title, observed=name)
@@ -75,33 +74,33 @@ class GraphExpectations(ExpectationBase):
         """
         with contextlib.suppress(ServiceMissing):
             call_all(
-                self.observer,
+                self._observer,
                 f"{name}/list_parameters",
                 ListParameters,
                 [ListParameters.Request()],
                 SETTLE / 2,
-                lambda: self.gone_program() is not None,
+                lambda: self._running.gone_program() is not None,
             )
 
     def expect_no_node(self, name: str, *, within: float = GONE_WITHIN, hint: str = "") -> None:
         """No node has this full name; use it after a positive expectation, which proves that the graph is known."""
-        gone = self.observer.wait(lambda: name not in self.observer.nodes(), within)
-        self.expect_that(
+        gone = self._observer.wait(lambda: name not in self._observer.nodes(), within)
+        self._expect_that(
             gone,
             f"No node is called `{name}`",
             lambda: Diagnosis(f"`{name}` is still on the graph.", "node-present"),
-            observed=", ".join(self.observer.nodes()),
+            observed=", ".join(self._observer.nodes()),
             hint=hint,
         )
 
     def expect_topic(self, topic: str, msg_type: type, *, within: float = WITHIN, hint: str = "") -> None:
         """The topic exists with this message type."""
         wanted = type_name(msg_type)
-        found = self.wait_for_graph(lambda: wanted in self.observer.topics().get(topic, []), within)
-        self.expect_that(
+        found = self.wait_for_graph(lambda: wanted in self._observer.topics().get(topic, []), within)
+        self._expect_that(
             found,
             f"The topic `{topic}` carries {wanted}",
-            lambda: diagnosis.why_no_endpoint(self.scene(), topic, msg_type, "publisher"),
+            lambda: diagnosis.why_no_endpoint(self._scene(), topic, msg_type, "publisher"),
             expected=f"{topic} ({wanted})",
             observed=lambda: self._topics(),
             hint=hint,
@@ -109,21 +108,21 @@ class GraphExpectations(ExpectationBase):
 
     def expect_no_topic(self, topic: str, *, within: float = GONE_WITHIN, hint: str = "") -> None:
         """Nobody publishes or subscribes to this topic."""
-        gone = self.observer.wait(lambda: topic not in self.observer.topics(), within)
-        self.expect_that(
+        gone = self._observer.wait(lambda: topic not in self._observer.topics(), within)
+        self._expect_that(
             gone,
             f"Nobody uses the topic `{topic}`",
-            lambda: diagnosis.why_topic_present(self.scene(), topic),
+            lambda: diagnosis.why_topic_present(self._scene(), topic),
             observed=lambda: self._topics(),
             hint=hint,
         )
 
     def _topics(self) -> str:
-        own = [t for t in sorted(self.observer.topics()) if t not in ("/rosout", "/parameter_events")]
+        own = [t for t in sorted(self._observer.topics()) if t not in ("/rosout", "/parameter_events")]
         return ", ".join(own) or "no topic"
 
     def _ends(self, topic: str, msg_type: type | None, kind: End, node: str) -> list[TopicEndpointInfo]:
-        ends = self.observer.publishers(topic) if kind == "publisher" else self.observer.subscriptions(topic)
+        ends = self._observer.publishers(topic) if kind == "publisher" else self._observer.subscriptions(topic)
         return [
             end
             for end in ends
@@ -151,8 +150,8 @@ class GraphExpectations(ExpectationBase):
         if found:
             reason = replace(reason, code=f"extra-{kind}")
         elif not number():
-            reason = diagnosis.why_no_endpoint(self.scene(), topic, msg_type, kind, node)
-        self.fail(
+            reason = diagnosis.why_no_endpoint(self._scene(), topic, msg_type, kind, node)
+        self._fail(
             title,
             reason,
             expected=f"{count} {kind}{'s' * (count != 1)} on {topic} ({type_name(msg_type)})",
@@ -180,8 +179,8 @@ class GraphExpectations(ExpectationBase):
         return ", ".join(owner if times == 1 else f"{owner} ({times})" for owner, times in sorted(owners.items()))
 
     def _expect_no_end(self, topic: str, kind: End, within: float, hint: str) -> None:
-        gone = self.observer.wait(lambda: not self._ends(topic, None, kind, ""), within)
-        self.expect_that(
+        gone = self._observer.wait(lambda: not self._ends(topic, None, kind, ""), within)
+        self._expect_that(
             gone,
             f"`{topic}` has no {kind}",
             lambda: Diagnosis(
@@ -198,99 +197,3 @@ class GraphExpectations(ExpectationBase):
     def expect_no_subscription(self, topic: str, *, within: float = GONE_WITHIN, hint: str = "") -> None:
         """Nobody subscribes to the topic."""
         self._expect_no_end(topic, "subscription", within, hint)
-
-    def expect_qos(
-        self,
-        topic: str,
-        *,
-        of: End = "publisher",
-        node: str = "",
-        within: float = WITHIN,
-        hint: str = "",
-        **policies: str | float | None,
-    ) -> None:
-        """The endpoint has these QoS policies.
-
-        Args:
-            topic: full name.
-            of: which end.
-            node: full name of its node, if the topic has several such ends.
-            within: seconds to wait for the endpoint.
-            hint: a pointer for the student.
-            policies: any of reliability, durability, liveliness (in words) and deadline, lifespan, lease (seconds, or
-                None for "never"). History and depth are not on the graph.
-        """
-        unknown = sorted(policies.keys() - qos.POLICIES)
-        if unknown or not policies:
-            raise KitError(
-                f"expect_qos knows no policy called {', '.join(unknown) or 'nothing'}.",
-                f"Policies on the graph are {', '.join(sorted(qos.POLICIES))}.",
-            )
-        wanted = ", ".join(f"{policy} {qos.in_words(value)}" for policy, value in policies.items())
-        title = f"The {of} on `{topic}` has {wanted}"
-        if not self.wait_for_graph(lambda: self._ends(topic, None, of, node), within):
-            self.fail(
-                title,
-                diagnosis.why_no_endpoint(self.scene(), topic, None, of, node),
-                expected=f"a {of} on {topic}",
-                observed=self._topics(),
-                hint=hint,
-            )
-        self._all_there(topic, of)
-        seen, wrong = [], []
-        for end in self._ends(topic, None, of, node):
-            owner, have = full_name(end.node_namespace, end.node_name), qos.describe(end.qos_profile)
-            seen.append(", ".join(f"{policy} {qos.in_words(have[policy])}" for policy in policies))
-            wrong += [
-                (
-                    policy,
-                    f"The {of} of `{owner}`: its {policy} is {qos.in_words(have[policy])}, not {qos.in_words(value)}.",
-                )
-                for policy, value in policies.items()
-                if not _same(have[policy], value)
-            ]
-        self.expect_that(
-            not wrong,
-            title,
-            lambda: Diagnosis(" ".join(dict.fromkeys(said for _, said in wrong)), f"qos-{wrong[0][0]}"),
-            expected=wanted,
-            observed="; ".join(seen),
-            hint=hint,
-        )
-
-    def _all_there(self, topic: str, kind: End) -> None:
-        """Wait until the nodes at this end are built: their constructors may be about to make further ends."""
-        for owner in {full_name(end.node_namespace, end.node_name) for end in self._ends(topic, None, kind, "")}:
-            if owner not in self._built:
-                self._built.add(owner)
-                self._settle(owner)
-
-    def expect_match(self, topic: str, *, within: float = WITHIN, hint: str = "") -> None:
-        """Every subscription to the topic accepts the QoS that every publisher of it offers."""
-        title = f"Publishers and subscriptions on `{topic}` match"
-
-        def ends(kind: End) -> list[TopicEndpointInfo]:
-            return self._ends(topic, None, kind, "")
-
-        if not self.wait_for_graph(lambda: ends("publisher") and ends("subscription"), within):
-            missing: End = "subscription" if ends("publisher") else "publisher"
-            self.fail(
-                title,
-                diagnosis.why_no_endpoint(self.scene(), topic, None, missing),
-                expected=f"a publisher and a subscription on {topic}",
-                observed=self._topics(),
-                hint=hint,
-            )
-        self._all_there(topic, "publisher")
-        self._all_there(topic, "subscription")
-        reasons = [
-            diagnosis.why_not_matched(self.scene(), topic, end.qos_profile, "publisher") for end in ends("subscription")
-        ]
-        reason = next((found for found in reasons if found), None)
-        self.expect_that(not reason, title, lambda: reason, hint=hint)
-
-
-def _same(have: Any, want: Any) -> bool:
-    if isinstance(want, (int, float)) and isinstance(have, (int, float)):
-        return abs(have - want) <= 1e-6 + 0.001 * abs(want)
-    return bool(have == want)

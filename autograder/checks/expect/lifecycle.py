@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 from typing import NoReturn
 
 from autograder import diagnosis
 from autograder.checks import outcomes
-from autograder.checks.expect.expectations import WITHIN
-from autograder.checks.expect.graph import GraphExpectations
+from autograder.checks.expect.expectations import WITHIN, Expectations
 from autograder.diagnosis import Diagnosis
 from autograder.graph.lifecycle import Change, LifecycleClient, Requested, in_order
 from autograder.graph.parameters import NoAnswer
@@ -18,36 +18,35 @@ WORD_FROM_INSIDE = 0.5
 """Seconds that a failed check waits for what the student's process says about it."""
 
 
-class LifecycleExpectations(GraphExpectations):
+class LifecycleExpectations(Expectations):
     """What state a node must be in, and how it got there."""
 
-    def prepare(self) -> None:
-        """Set up the lifecycle clients."""
-        super().prepare()
-        self._lifecycle_clients: dict[str, LifecycleClient] = {}
+    @cached_property
+    def _lifecycle_clients(self) -> dict[str, LifecycleClient]:
+        return {}
 
     def watch_transitions(self, node: str) -> LifecycleClient:
         """Record a node's state changes from now on; its events are volatile, so watch before it starts."""
         if node not in self._lifecycle_clients:
-            self._lifecycle_clients[node] = LifecycleClient(self.observer, node)
+            self._lifecycle_clients[node] = LifecycleClient(self._observer, node)
         return self._lifecycle_clients[node]
 
     def _unreachable(self, title: str, node: str, error: Exception, hint: str) -> NoReturn:
-        scene = self.scene()
+        scene = self._scene()
         if isinstance(error, NoAnswer):
             reason = diagnosis.why_no_answer(scene, f"{node}/get_state")
-        elif node in self.observer.nodes():
+        elif node in self._observer.nodes():
             reason = diagnosis.program_trouble(scene) or Diagnosis(
                 f"`{node}` is not a lifecycle node: it offers no `{node}/get_state`.", "not-lifecycle"
             )
         else:
             reason = diagnosis.why_no_node(scene, node)
-        self.fail(title, reason, expected=node, observed=", ".join(self.observer.nodes()), hint=hint)
+        self._fail(title, reason, expected=node, observed=", ".join(self._observer.nodes()), hint=hint)
 
     def state(self, node: str, *, within: float = WITHIN) -> str:
         """Label of a node's current state."""
         try:
-            return self.watch_transitions(node).state(within, self.without_node(node))
+            return self.watch_transitions(node).state(within, self._without(node))
         except (ServiceMissing, NoAnswer) as error:
             self._unreachable(f"`{node}` tells its lifecycle state", node, error, "")
 
@@ -57,10 +56,10 @@ class LifecycleExpectations(GraphExpectations):
         """A lifecycle node is in this state, or gets there within `within` seconds."""
         title = f"`{node}` is {state}"
         try:
-            seen = self.watch_transitions(node).wait_for_state(state, within, self.without_node(node))
+            seen = self.watch_transitions(node).wait_for_state(state, within, self._without(node))
         except (ServiceMissing, NoAnswer) as error:
             self._unreachable(title, node, error, hint)
-        self.expect_that(
+        self._expect_that(
             seen == state,
             title,
             lambda: Diagnosis(because, code or "state") if because else self._why_state(node, seen, state),
@@ -76,15 +75,15 @@ class LifecycleExpectations(GraphExpectations):
         """What the programs say of themselves: it takes another way than the node's answer, and may come later."""
 
         def look() -> Diagnosis | None:
-            return diagnosis.program_trouble(self.scene()) or diagnosis.inside_reason(self.scene())
+            return diagnosis.program_trouble(self._scene()) or diagnosis.inside_reason(self._scene())
 
-        self.observer.wait(look, WORD_FROM_INSIDE)
+        self._observer.wait(look, WORD_FROM_INSIDE)
         return look()
 
     def available_transitions(self, node: str, *, within: float = WITHIN) -> Mapping[str, str]:
         """Labels of the transitions that a node offers now, each with the state it leads to."""
         try:
-            return self.watch_transitions(node).available(within, self.without_node(node))
+            return self.watch_transitions(node).available(within, self._without(node))
         except (ServiceMissing, NoAnswer) as error:
             self._unreachable(f"`{node}` tells its transitions", node, error, "")
 
@@ -102,13 +101,13 @@ class LifecycleExpectations(GraphExpectations):
         """
         title = f"`{node}`: {label}" + {"success": " succeeds", "failure": " does not succeed", None: ""}[expect]
         try:
-            done = self.watch_transitions(node).transition(label, within, self.without_node(node))
+            done = self.watch_transitions(node).transition(label, within, self._without(node))
         except (ServiceMissing, NoAnswer) as error:
             self._unreachable(title, node, error, hint)
         if expect is None:
             return done
         if not done.offered:
-            self.fail(
+            self._fail(
                 title,
                 Diagnosis(
                     f"`{node}` is {done.before}; from there it offers {', '.join(done.available) or 'nothing'}.",
@@ -119,7 +118,7 @@ class LifecycleExpectations(GraphExpectations):
                 hint=hint,
             )
         if expect == "success" and not done.success:
-            self.fail(
+            self._fail(
                 title,
                 self._what_they_say()
                 or Diagnosis(
@@ -131,7 +130,7 @@ class LifecycleExpectations(GraphExpectations):
                 hint=hint,
             )
         if expect == "failure" and done.success:
-            self.fail(
+            self._fail(
                 title,
                 Diagnosis(f"It succeeded; the node is {done.after} now.", "transition-succeeded"),
                 expected="no success",
@@ -150,9 +149,9 @@ class LifecycleExpectations(GraphExpectations):
     ) -> None:
         """A node took exactly these steps (state left, state entered) since it is watched."""
         client = self.watch_transitions(node)
-        seen = [change.step for change in client.wait_for_changes(len(steps), within, self.without_node(node))]
+        seen = [change.step for change in client.wait_for_changes(len(steps), within, self._without(node))]
         told = ", ".join(f"{a} to {b}" for a, b in seen) or "no step"
-        self.expect_that(
+        self._expect_that(
             seen == list(steps),
             f"`{node}` goes " + ", ".join(f"{a} to {b}" for a, b in steps),
             lambda: self._what_they_say() or Diagnosis(f"It went {told}.", "transitions"),

@@ -1,0 +1,87 @@
+"""Facts that a check has established itself and states in its own words."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from autograder import diagnosis
+from autograder.checks import outcomes
+from autograder.checks.expect.expectations import Expectations
+from autograder.diagnosis import Diagnosis
+
+
+class Facts(Expectations):
+    """What a check requires."""
+
+    def require(
+        self,
+        condition: object,
+        title: str,
+        *,
+        expected: str = "",
+        observed: str = "",
+        because: str = "",
+        hint: str = "",
+        code: str = "",
+    ) -> None:
+        """State a fact: passed if `condition` is true in Python's sense.
+
+        Where the programs themselves went wrong, the diagnosis of that is the reason. That one of them ended is none if
+        the check gives a reason of its own: it knows whether that program had to go on.
+
+        Args:
+            condition: anything; `None`, `0` and what is empty count as false.
+            title: what is required, as a sentence without its full stop.
+            expected: in words, for the report.
+            observed: in words, for the report.
+            because: what is wrong if it does not hold.
+            hint: a pointer for the student.
+            code: of that reason.
+
+        Example:
+            `ros.require(reply.success, "The order is accepted", because=reply.message)`
+
+        Codes:
+            `code`, by default `required` with a reason and `failed` without.
+        """
+        if condition:
+            outcomes.passed(title, expected=expected, observed=observed)
+            return
+        self._running.settle_programs()
+        scene = self._scene()
+        found = (diagnosis.program_trouble(scene), diagnosis.inside_reason(scene))
+        # Where the check has a reason, these say less: they are what a program looks like that does nothing more.
+        vague = ("exited", "not-spinning", "spinning-ended") if because else ()
+        trouble = next((one for one in found if one and one.code not in vague), None)
+        reason = trouble or (Diagnosis(because, code or "required") if because else None)
+        self._fail(title, reason, expected=expected, observed=observed, hint=hint)
+
+    def require_equal(
+        self, title: str, observed: Any, expected: Any, *, because: str = "", hint: str = "", code: str = "content"
+    ) -> None:
+        """State that two values are equal; the report shows both.
+
+        Args:
+            title: what is required, as a sentence without its full stop.
+            observed: the value that was found.
+            expected: the value that is right.
+            because: what is wrong if they differ; by default that it is the one value and not the other.
+            hint: a pointer for the student.
+            code: of that reason.
+
+        Example:
+            `ros.require_equal("The total is right", total.data, sum(numbers))`
+
+        Codes:
+            `code`, by default `content`.
+        """
+        have, want = _in_words(observed), _in_words(expected)
+        because = because or f"It is {have}, not {want}."
+        self.require(observed == expected, title, expected=want, observed=have, because=because, hint=hint, code=code)
+
+
+def _in_words(value: Any) -> str:
+    """A value for the report: a list as its elements, none of them as `none`."""
+    if isinstance(value, (list, tuple)):
+        return ", ".join(str(one) for one in value) or "none"
+    return str(value)

@@ -1,0 +1,100 @@
+"""Looking at the launch: what is on its graph, and what its programs print. Nothing here is an outcome."""
+
+from __future__ import annotations
+
+from rclpy.topic_endpoint_info import TopicEndpointInfo
+
+from autograder.checks.expect.expectations import Expectations
+from autograder.checks.misuse import Misuse
+from autograder.checks.program import Node
+
+
+class Looking(Expectations):
+    """What there is to see, at this moment."""
+
+    def nodes(self) -> list[str]:
+        """Full names of the nodes on the graph now; two nodes of one name are listed twice.
+
+        Example:
+            `ros.wait(lambda: "/talker" in ros.nodes())`
+        """
+        return self._observer.nodes()
+
+    def topics(self) -> dict[str, list[str]]:
+        """Topics on the graph now, each with the names of its message types.
+
+        Example:
+            `images = [topic for topic, types in ros.topics().items() if "sensor_msgs/msg/Image" in types]`
+        """
+        return self._observer.topics()
+
+    def publishers(self, topic: str) -> list[TopicEndpointInfo]:
+        """Publishers of a topic now, those of the check left out.
+
+        Args:
+            topic: full name.
+
+        Example:
+            `names = [end.node_name for end in ros.publishers("/chatter")]`
+        """
+        return self._observer.publishers(topic)
+
+    def subscriptions(self, topic: str) -> list[TopicEndpointInfo]:
+        """Subscriptions to a topic now, those of the check left out.
+
+        Args:
+            topic: full name.
+
+        Example:
+            `depths = [end.qos_profile.deadline for end in ros.subscriptions("/chatter")]`
+        """
+        return self._observer.subscriptions(topic)
+
+    def programs(self) -> list[str]:
+        """Names of the programs that this launch has started so far, ended ones included.
+
+        Example:
+            `ros.require(ros.programs(), "The words start the camera")`
+        """
+        return [program.name for _, program in self._running.programs]
+
+    def descriptions(self) -> list[Node]:
+        """What this launch was asked to start, or what its launch file starts: programs with their arguments.
+
+        Example:
+            `starts = len(ros.descriptions())`
+        """
+        return list(self._running.described)
+
+    def pause(self, for_seconds: float) -> None:
+        """Let the programs run for exactly so long: for experiments in which the length of a time matters.
+
+        Args:
+            for_seconds: how long, in seconds. To wait for something, use `wait` or an expectation.
+
+        Example:
+            `ros.pause(0.5)`
+        """
+        if for_seconds < 0:
+            raise Misuse(f"pause: {for_seconds!r} is no time; it is a number of seconds, 0 or more.")
+        self._observer.pause(for_seconds)
+
+    def seen_at_once(self, program: str, kind: str, name: str = "") -> int | None:
+        """How many runs of a program's callbacks of one kind were seen at once inside it: evidence for reasons only.
+
+        Args:
+            program: its name.
+            kind: `timer`, `subscription` or `service`: the highest number of runs of one of them.
+            name: full name of its topic or service, if several are of that kind.
+
+        Returns:
+            None where the inside of the program cannot be seen.
+
+        Example:
+            `most = ros.seen_at_once("worker", "timer")`
+        """
+        for inside in self._scene().insides:
+            things = [t for t in inside.callbacks if t.kind == kind and (not name or t.name == name)]
+            if inside.name == program and inside.attached and things:
+                return max(thing.most for thing in things)
+        return None

@@ -1,0 +1,96 @@
+"""Expectations of what goes on while a callback runs or a service is being called."""
+
+from __future__ import annotations
+
+from autograder import diagnosis
+from autograder.checks import outcomes
+from autograder.checks.expect.concurrency import ConcurrencyExpectations
+from autograder.checks.expect.expectations import WITHIN
+from autograder.checks.expect.offering import Offering
+from autograder.checks.expect.sources import SourceExpectations
+from autograder.diagnosis import Diagnosis
+
+
+class MeanwhileExpectations(ConcurrencyExpectations, SourceExpectations, Offering):
+    """What must go on meanwhile."""
+
+    def messages_during(
+        self, topic: str, msg_type: type, *, callback: str = "", activity: str = "", service: str = ""
+    ) -> list[int]:
+        """How many messages on `topic` were published during each run of a callback or each call of a service so far.
+
+        Args:
+            topic: full name of the topic whose messages are counted, by the publisher's stamps.
+            msg_type: their class.
+            callback: a callback that publishes `NAME begin` and `NAME end` (`std_msgs/String`) ...
+            activity: ... on this topic.
+            service: or a service that the check offers (`serve`): from a request's arrival to its answer.
+        """
+        if service:
+            spans = self.served(service)
+        else:
+            spans = [(span.begin, span.end) for span in self.concurrency(activity).spans() if span.name == callback]
+        stamps = [received.stamp for received in self._observer.record(topic, msg_type).messages]
+        return [sum(1 for stamp in stamps if begin < stamp < end) for begin, end in spans]
+
+    def expect_messages_during(
+        self,
+        topic: str,
+        msg_type: type,
+        *,
+        callback: str = "",
+        activity: str = "",
+        service: str = "",
+        at_least: int = 1,
+        runs: int = 3,
+        within: float = WITHIN,
+        hint: str = "",
+    ) -> None:
+        """Messages go on while a slow callback runs, or while the node waits for a service.
+
+        One run with enough messages is enough: a busy machine may have stopped the whole node during another.
+
+        Args:
+            topic: as for `messages_during`, like `msg_type`, `callback`, `activity` and `service`.
+            msg_type: message class.
+            callback: name in `activity`.
+            activity: topic of begins and ends.
+            service: full name of an offered service, instead of a callback.
+            at_least: messages.
+            runs: complete runs (or answered calls) to look at before giving up.
+            within: seconds.
+            hint: a pointer for the student.
+        """
+        title = f"`{topic}` goes on while " + (f"`{service}` is being called" if service else f"`{callback}` runs")
+
+        def counts() -> list[int]:
+            return self.messages_during(topic, msg_type, callback=callback, activity=activity, service=service)
+
+        def enough() -> bool:
+            return max(counts(), default=0) >= at_least
+
+        self.wait(lambda: enough() or len(counts()) >= runs, within)
+        self._observer.wait(enough, 0.2)  # the last messages may come after the end that lies behind them
+        seen = counts()
+        if not enough():
+            if not service and not seen:
+                self._wait_for_runs(activity, [callback], 1, title, 0.0, hint)
+            told = ", ".join(str(count) for count in seen) or "no complete run"
+            scene = self._scene()
+            self._fail(
+                title,
+                diagnosis.program_trouble(scene)
+                or diagnosis.inside_reason(scene)
+                or diagnosis.waits_for_its_group(scene)
+                or diagnosis.why_not_together(scene, activity or topic)
+                or Diagnosis(
+                    f"The most that came on `{topic}` in one run is {max(seen, default=0)}. "
+                    + diagnosis.layout(scene, activity or topic),
+                    "paused",
+                ),
+                expected=f"at least {at_least} messages in one run",
+                observed=told,
+                hint=hint,
+            )
+        self._one_source(title, topic, msg_type, "", 1, self._observer.record(topic, msg_type).messages)
+        outcomes.passed(title, observed=", ".join(str(count) for count in seen))

@@ -1,0 +1,31 @@
+"""Services that the check offers to the student's clients."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cached_property
+from typing import Any
+
+from autograder.checks.expect.expectations import Expectations
+from autograder.graph.services import OfferedService
+
+
+class Offering(Expectations):
+    """What the check answers."""
+
+    @cached_property
+    def _offered(self) -> dict[str, OfferedService]:
+        return {}
+
+    def serve(self, name: str, srv_type: type, answer: Callable[[Any, Any], Any], delay: float = 0.0) -> OfferedService:
+        """Offer a service to the student's client; each answer comes after `delay` seconds."""
+        self._offered[name] = OfferedService(self._observer, name, srv_type, answer, delay)
+        return self._offered[name]
+
+    def requests(self, name: str) -> list[Any]:
+        """Requests that have reached a service offered by `serve`."""
+        return list(self._offered[name].requests)
+
+    def served(self, name: str) -> list[tuple[float, float]]:
+        """When requests to a service offered by `serve` arrived and were answered, seconds on the system clock."""
+        return list(self._offered[name].served)

@@ -1,0 +1,93 @@
+"""Sending: messages from the check to the student's nodes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cached_property
+from typing import Any
+
+from rclpy.qos import QoSProfile
+
+from autograder import diagnosis
+from autograder.checks.expect.expectations import WITHIN
+from autograder.checks.expect.graph import GraphExpectations
+from autograder.graph.stream import Stream
+
+RELIABLE_DEEP = 1000
+"""Depth of the check's own publishers, so that a burst of its own is never cut."""
+
+MATCHES_WITHIN = 1.0
+"""Seconds to wait for the check's recordings before it sends something that may be answered at once."""
+
+
+class Publishing(GraphExpectations):
+    """What the check sends."""
+
+    @cached_property
+    def _publishers(self) -> dict[tuple[str, str], Any]:
+        return {}
+
+    def open_publisher(self, topic: str, msg_type: type, *, qos: QoSProfile | int = RELIABLE_DEEP) -> Any:
+        """Make the publisher that a later `publish` uses, before the program subscribes.
+
+        A best-effort subscription hears only what comes after it has matched, and only the program can tell when that
+        is: one that is made after the publisher has matched it by the time its other messages arrive.
+        """
+        profile = qos if isinstance(qos, QoSProfile) else QoSProfile(depth=qos)
+        key = (topic, str(profile))  # its repr would tell objects apart, not policies
+        if key not in self._publishers:
+            self._publishers[key] = self._observer.publisher(topic, msg_type, profile)
+        return self._publishers[key]
+
+    def publish(
+        self,
+        topic: str,
+        *messages: Any,
+        qos: QoSProfile | int = RELIABLE_DEEP,
+        within: float = WITHIN,
+        hint: str = "",
+    ) -> None:
+        """Send messages to the student's node, after its subscription has matched, and the recordings what answers.
+
+        What the messages set off is heard from the first one on if its topic is recorded: `listen` before.
+        A missing or incompatible subscription is a failed outcome with its reason.
+        """
+        msg_type = type(messages[0])
+        profile = qos if isinstance(qos, QoSProfile) else QoSProfile(depth=qos)
+        publisher = self.open_publisher(topic, msg_type, qos=profile)
+        self._wait_until_heard(publisher.get_subscription_count, topic, msg_type, profile, within, hint)
+        self._observer.wait(self._observer.hears_all, MATCHES_WITHIN)
+        for message in messages:
+            publisher.publish(message)
+
+    def _wait_until_heard(
+        self, matched: Callable[[], int], topic: str, msg_type: type, profile: QoSProfile, within: float, hint: str
+    ) -> None:
+        """Wait until a subscription has matched a publisher of the observer's; fail with what keeps them apart."""
+        if self.wait_for_graph(matched, within):
+            return
+        reason = diagnosis.why_not_matched(self._scene(), topic, profile, "subscription") or diagnosis.why_no_endpoint(
+            self._scene(), topic, msg_type, "subscription"
+        )
+        self._fail(
+            f"A node listens to `{topic}`",
+            reason,
+            expected=f"a subscription on {topic}",
+            observed=self._topics(),
+            hint=hint,
+        )
+
+    def stream(self, topic: str, message: Any, *, rate: float, qos: QoSProfile) -> Stream:
+        """A message that is sent again and again, as by a sensor or a controller, between `start()` and `stop()`.
+
+        Args:
+            topic: full name; a node of the student's must subscribe to it with a profile that matches.
+            message: what is sent.
+            rate: hertz.
+            qos: what is offered.
+        """
+
+        def expect_heard(matched: Callable[[], int]) -> None:
+            self._wait_until_heard(matched, topic, type(message), qos, WITHIN, "")
+
+        return Stream(self._observer, topic, message, rate, qos, expect_heard)

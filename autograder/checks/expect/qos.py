@@ -1,0 +1,161 @@
+"""Expectations of QoS: what the ends of a topic offer and request, and whether they match."""
+
+from __future__ import annotations
+
+from typing import Any, get_args
+
+from rclpy.topic_endpoint_info import TopicEndpointInfo
+
+from autograder import diagnosis
+from autograder.checks.expect.expectations import WITHIN
+from autograder.checks.expect.graph import End, GraphExpectations
+from autograder.checks.misuse import Misuse
+from autograder.diagnosis import Diagnosis
+from autograder.graph import qos
+from autograder.graph.names import full_name
+
+_WORDS = {
+    "reliability": ("reliable", "best_effort"),
+    "durability": ("volatile", "transient_local"),
+    "liveliness": ("automatic", "manual_by_topic"),
+}
+"""What the policies that are not times can be."""
+
+Policies = dict[str, str | float | None]
+
+
+class QosExpectations(GraphExpectations):
+    """What QoS the ends of a topic must have."""
+
+    def expect_qos(
+        self,
+        topic: str,
+        *,
+        of: End = "publisher",
+        node: str = "",
+        within: float = WITHIN,
+        hint: str = "",
+        **policies: str | float | None,
+    ) -> None:
+        """Every end of one kind on the topic has these QoS policies.
+
+        Args:
+            topic: full name.
+            of: which ends, `publisher` or `subscription`.
+            node: full name of the node whose ends are meant; by default everybody's are.
+            within: seconds until there must be such an end.
+            hint: a pointer for the student.
+            policies: any of `reliability` (`reliable`, `best_effort`), `durability` (`volatile`, `transient_local`),
+                `liveliness` (`automatic`, `manual_by_topic`), and in seconds, or None for "never", `deadline`,
+                `lifespan` and `lease`. History and depth are not on the graph.
+
+        Example:
+            `ros.expect_qos("/map", reliability="reliable", durability="transient_local")`
+
+        Codes:
+            `qos-reliability` and so on by the policy, and those of `expect_publisher` and `expect_subscription`.
+        """
+        _refuse_misspelt(of, policies)
+        wanted = _in_words(policies, policies)
+        title = f"The {of} on `{topic}` has {wanted}"
+        if not self.wait_for_graph(lambda: self._ends(topic, None, of, node), within):
+            self._fail(
+                title,
+                diagnosis.why_no_endpoint(self._scene(), topic, None, of, node),
+                expected=f"a {of} on {topic}",
+                observed=self._topics(),
+                hint=hint,
+            )
+        self._all_there(topic, of)
+        ends = self._ends(topic, None, of, node)
+        wrong = [found for end in ends for found in _differences(end, of, policies)]
+        self._expect_that(
+            not wrong,
+            title,
+            lambda: Diagnosis(" ".join(dict.fromkeys(said for _, said in wrong)), f"qos-{wrong[0][0]}"),
+            expected=wanted,
+            observed="; ".join(_in_words(policies, qos.describe(end.qos_profile)) for end in ends),
+            hint=hint,
+        )
+
+    def _all_there(self, topic: str, kind: End) -> None:
+        """Wait until the nodes at this end are built: their constructors may be about to make further ends."""
+        for owner in {full_name(end.node_namespace, end.node_name) for end in self._ends(topic, None, kind, "")}:
+            if owner not in self._built:
+                self._built.add(owner)
+                self._settle(owner)
+
+    def expect_match(self, topic: str, *, within: float = WITHIN, hint: str = "") -> None:
+        """Every subscription to the topic accepts the QoS that every publisher of it offers.
+
+        Args:
+            topic: full name.
+            within: seconds until there must be a publisher and a subscription.
+            hint: a pointer for the student.
+
+        Example:
+            `ros.expect_match("/scan")`
+
+        Codes:
+            those of `expect_publisher` and `expect_subscription`, and `qos-mismatch`.
+        """
+        title = f"Publishers and subscriptions on `{topic}` match"
+
+        def ends(kind: End) -> list[TopicEndpointInfo]:
+            return self._ends(topic, None, kind, "")
+
+        if not self.wait_for_graph(lambda: ends("publisher") and ends("subscription"), within):
+            missing: End = "subscription" if ends("publisher") else "publisher"
+            self._fail(
+                title,
+                diagnosis.why_no_endpoint(self._scene(), topic, None, missing),
+                expected=f"a publisher and a subscription on {topic}",
+                observed=self._topics(),
+                hint=hint,
+            )
+        self._all_there(topic, "publisher")
+        self._all_there(topic, "subscription")
+        reasons = [
+            diagnosis.why_not_matched(self._scene(), topic, end.qos_profile, "publisher")
+            for end in ends("subscription")
+        ]
+        reason = next((found for found in reasons if found), None)
+        self._expect_that(not reason, title, lambda: reason, hint=hint)
+
+
+def _refuse_misspelt(of: str, policies: Policies) -> None:
+    if of not in get_args(End):
+        raise Misuse(f"expect_qos: of={of!r} is neither 'publisher' nor 'subscription'.")
+    unknown = sorted(policies.keys() - qos.POLICIES)
+    if unknown or not policies:
+        known = ", ".join(sorted(qos.POLICIES))
+        raise Misuse(f"expect_qos knows no policy called {', '.join(unknown) or 'nothing'}. It knows {known}.")
+    for policy, value in policies.items():
+        words = _WORDS.get(policy)
+        if words is not None and value not in words:
+            raise Misuse(f"expect_qos: {policy}={value!r} is neither {' nor '.join(map(repr, words))}.")
+        if words is None and not (value is None or (isinstance(value, (int, float)) and value > 0)):
+            raise Misuse(f"expect_qos: {policy}={value!r} is no time; it is a number of seconds above 0, or None.")
+
+
+def _in_words(policies: Policies, values: Policies) -> str:
+    return ", ".join(f"{policy} {qos.in_words(values[policy])}" for policy in policies)
+
+
+def _differences(end: TopicEndpointInfo, kind: str, policies: Policies) -> list[tuple[str, str]]:
+    """The policies of an end that are not as they should be, each with a sentence."""
+    owner, have = full_name(end.node_namespace, end.node_name), qos.describe(end.qos_profile)
+    return [
+        (
+            policy,
+            f"The {kind} of `{owner}`: its {policy} is {qos.in_words(have[policy])}, not {qos.in_words(value)}.",
+        )
+        for policy, value in policies.items()
+        if not _same(have[policy], value)
+    ]
+
+
+def _same(have: Any, want: Any) -> bool:
+    if isinstance(want, (int, float)) and isinstance(have, (int, float)):
+        return abs(have - want) <= 1e-6 + 0.001 * abs(want)
+    return bool(have == want)

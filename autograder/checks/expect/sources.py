@@ -1,0 +1,48 @@
+"""Whose messages arrive: from one publisher, and from the node that is meant."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+
+from autograder.checks.expect.graph import GraphExpectations
+from autograder.diagnosis import Diagnosis
+from autograder.graph.names import full_name
+from autograder.graph.recording import Received
+
+
+class SourceExpectations(GraphExpectations):
+    """What expectations of messages ask of their publishers."""
+
+    def _one_source(
+        self, title: str, topic: str, msg_type: type, node: str, publishers: int, received: Sequence[Received]
+    ) -> None:
+        """Fail if the messages may come from another publisher than the one that is meant."""
+        if not received:
+            return
+        ends = self._ends(topic, msg_type, "publisher", "")
+        owners = [full_name(end.node_namespace, end.node_name) for end in ends]
+        named = ", ".join(sorted(owners))
+        if len(ends) > publishers:
+            self._fail(
+                title,
+                Diagnosis(
+                    f"`{topic}` has {len(ends)} publishers ({named}): it cannot be told whose messages these are.",
+                    "extra-publisher",
+                    "Publish on this topic from one place only.",
+                ),
+                expected=f"{publishers} publisher",
+                observed=f"{len(ends)} publishers",
+            )
+        if publishers == 1 and _numbers_repeat(received):
+            because = f"The messages on `{topic}` come from more than one publisher (their sequence numbers repeat)."
+            self._fail(title, Diagnosis(because, "extra-publisher"), expected="one publisher")
+        if node and node not in owners:
+            named = named or "nobody any more"
+            because = f"The messages on `{topic}` come from {named}, not from `{node}`."
+            self._fail(title, Diagnosis(because, "wrong-node"), expected=node, observed=named)
+
+
+def _numbers_repeat(received: Sequence[Received]) -> bool:
+    """Each publisher counts its own messages: a second one, gone by now, shows as a number that comes again."""
+    return any(later.sequence <= earlier.sequence for earlier, later in itertools.pairwise(received))

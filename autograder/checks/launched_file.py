@@ -1,0 +1,64 @@
+"""A student's launch file, and what of the course's stands in for a part of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from autograder.checks import runtime
+from autograder.checks.program import Node
+from autograder.launch_files import read_launch_file
+
+
+@dataclass(frozen=True)
+class LaunchedFile:
+    """What is read, and with what words."""
+
+    name: str
+    arguments: Mapping[str, str]
+    package: str
+    """The package that the student's programs are said to be in."""
+    stand_ins: Mapping[str, Node]
+    """The course's own program in place of the one that the file names."""
+    includes: Mapping[str, str]
+    """The course's own launch file in place of the one that the file includes."""
+    namespace: str
+    """As if another file included this one after `push_ros_namespace`."""
+
+    def nodes(self) -> list[Node]:
+        """What the file starts.
+
+        Raises:
+            LaunchFileError: it cannot be read.
+        """
+        folder = runtime.current.folder.resolve()
+
+        def find(wanted: str) -> Path:
+            if wanted != self.package:
+                raise KeyError(wanted)
+            return folder
+
+        programs = set(self.stand_ins) or {path.stem for path in folder.glob("*.py")}
+        runtime.current.use(self.name)
+        found = read_launch_file(folder / self.name, self.arguments, find, programs, self.includes, self.namespace)
+        return [
+            self._stand_in(
+                Node(
+                    one.program,
+                    ros_arguments=one.ros_arguments(),
+                    arguments_of_its_own=one.arguments,
+                    environment=one.environment,
+                    warnings=one.warnings,
+                )
+            )
+            for one in found
+        ]
+
+    def _stand_in(self, node: Node) -> Node:
+        """The course's own program in place of the student's, if the check has one, started with the same words."""
+        course = self.stand_ins.get(node.program)
+        if course is None:
+            return node
+        own = [*course.arguments_of_its_own, *node.arguments_of_its_own]
+        return replace(node, program=course.program, arguments_of_its_own=own)

@@ -1,0 +1,48 @@
+"""Mistakes of a check's author: refused at once, with the line of the check cell, and never a student's failure."""
+
+from __future__ import annotations
+
+import inspect
+import linecache
+import traceback
+from collections.abc import Callable, Mapping
+from typing import Any
+
+_TIMES = ("within", "for_seconds")
+
+
+class Misuse(Exception):
+    """A check asks for something that makes no sense. The message says what, and what to write instead."""
+
+
+def place_of(error: BaseException, is_cells: Callable[[str], bool]) -> str:
+    """Where in the check cell an error arose, as `line 3: ros.expect_node("/talker")`; empty if it was not there.
+
+    Args:
+        error: that was raised.
+        is_cells: whether a file name is that of a check cell.
+    """
+    frames = [frame for frame in traceback.extract_tb(error.__traceback__) if is_cells(frame.filename)]
+    if not frames or frames[-1].lineno is None:
+        return ""
+    line = linecache.getline(frames[-1].filename, frames[-1].lineno).strip()
+    return f"line {frames[-1].lineno}: {line}" if line else f"line {frames[-1].lineno}"
+
+
+def refuse_times(method: Callable[..., Any]) -> Callable[[tuple[Any, ...], Mapping[str, Any]], None]:
+    """Return what looks through the arguments of a call to `method` for times that are none.
+
+    Raises:
+        Misuse: (when called) a time is negative, or no number.
+    """
+    parameters = inspect.signature(method).parameters.values()
+    places = {one.name: place for place, one in enumerate(parameters) if one.name in _TIMES}
+    by_place = {one.name for one in parameters if one.kind is one.POSITIONAL_OR_KEYWORD}
+
+    def look(args: tuple[Any, ...], kwargs: Mapping[str, Any]) -> None:
+        for name, place in places.items():
+            value = kwargs.get(name, args[place - 1] if name in by_place and len(args) >= place else 0)
+            if isinstance(value, bool) or not isinstance(value, (int, float)) or not value >= 0:
+                raise Misuse(f"{method.__name__}: {name}={value!r} is no time; it is a number of seconds, 0 or more.")
+
+    return look

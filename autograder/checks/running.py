@@ -1,0 +1,82 @@
+"""A launch that runs: its observer, its programs, and what became of them."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+from autograder.checks import runtime
+from autograder.checks.program import Node
+from autograder.checks.settling import Settling
+from autograder.diagnosis import Diagnosis, Scene
+from autograder.graph.observer import Observer
+from autograder.sandbox.nodes import Program
+
+SETTLE = 2.0
+"""Seconds that a new program may take to show that it lives."""
+
+AFTER_EXIT = 0.3
+"""Seconds that evidence may still be under way after the last program has ended."""
+
+
+class Running:
+    """What the expectations of one launch know of its programs.
+
+    Its `observer` is there from the moment the launch begins.
+    """
+
+    observer: Observer
+
+    def __init__(self) -> None:
+        """Begin without programs."""
+        self.described: list[Node] = []
+        """What the launch was asked to start."""
+        self.programs: list[tuple[Node, Program]] = []
+        """What has been started."""
+        self.missing: list[str] = []
+        """Programs that no cell has written."""
+        self.trouble: list[Diagnosis] = []
+        """Why a program, or the whole launch file, could not be started."""
+        self.stopped: list[Program] = []
+        """Programs that the check itself has stopped."""
+        self.may_end: list[Program] = []
+        """Programs that the check itself has stopped, or that are asked to end by themselves."""
+        self._ended: float | None = None
+
+    def scene(self) -> Scene:
+        """The launch as the diagnosis sees it."""
+        return Scene(
+            self.observer,
+            [program for _, program in self.programs],
+            self.missing,
+            runtime.current.folder,
+            [node.all_rules() for node, _ in self.programs],
+            self.trouble,
+            self.stopped,
+        )
+
+    def all_ended(self) -> bool:
+        """Whether nothing can come any more: every program has ended (or none could be started), a moment ago."""
+        if any(program.running() for _, program in self.programs):
+            self._ended = None
+            return False
+        if self._ended is None:
+            self._ended = time.monotonic()
+        return time.monotonic() - self._ended > AFTER_EXIT
+
+    def hopeless_without(self, needs: Callable[[], object]) -> Callable[[], bool]:
+        """Return a question to ask while waiting: whether what needs this on the graph cannot come any more."""
+        settling = Settling(self.observer, [program for _, program in self.programs])
+        return lambda: self.all_ended() or (not needs() and settling.decided())
+
+    def gone_program(self) -> Program | None:
+        """A program that has ended by itself, though it had to go on: it failed, or it ended as the last one."""
+        ended = [program for _, program in self.programs if not program.running() and program not in self.may_end]
+        failed = [program for program in ended if program.exit_status() != 0]
+        last = ended if len(ended) == len(self.programs) else []
+        return next(iter(failed + last), None)
+
+    def settle_programs(self) -> None:
+        """Give a new program a moment to show what becomes of it, before something is held against it."""
+        youngest = max((program.began for _, program in self.programs), default=0.0)
+        self.observer.wait(self.gone_program, youngest + SETTLE - time.monotonic())
