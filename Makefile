@@ -10,10 +10,12 @@ ARGS ?=
 RUN := PATH="$(CURDIR)/.venv/bin:$$PATH"
 
 # Any Python 3 starts the set-up, which then looks for one that will do, or says what is missing.
+# Isolated, so that nothing of the shell's comes between; of the checkout it has to be told then.
 define set_up
-@for python in $(if $(PYTHON),"$(PYTHON)") python3 python3.14 python3.13 python3.12 python3.11; do \
+@BEGIN='import os, sys; sys.path.insert(0, os.getcwd()); from autograder.setup.bootstrap import main; sys.exit(main())'; \
+for python in $(if $(PYTHON),"$(PYTHON)") python3 python3.14 python3.13 python3.12 python3.11; do \
   if "$$python" -I -c 'import sys; sys.exit(sys.version_info < (3, 6))' 2>/dev/null; then \
-    exec "$$python" -I autograder/setup/bootstrap.py --python "$(PYTHON)" $(1); fi; done; \
+    exec "$$python" -I -c "$$BEGIN" --python "$(PYTHON)" $(1); fi; done; \
 echo "No Python was found. The kit needs Python 3.11 to 3.14." >&2; \
 echo "What to do: sudo apt-get install python3 python3-venv   or name one: make PYTHON=/path/to/python3.12" >&2; exit 2
 endef

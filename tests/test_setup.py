@@ -20,7 +20,9 @@ from pathlib import Path
 
 import pytest
 
-from autograder.setup import bootstrap
+from autograder.setup import refusals
+from autograder.setup.packages import pin
+from autograder.setup.places import MARKER
 
 ROOT = Path(__file__).resolve().parent.parent
 MAKE = shutil.which("make") or "make"
@@ -58,7 +60,7 @@ def check_out(folder: Path, *, whole_lock: bool = False) -> Path:
 
 
 def write_lock(folder: Path, lock: str, *packages: str) -> None:
-    (folder / lock).write_text("".join(bootstrap.pin("requirements.lock", package) for package in packages))
+    (folder / lock).write_text("".join(pin("requirements.lock", package) for package in packages))
 
 
 def make(folder: Path, *arguments: str, path: str | None = None, **environ: str) -> subprocess.CompletedProcess[str]:
@@ -188,14 +190,14 @@ def test_an_interrupted_environment_is_made_anew(tmp_path: Path) -> None:
 
     # A moved checkout is no longer finished: the scripts inside name the old place.
     moved = folder.rename(tmp_path / "elsewhere")
-    asked = "import bootstrap; print(bootstrap.read_marker())"
-    found = subprocess.run([BASE_PYTHON, "-c", asked], cwd=moved / "autograder", capture_output=True, text=True)
+    asked = "from autograder.setup.environment import read_marker; print(read_marker())"
+    found = subprocess.run([BASE_PYTHON, "-c", asked], cwd=moved, capture_output=True, text=True)
     assert found.stdout == "{}\n", found.stderr
 
 
 def test_the_active_environment_is_not_built_on_itself(small: Path) -> None:
     path = f"{small / '.venv' / 'bin'}:{ENVIRON['PATH']}"
-    (small / ".venv" / bootstrap.MARKER.name).unlink()
+    (small / ".venv" / MARKER.name).unlink()
     done = make(small, "setup", path=path, VIRTUAL_ENV=str(small / ".venv"))
     assert done.returncode == 0, done.stderr
     assert f": {small}" not in done.stderr
@@ -265,7 +267,7 @@ def test_without_network_it_says_so(tmp_path: Path) -> None:
     assert "index does not answer" in done.stderr
     assert "Connect to the network" in done.stderr
     assert "Traceback" not in done.stderr
-    assert not (folder / ".venv" / bootstrap.MARKER.name).exists()
+    assert not (folder / ".venv" / MARKER.name).exists()
 
 
 def test_pip_helps_where_uv_does_not_manage(tmp_path: Path) -> None:
@@ -305,18 +307,18 @@ def test_a_foreign_ros_is_refused(small: Path, variable: str, value: str) -> Non
 
 
 def test_a_sourced_jazzy_is_welcome() -> None:
-    assert not bootstrap.foreign_ros({"ROS_DISTRO": "jazzy", "AMENT_PREFIX_PATH": "/opt/ros/jazzy", "PYTHONPATH": "/x"})
+    assert not refusals.foreign_ros({"ROS_DISTRO": "jazzy", "AMENT_PREFIX_PATH": "/opt/ros/jazzy", "PYTHONPATH": "/x"})
 
 
 def test_other_machines_are_told_what_is_needed(monkeypatch: pytest.MonkeyPatch) -> None:
-    bootstrap.refuse_other_machines()
-    monkeypatch.setattr(bootstrap.platform, "machine", lambda: "aarch64")
-    with pytest.raises(bootstrap.SetUpError, match="Linux on x86_64"):
-        bootstrap.refuse_other_machines()
+    refusals.refuse_other_machines()
+    monkeypatch.setattr(refusals.platform, "machine", lambda: "aarch64")
+    with pytest.raises(refusals.SetUpError, match="Linux on x86_64"):
+        refusals.refuse_other_machines()
     monkeypatch.undo()
-    monkeypatch.setattr(bootstrap.platform, "libc_ver", lambda: ("glibc", "2.17"))
-    with pytest.raises(bootstrap.SetUpError, match=r"glibc 2\.17"):
-        bootstrap.refuse_other_machines()
+    monkeypatch.setattr(refusals.platform, "libc_ver", lambda: ("glibc", "2.17"))
+    with pytest.raises(refusals.SetUpError, match=r"glibc 2\.17"):
+        refusals.refuse_other_machines()
 
 
 def test_help_lists_every_target() -> None:
@@ -354,7 +356,7 @@ def test_an_ordinary_user_can_do_it(ordinary_folder: Path) -> None:
     if "needs Python" in done.stderr:
         pytest.skip("every Python here that would do is root's own")
     assert done.returncode == 0, done.stderr
-    assert (folder / ".venv" / bootstrap.MARKER.name).stat().st_uid == ORDINARY_USER
+    assert (folder / ".venv" / MARKER.name).stat().st_uid == ORDINARY_USER
 
 
 def test_a_checkout_of_somebody_elses_is_explained(ordinary_folder: Path) -> None:
@@ -385,8 +387,10 @@ def test_a_full_disk_is_explained(tmp_path: Path) -> None:
         pytest.skip("this machine lets nobody mount a small disk")
     steps = '"$@" && cp -r "$COPY/." "$DISK" && exec make -C "$DISK" setup'
     copy = tmp_path.with_name(f"{tmp_path.name} copy")
-    (copy / "autograder").mkdir(parents=True)
-    for name in ("Makefile", "autograder/setup/bootstrap.py"):
+    only_python = shutil.ignore_patterns("__pycache__")
+    for folder in ("setup", "core"):
+        shutil.copytree(ROOT / "autograder" / folder, copy / "autograder" / folder, ignore=only_python)
+    for name in ("Makefile", "autograder/__init__.py"):
         shutil.copy(ROOT / name, copy / name)
     for lock in ("requirements.lock", "requirements-dev.lock"):
         write_lock(copy, lock, "uv")

@@ -16,7 +16,10 @@ from rich.table import Table
 from rich.text import Text
 
 from autograder.sandbox.environment import profile_environment
-from autograder.setup import bootstrap
+from autograder.setup.environment import digest, read_marker
+from autograder.setup.interpreter import NEWEST, OLDEST
+from autograder.setup.places import ROOT, VENV
+from autograder.setup.refusals import SetUpError, refuse_foreign_ros
 
 GIB = 1 << 30
 NEEDED_SPACE = 2 * GIB
@@ -99,7 +102,7 @@ def show(findings: list[Finding], healthy: bool) -> None:
 def python() -> Finding:
     """Whether this Python is one that the ROS wheels exist for."""
     version = platform.python_version()
-    good = bootstrap.OLDEST <= sys.version_info[:2] <= bootstrap.NEWEST
+    good = OLDEST <= sys.version_info[:2] <= NEWEST
     do = "" if good else "Use Python 3.11 to 3.14: make setup PYTHON=/path/to/python3.12"
     return Finding("Python", good, f"{version}  {sys.executable}", do)
 
@@ -107,22 +110,22 @@ def python() -> Finding:
 def environment() -> Finding:
     """Whether `.venv` is finished and agrees with the lock."""
     name = "environment"
-    if Path(sys.prefix).resolve() != bootstrap.VENV:
+    if Path(sys.prefix).resolve() != VENV:
         return Finding(name, True, f"{sys.prefix} (not the kit's own .venv)")
-    state = bootstrap.read_marker()
+    state = read_marker()
     if not state:
-        return Finding(name, False, f"{bootstrap.VENV} is unfinished, or was moved", "Run: make setup")
-    old = [lock for lock, digest in state["locks"].items() if digest != bootstrap.digest(lock)]
+        return Finding(name, False, f"{VENV} is unfinished, or was moved", "Run: make setup")
+    old = [lock for lock, made_of in state["locks"].items() if made_of != digest(lock)]
     if old:
-        return Finding(name, False, f"{bootstrap.VENV} is older than {' and '.join(old)}", "Run: make setup")
-    return Finding(name, True, f"{bootstrap.VENV} agrees with {' and '.join(state['locks'])}")
+        return Finding(name, False, f"{VENV} is older than {' and '.join(old)}", "Run: make setup")
+    return Finding(name, True, f"{VENV} agrees with {' and '.join(state['locks'])}")
 
 
 def foreign_ros() -> Finding:
     """Whether this shell has another ROS distribution sourced."""
     try:
-        bootstrap.refuse_foreign_ros(os.environ)
-    except bootstrap.SetUpError as error:
+        refuse_foreign_ros(os.environ)
+    except SetUpError as error:
         return Finding("other ROS", False, error.what, error.do)
     return Finding("other ROS", True, "none is sourced in this shell")
 
@@ -174,7 +177,7 @@ def cores() -> Finding:
 
 def space() -> Finding:
     """Free space where results are written."""
-    folder = bootstrap.ROOT
+    folder = ROOT
     free = shutil.disk_usage(folder).free
     do = "" if free >= NEEDED_SPACE else f"Free {NEEDED_SPACE // GIB} GiB; make clean removes what was built."
     if not os.access(folder, os.W_OK):

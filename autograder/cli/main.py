@@ -12,7 +12,7 @@ from pathlib import Path
 from autograder.cli import check, grade, labs, machine, results  # noqa: F401  each registers its commands
 from autograder.cli.app import app
 from autograder.core.errors import KitError
-from autograder.setup.bootstrap import SetUpError, refuse_foreign_ros
+from autograder.setup.refusals import SetUpError, refuse_foreign_ros
 
 INTERRUPTED = 130
 """Exit status after Ctrl-C; Typer takes the KeyboardInterrupt and exits with it, saying nothing."""

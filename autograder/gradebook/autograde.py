@@ -23,13 +23,13 @@ from nbgrader.preprocessors import (
     NbGraderPreprocessor,
     OverwriteCells,
     OverwriteKernelspec,
-    SaveAutoGrades,
 )
 
 from autograder.core.errors import KitError
 from autograder.core.results import CheckResult, Isolation
 from autograder.course.lab import Lab, load_lab
 from autograder.gradebook.inert import UNDECIDED, InertAnswers, inert_text
+from autograder.gradebook.private_nbgrader import SaveScores, in_first_pass
 from autograder.grading.runner import Settings, run_submission
 from autograder.grading.store import ResultStore
 from autograder.report.html import check_html, render
@@ -70,7 +70,7 @@ class SubmissionExporter(NotebookExporter):  # type: ignore[misc]
 
     def from_filename(self, filename: str, resources: dict[str, Any] | None = None, **kwargs: Any) -> Any:
         """Rebuild the notebook in nbgrader's first pass; read what that pass wrote in the second."""
-        if not self.parent._sanitizing:
+        if not in_first_pass(self.parent):
             return super().from_filename(filename, resources=resources, **kwargs)
         resources = dict(resources or {})
         _, _, lab, path = _submitted(self.parent, resources)
@@ -122,18 +122,13 @@ def _attach(cell: Any, check: CheckResult | None) -> float | None:
     return check.points
 
 
-class SaveCheckedGrades(SaveAutoGrades):  # type: ignore[misc]
+class SaveCheckedGrades(SaveScores):
     """Records points of check cells from their results; without a verdict the cell waits for manual grading."""
 
-    def _add_score(self, cell: Any, resources: dict[str, Any]) -> None:
-        if utils.is_solution(cell) or cell.cell_type != "code":
-            super()._add_score(cell, resources)
-            return
-        grade_id = cell.metadata["nbgrader"]["grade_id"]
-        grade = self.gradebook.find_grade(grade_id, self.notebook_id, self.assignment_id, self.student_id)
-        grade.auto_score = resources[_POINTS].get(grade_id)
+    def score_check(self, grade: Any, resources: dict[str, Any]) -> None:
+        """Set the points that checking found."""
+        grade.auto_score = resources[_POINTS].get(grade.name)
         grade.needs_manual_grade = grade.auto_score is None or grade.manual_score is not None
-        self.gradebook.db.commit()
 
 
 SANITIZE = [ClearOutput, DeduplicateIds, OverwriteKernelspec, OverwriteCells, CheckCellMetadata]

@@ -6,14 +6,13 @@ import re
 from typing import Any
 
 from jinja2.bccache import Bucket, BytecodeCache
-from nbconvert.exporters import HTMLExporter
 from nbconvert.filters import Highlight2HTML
-from nbconvert.filters.widgetsdatatypefilter import WidgetsDataTypeFilter
 from nbconvert.preprocessors import CSSHTMLHeaderPreprocessor
 from nbgrader import utils
 from nbgrader.preprocessors import ClearMarkScheme, GetGrades
 
 from autograder.gradebook.inert import SanitizeOutputs
+from autograder.gradebook.private_nbconvert import LeanHTMLExporter
 from autograder.gradebook.released_notebook import HideTests
 
 
@@ -42,9 +41,6 @@ class _CompiledTemplates(BytecodeCache):
         self._codes[bucket.key] = bucket.bytecode_to_string()
 
 
-_COMPILED = _CompiledTemplates()
-
-
 _TOO_LONG_TO_COLOUR = re.compile(r"\s{200}|\S{400}")
 """No program looks like that, and the time that Pygments takes for it grows with the square of its length."""
 
@@ -57,27 +53,14 @@ class ColouredCode(Highlight2HTML):  # type: ignore[misc]
         return super().__call__(source, "text" if _TOO_LONG_TO_COLOUR.search(source) else language, metadata)
 
 
-class FeedbackExporter(HTMLExporter):  # type: ignore[misc]
-    """nbconvert's HTML in half the time, which is most of what a submission costs here.
+class FeedbackExporter(LeanHTMLExporter):
+    """The page that a student gets to read."""
 
-    It compiles the templates once, and leaves out the second parsing of the page: that gives images without a
-    description one, and nothing of a student's can become an image.
-    """
+    compiled = _CompiledTemplates()
 
-    def _create_environment(self) -> Any:
-        environment = super()._create_environment()
-        environment.bytecode_cache = _COMPILED
-        return environment
-
-    def from_notebook_node(self, nb: Any, resources: dict[str, Any] | None = None, **kwargs: Any) -> Any:
-        """Convert a notebook as HTMLExporter does before it parses its own page."""
-        resources = self._init_resources(resources)
-        self.register_filter("highlight_code", ColouredCode(pygments_lexer="ipython3", parent=self))
-        self.register_filter(
-            "filter_data_type",
-            WidgetsDataTypeFilter(notebook_metadata=self._nb_metadata, parent=self, resources=resources),
-        )
-        return super(HTMLExporter, self).from_notebook_node(nb, resources, **kwargs)
+    def colour(self) -> ColouredCode:
+        """Return what colours the code of the page."""
+        return ColouredCode(pygments_lexer="ipython3", parent=self)
 
 
 FEEDBACK = [GetGrades, HideTests, HideMarkScheme, SanitizeOutputs, CSSHTMLHeaderPreprocessor]

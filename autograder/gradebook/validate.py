@@ -8,21 +8,18 @@ from __future__ import annotations
 import os
 import textwrap
 from pathlib import Path
-from typing import Any
 
 from nbconvert.filters import ansi2html
-from nbgrader.converters.generate_solution import GenerateSolution
-from nbgrader.preprocessors import Execute
-from nbgrader.validator import Validator
 
 from autograder.core.errors import KitError
 from autograder.core.results import Isolation, Outcome, Status
+from autograder.gradebook.private_nbgrader import Verdicts, replace_execution
 from autograder.grading.runner import WORKERS_FOR_ONE, Settings, run_submission
 from autograder.report import words
 from autograder.report.audience import result_for
 from autograder.report.terminal import plain
 from autograder.sandbox.isolation import choose
-from autograder.setup.bootstrap import SetUpError, refuse_foreign_ros
+from autograder.setup.refusals import SetUpError, refuse_foreign_ros
 from autograder.submission.reader import lab_of
 
 _WIDTH = 80
@@ -30,34 +27,21 @@ _WIDTH = 80
 
 
 def install(root: Path) -> None:
-    """Put the course's way in place of nbgrader's, for this process.
-
-    nbgrader has no setting for it: the stages of its validator are not configurable. Its stage that executes is closed
-    as well, so that no other setting and no other door leads to it; only solutions, which are the instructor's own, may
-    still be executed.
+    """Put the course's way in place of nbgrader's, for this process, so that no setting and no other door leads there.
 
     Args:
         root: of the course whose checks are run.
     """
-    execute = Execute.preprocess
-
-    def validate(self: Any, filename: str) -> dict[str, list[dict[str, str]]]:
-        return verdicts(root, Path(filename), invert=self.invert)
-
-    def refuse(self: Any, nb: Any, resources: Any = None, km: Any = None) -> Any:
-        if isinstance(self.parent, GenerateSolution):
-            return execute(self, nb, resources, km)
-        raise KitError(
+    replace_execution(
+        lambda notebook, invert: verdicts(root, notebook, invert),
+        lambda: KitError(
             "nbgrader's own execution is closed in this course: it would run students' code in your session.",
             "Use `autograder grade`, or nbgrader's commands without settings for their stages.",
-        )
-
-    Validator.validate = validate
-    if execute.__name__ != refuse.__name__:
-        Execute.preprocess = refuse
+        ),
+    )
 
 
-def verdicts(root: Path, notebook: Path, invert: bool) -> dict[str, list[dict[str, str]]]:
+def verdicts(root: Path, notebook: Path, invert: bool) -> Verdicts:
     """Check a notebook in the sandbox, and return what did not pass in the form that nbgrader shows.
 
     Args:
