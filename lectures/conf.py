@@ -20,11 +20,13 @@ from autograder.sandbox.environment import profile_environment  # noqa: E402  (n
 # What the kernels inherit. The log folder must exist before rclpy starts.
 os.environ |= profile_environment() | {"ROS_DOMAIN_ID": str(next(free_domains())), "JUPYTER_PREFER_ENV_PATH": "1"}
 Path(os.environ["ROS_LOG_DIR"]).mkdir(parents=True, exist_ok=True)
+# A page that runs the command `autograder` means the one of this environment.
+os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])
 
 project = "ROS 2 in Python: executors, names, lifecycle, quality of service"
 author = "The course kit's authors"
 language = "en"
-extensions = ["myst_nb", "sphinx_revealjs", "slides"]
+extensions = ["myst_nb", "sphinx_revealjs", "slides", "reference"]
 exclude_patterns = ["_*"]
 pygments_style = "default"
 myst_enable_extensions = ["colon_fence", "deflist"]

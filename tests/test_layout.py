@@ -13,12 +13,13 @@ import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
 FOLDERS = {"lectures", "labs", "solutions", "autograder", "tests"}
-FILES = {"Makefile", "README.md", "LICENSE"}
+FILES = {"Makefile", "README.md", "LICENSE", "CHANGELOG.md", "CONTRIBUTING.md", "SECURITY.md"}
 DEMANDED_BY_TOOLS = {
     ".ci",
     ".devcontainer",
     ".github",
     ".gitignore",
+    ".pre-commit-config.yaml",
     "nbgrader_config.py",
     "pyproject.toml",
     "requirements-dev.lock",
@@ -115,6 +116,19 @@ def test_the_devcontainer_and_the_workflow_can_be_read() -> None:
     assert "bash .ci/run" in commands
     assert any(command.startswith("sudo") and "tests/test_sandbox.py" in command for command in commands)
     assert "make test" in (ROOT / ".ci" / "run").read_text()
+
+
+def test_the_issue_forms_and_the_hooks_can_be_read() -> None:
+    import yaml
+
+    for path in (ROOT / ".github" / "ISSUE_TEMPLATE").glob("*.yml"):
+        form = yaml.safe_load(path.read_text(encoding="utf-8"))
+        if path.stem != "config":
+            assert form["name"] and form["description"]
+            assert all(field["type"] and field["attributes"]["label"] for field in form["body"])
+    hooks = yaml.safe_load((ROOT / ".pre-commit-config.yaml").read_text(encoding="utf-8"))["repos"][0]["hooks"]
+    assert {hook["id"] for hook in hooks} == {"ruff-check", "ruff-format", "notebooks"}
+    assert all((hook["entry"].startswith(".venv/bin/")) for hook in hooks)
 
 
 @pytest.mark.parametrize(

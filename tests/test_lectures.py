@@ -15,6 +15,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
 LECTURES = sorted(path.stem for path in (ROOT / "lectures").glob("*.md"))
+PAGES = [*LECTURES, *sorted(f"instructors/{path.stem}" for path in (ROOT / "lectures" / "instructors").glob("*.md"))]
 
 # Runs in a deck: what lies outside of its slide, for each slide.
 OUTSIDE = """() => Reveal.getSlides().flatMap((slide, number) => {
@@ -69,7 +70,7 @@ def violations(page: Any) -> list[str]:
     return [f"{rule['id']}: {rule['help']}: {rule['nodes'][0]['html'][:150]}" for rule in found]
 
 
-@pytest.mark.parametrize("name", LECTURES)
+@pytest.mark.parametrize("name", PAGES)
 def test_every_page_of_the_book_can_be_read(site: Path, page: Any, name: str) -> None:
     """No broken or undescribed picture, nothing wider than the window, nothing that axe objects to."""
     page.goto(f"file://{site}/book/{name}.html")

@@ -1,0 +1,72 @@
+"""The pages for instructors and authors say what the code does: every reason code, every door, every expectation."""
+
+from __future__ import annotations
+
+import json
+import re
+import sys
+from pathlib import Path
+
+import pytest
+import yaml
+
+ROOT = Path(__file__).resolve().parent.parent
+sys.path.append(str(ROOT / "lectures" / "_ext"))
+
+import reference  # noqa: E402  (an extension of the book's)
+
+from autograder.checks.codes import GROUPS  # noqa: E402
+from autograder.checks.launch import Launch  # noqa: E402
+from autograder.diagnosis.codes import CODES  # noqa: E402
+
+LISTED = [*CODES, *(code for group in GROUPS.values() for code in group)]
+PAGES = sorted((ROOT / "lectures" / "instructors").glob("*.md"))
+
+
+def test_every_code_that_the_kit_gives_is_listed() -> None:
+    used = reference.codes_used()
+    assert len(used) > 100
+    assert sorted(code for code in used if not any(reference.fits(one, code) for one in LISTED)) == []
+
+
+def test_no_code_is_listed_twice_or_without_use() -> None:
+    assert len(LISTED) == len(set(LISTED))
+    filled_in = {code for code in LISTED if code.endswith(("-limit", "-exception"))}  # named by what happened
+    used = reference.codes_used()
+    assert [code for code in LISTED if code not in filled_in and not any(reference.fits(code, u) for u in used)] == []
+
+
+def test_every_code_that_grading_gave_stands_on_the_page_or_in_a_lab() -> None:
+    labs = "".join(path.read_text(encoding="utf-8") for path in (ROOT / "solutions").glob("*/*.ipynb"))
+    own = set(re.findall(r"[a-z]+(?:-[a-z]+)*", labs))
+    given = set()
+    for path in (ROOT / "tests" / "classes").glob("*/*/expected.yaml"):
+        checks = yaml.safe_load(path.read_text(encoding="utf-8")).get("checks") or {}
+        given |= {check["code"] for check in checks.values() if isinstance(check, dict) and "code" in check}
+    page = reference.reason_codes()
+    assert len(given) > 50
+    assert sorted(code for code in given if f"**`{code}`**" not in page and code not in own) == []
+
+
+def test_everything_that_ros_offers_is_documented() -> None:
+    page = reference.check_api()
+    offered = [name for name, _ in reference.offered(Launch)]
+    assert {"expect_node", "expect_messages", "part", "score"} <= set(offered)
+    assert [name for name in offered if f"\n### {name}\n" not in page] == []
+
+
+@pytest.mark.parametrize("path", PAGES, ids=lambda path: path.stem)
+def test_files_that_a_page_names_are_there(path: Path) -> None:
+    text = path.read_text(encoding="utf-8")
+    named = set(re.findall(r"`((?:autograder|tests|lectures|solutions|labs)/[\w/.-]+)`", text))
+    assert [name for name in sorted(named) if not re.search(r"[A-Z]{3}", name) and not (ROOT / name).exists()] == []
+
+
+def test_an_example_is_taken_from_what_students_may_see() -> None:
+    released = "".join(
+        "".join(cell["source"])
+        for path in (ROOT / "labs").glob("*/*.ipynb")
+        for cell in json.loads(path.read_text(encoding="utf-8"))["cells"]
+    )
+    for example in reference.examples().values():
+        assert example.splitlines()[0].removesuffix(" as ros:").removeprefix("with ") in released
