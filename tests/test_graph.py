@@ -26,7 +26,7 @@ from rclpy.qos import (
 )
 
 from autograder.checks import runtime
-from autograder.checks.concurrency import Activity
+from autograder.checks.concurrency import Concurrency
 from autograder.checks.program import Node
 from autograder.graph.names import nearest
 from autograder.graph.observer import Observer
@@ -77,7 +77,7 @@ def test_overlap_counts_the_runs_that_are_under_way_together(runs: list[tuple[st
         [(start, 1, f"{name} begin") for name, start, _ in runs]
         + [(start + length, 0, f"{name} end") for name, start, length in runs]
     )
-    activity = Activity(received([text for _, _, text in events]))
+    activity = Concurrency(received([text for _, _, text in events]))
     most = max((sum(s <= t < s + n for _, s, n in runs) for t in range(80)), default=0)
     assert activity.overlap("abc") == most
     assert activity.distinct_overlap("abc") == max(
@@ -88,7 +88,7 @@ def test_overlap_counts_the_runs_that_are_under_way_together(runs: list[tuple[st
 
 def test_the_order_of_publication_decides_not_the_order_of_arrival() -> None:
     messages = received(["a begin", "a end", "b begin", "b end"])
-    assert Activity([messages[i] for i in (0, 2, 1, 3)]).overlap("ab") == 1
+    assert Concurrency([messages[i] for i in (0, 2, 1, 3)]).overlap("ab") == 1
 
 
 @pytest.mark.parametrize(

@@ -18,7 +18,24 @@ class ActionExpectations(Expectations):
     """What decides about goals."""
 
     def send_goal(self, name: str, action_type: type, goal: Any, *, within: float = WITHIN, hint: str = "") -> Goal:
-        """Send a goal and wait for the server's decision; a missing server or decision is a failed outcome."""
+        """Send a goal and wait for the server's decision; a missing server or decision is a failed outcome.
+
+        Args:
+            name: full name of the action.
+            action_type: action class.
+            goal: of that class.
+            within: seconds until it must be accepted or rejected.
+            hint: a pointer for the student.
+
+        Returns:
+            the goal, to be followed: feedback, status, result.
+
+        Example:
+            `goal = ros.send_goal("/dock", Fibonacci, Fibonacci.Goal(order=5))`
+
+        Codes:
+            `no-action`, `no-answer`, and what blocks a callback.
+        """
         # Actions load numpy, a quarter of a second of CPU that most labs do not need.
         from autograder.graph import actions
 

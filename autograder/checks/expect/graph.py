@@ -34,7 +34,20 @@ class GraphExpectations(Expectations):
         return set()
 
     def expect_node(self, name: str, *, within: float = WITHIN, hint: str = "") -> None:
-        """The node with this full name is on the graph, exactly once."""
+        """The node with this full name is on the graph, exactly once, and lives on.
+
+        Args:
+            name: full name.
+            within: seconds until it must be there.
+            hint: a pointer for the student.
+
+        Example:
+            `ros.expect_node("/robot/talker")`
+
+        Codes:
+            `no-node`, `node-name`, `namespace`, `one-name-for-all`, `duplicate-node`, and those of a program that
+            ended.
+        """
         title = f"The node `{name}` is on the graph"
         if not self.wait_for_graph(lambda: name in self._observer.nodes(), within):
             self._fail(
@@ -83,7 +96,19 @@ class GraphExpectations(Expectations):
             )
 
     def expect_no_node(self, name: str, *, within: float = GONE_WITHIN, hint: str = "") -> None:
-        """No node has this full name; use it after a positive expectation, which proves that the graph is known."""
+        """No node has this full name; use it after a positive expectation, which proves that the graph is known.
+
+        Args:
+            name: full name.
+            within: seconds until it must be gone.
+            hint: a pointer for the student.
+
+        Example:
+            `ros.expect_no_node("/talker")`
+
+        Codes:
+            `node-present`.
+        """
         gone = self._observer.wait(lambda: name not in self._observer.nodes(), within)
         self._expect_that(
             gone,
@@ -94,7 +119,20 @@ class GraphExpectations(Expectations):
         )
 
     def expect_topic(self, topic: str, msg_type: type, *, within: float = WITHIN, hint: str = "") -> None:
-        """The topic exists with this message type."""
+        """The topic exists with this message type.
+
+        Args:
+            topic: full name.
+            msg_type: message class.
+            within: seconds until it must be there.
+            hint: a pointer for the student.
+
+        Example:
+            `ros.expect_topic("/chatter", String)`
+
+        Codes:
+            `no-topic`, `topic-name`, `wrong-type`, `wrong-end`, `absolute-name`.
+        """
         wanted = type_name(msg_type)
         found = self.wait_for_graph(lambda: wanted in self._observer.topics().get(topic, []), within)
         self._expect_that(
@@ -107,7 +145,19 @@ class GraphExpectations(Expectations):
         )
 
     def expect_no_topic(self, topic: str, *, within: float = GONE_WITHIN, hint: str = "") -> None:
-        """Nobody publishes or subscribes to this topic."""
+        """Nobody publishes or subscribes to this topic.
+
+        Args:
+            topic: full name.
+            within: seconds until nobody may use it any more.
+            hint: a pointer for the student.
+
+        Example:
+            `ros.expect_no_topic("/chatter")`
+
+        Codes:
+            `topic-present`, `absolute-name`.
+        """
         gone = self._observer.wait(lambda: topic not in self._observer.topics(), within)
         self._expect_that(
             gone,
@@ -162,13 +212,45 @@ class GraphExpectations(Expectations):
     def expect_publisher(
         self, topic: str, msg_type: type, *, node: str = "", count: int = 1, within: float = WITHIN, hint: str = ""
     ) -> None:
-        """The topic has exactly `count` publishers of this type, of the node `node` if one is given."""
+        """The topic has exactly `count` publishers of this type, of the node `node` if one is given.
+
+        Args:
+            topic: full name.
+            msg_type: message class.
+            node: full name of the node whose they are; by default of any.
+            count: how many publishers.
+            within: seconds until they must be there.
+            hint: a pointer for the student.
+
+        Example:
+            `ros.expect_publisher("/chatter", String, node="/talker")`
+
+        Codes:
+            `no-topic`, `topic-name`, `wrong-type`, `wrong-node`, `wrong-end`, `absolute-name`, `count`,
+            `extra-publisher`.
+        """
         self._expect_end(topic, msg_type, "publisher", node, count, within, hint)
 
     def expect_subscription(
         self, topic: str, msg_type: type, *, node: str = "", count: int = 1, within: float = WITHIN, hint: str = ""
     ) -> None:
-        """The topic has exactly `count` subscriptions of this type, of the node `node` if one is given."""
+        """The topic has exactly `count` subscriptions of this type, of the node `node` if one is given.
+
+        Args:
+            topic: full name.
+            msg_type: message class.
+            node: full name of the node whose they are; by default of any.
+            count: how many subscriptions.
+            within: seconds until they must be there.
+            hint: a pointer for the student.
+
+        Example:
+            `ros.expect_subscription("/chatter", String, node="/listener")`
+
+        Codes:
+            `no-topic`, `topic-name`, `wrong-type`, `wrong-node`, `wrong-end`, `absolute-name`, `count`,
+            `extra-subscription`.
+        """
         self._expect_end(topic, msg_type, "subscription", node, count, within, hint)
 
     def _owners(self, topic: str, kind: End, msg_type: type | None = None, node: str = "") -> str:
@@ -191,9 +273,33 @@ class GraphExpectations(Expectations):
         )
 
     def expect_no_publisher(self, topic: str, *, within: float = GONE_WITHIN, hint: str = "") -> None:
-        """Nobody publishes on the topic."""
+        """Nobody publishes on the topic.
+
+        Args:
+            topic: full name.
+            within: seconds until they must be gone.
+            hint: a pointer for the student.
+
+        Example:
+            `ros.expect_no_publisher("/chatter")`
+
+        Codes:
+            `publisher-present`.
+        """
         self._expect_no_end(topic, "publisher", within, hint)
 
     def expect_no_subscription(self, topic: str, *, within: float = GONE_WITHIN, hint: str = "") -> None:
-        """Nobody subscribes to the topic."""
+        """Nobody subscribes to the topic.
+
+        Args:
+            topic: full name.
+            within: seconds until they must be gone.
+            hint: a pointer for the student.
+
+        Example:
+            `ros.expect_no_subscription("/chatter")`
+
+        Codes:
+            `subscription-present`.
+        """
         self._expect_no_end(topic, "subscription", within, hint)

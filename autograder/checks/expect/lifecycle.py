@@ -26,7 +26,14 @@ class LifecycleExpectations(Expectations):
         return {}
 
     def watch_transitions(self, node: str) -> LifecycleClient:
-        """Record a node's state changes from now on; its events are volatile, so watch before it starts."""
+        """Record a node's state changes from now on; its events are volatile, so watch before it starts.
+
+        Args:
+            node: full name.
+
+        Example:
+            `ros.watch_transitions("/camera")`
+        """
         if node not in self._lifecycle_clients:
             self._lifecycle_clients[node] = LifecycleClient(self._observer, node)
         return self._lifecycle_clients[node]
@@ -44,7 +51,18 @@ class LifecycleExpectations(Expectations):
         self._fail(title, reason, expected=node, observed=", ".join(self._observer.nodes()), hint=hint)
 
     def state(self, node: str, *, within: float = WITHIN) -> str:
-        """Label of a node's current state."""
+        """Label of a node's current state; a node that does not tell it is a failed outcome.
+
+        Args:
+            node: full name.
+            within: seconds until it must have answered.
+
+        Example:
+            `before = ros.state("/camera")`
+
+        Codes:
+            `no-answer`, `not-lifecycle`, and those of `expect_node`.
+        """
         try:
             return self.watch_transitions(node).state(within, self._without(node))
         except (ServiceMissing, NoAnswer) as error:
@@ -53,7 +71,22 @@ class LifecycleExpectations(Expectations):
     def expect_state(
         self, node: str, state: str, *, within: float = WITHIN, because: str = "", code: str = "", hint: str = ""
     ) -> None:
-        """A lifecycle node is in this state, or gets there within `within` seconds."""
+        """A lifecycle node is in this state, or gets there.
+
+        Args:
+            node: full name.
+            state: `unconfigured`, `inactive`, `active` or `finalized`.
+            within: seconds until it must be there.
+            because: what another state would mean here, if the check knows it.
+            code: of that reason.
+            hint: a pointer for the student.
+
+        Example:
+            `ros.expect_state("/camera", "active")`
+
+        Codes:
+            `state` or `code`, `no-answer`, `not-lifecycle`, and errors in callbacks.
+        """
         title = f"`{node}` is {state}"
         try:
             seen = self.watch_transitions(node).wait_for_state(state, within, self._without(node))
@@ -81,7 +114,18 @@ class LifecycleExpectations(Expectations):
         return look()
 
     def available_transitions(self, node: str, *, within: float = WITHIN) -> Mapping[str, str]:
-        """Labels of the transitions that a node offers now, each with the state it leads to."""
+        """Labels of the transitions that a node offers now, each with the state it leads to.
+
+        Args:
+            node: full name.
+            within: seconds until it must have answered.
+
+        Example:
+            `ros.require("configure" in ros.available_transitions("/camera"), "It can be configured")`
+
+        Codes:
+            `no-answer`, `not-lifecycle`, and those of `expect_node`.
+        """
         try:
             return self.watch_transitions(node).available(within, self._without(node))
         except (ServiceMissing, NoAnswer) as error:
@@ -96,8 +140,14 @@ class LifecycleExpectations(Expectations):
             node: full name.
             label: `configure`, `activate`, `deactivate`, `cleanup` or `shutdown`.
             expect: `success`, `failure` (the node answers that it did not succeed), or None: look only, no outcome.
-            within: seconds.
+            within: seconds until it must have been answered.
             hint: a pointer for the student.
+
+        Example:
+            `ros.transition("/camera", "configure")`
+
+        Codes:
+            `state`, `transition-failed`, `transition-succeeded`, `no-answer`, `not-lifecycle`, and errors in callbacks.
         """
         title = f"`{node}`: {label}" + {"success": " succeeds", "failure": " does not succeed", None: ""}[expect]
         try:
@@ -141,13 +191,33 @@ class LifecycleExpectations(Expectations):
         return done
 
     def changes(self, *nodes: str) -> list[Change]:
-        """State changes so far of the nodes (by default of all that are watched), in the order of publication."""
+        """State changes so far, in the order of publication.
+
+        Args:
+            nodes: full names; by default all nodes that are watched.
+
+        Example:
+            `steps = [change.step for change in ros.changes("/camera")]`
+        """
         return in_order([self.watch_transitions(node) for node in nodes or self._lifecycle_clients])
 
     def expect_transitions(
         self, node: str, steps: Sequence[tuple[str, str]], *, within: float = WITHIN, hint: str = ""
     ) -> None:
-        """A node took exactly these steps (state left, state entered) since it is watched."""
+        """A node took exactly these steps since it is watched.
+
+        Args:
+            node: full name.
+            steps: of each the state that was left and the one that was entered.
+            within: seconds until the last of them must have come.
+            hint: a pointer for the student.
+
+        Example:
+            `ros.expect_transitions("/camera", [("unconfigured", "configuring"), ("configuring", "inactive")])`
+
+        Codes:
+            `transitions`, and errors in callbacks.
+        """
         client = self.watch_transitions(node)
         seen = [change.step for change in client.wait_for_changes(len(steps), within, self._without(node))]
         told = ", ".join(f"{a} to {b}" for a, b in seen) or "no step"

@@ -25,6 +25,9 @@ class MeanwhileExpectations(ConcurrencyExpectations, SourceExpectations, Offerin
             callback: a callback that publishes `NAME begin` and `NAME end` (`std_msgs/String`) ...
             activity: ... on this topic.
             service: or a service that the check offers (`serve`): from a request's arrival to its answer.
+
+        Example:
+            `counts = ros.messages_during("/heartbeat", Int64, callback="slow", activity="/activity")`
         """
         if service:
             spans = self.served(service)
@@ -56,10 +59,16 @@ class MeanwhileExpectations(ConcurrencyExpectations, SourceExpectations, Offerin
             callback: name in `activity`.
             activity: topic of begins and ends.
             service: full name of an offered service, instead of a callback.
-            at_least: messages.
+            at_least: messages in one run.
             runs: complete runs (or answered calls) to look at before giving up.
-            within: seconds.
+            within: seconds until these must have come.
             hint: a pointer for the student.
+
+        Example:
+            `ros.expect_messages_during("/heartbeat", Int64, callback="slow", activity="/activity", at_least=2)`
+
+        Codes:
+            `paused` or the cause of it, `extra-publisher`, and those of `expect_runs`.
         """
         title = f"`{topic}` goes on while " + (f"`{service}` is being called" if service else f"`{callback}` runs")
 

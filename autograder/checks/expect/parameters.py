@@ -39,28 +39,82 @@ class ParameterExpectations(Expectations):
         self._fail(title, reason, expected=node, observed=", ".join(self._observer.nodes()), hint=hint)
 
     def get_parameters(self, node: str, names: Sequence[str], *, within: float = WITHIN) -> Mapping[str, Any]:
-        """Values of a node's parameters; those it has not declared are left out."""
+        """Values of a node's parameters; those it has not declared are left out.
+
+        Args:
+            node: full name.
+            names: of the parameters.
+            within: seconds until it must have answered.
+
+        Example:
+            `rate = ros.get_parameters("/camera", ["rate"]).get("rate")`
+
+        Codes:
+            `no-answer`, `no-service`, and those of `expect_node`.
+        """
         try:
             return parameters.get_parameters(self._observer, node, names, within, self._without(node))
         except (ServiceMissing, parameters.NoAnswer) as error:
             self._no_parameters(f"`{node}` tells its parameters", node, error, "")
 
     def list_parameters(self, node: str, *, within: float = WITHIN) -> list[str]:
-        """Names of the parameters that a node has declared."""
+        """Names of the parameters that a node has declared.
+
+        Args:
+            node: full name.
+            within: seconds until it must have answered.
+
+        Example:
+            `names = ros.list_parameters("/camera")`
+
+        Codes:
+            `no-answer`, `no-service`, and those of `expect_node`.
+        """
         try:
             return parameters.list_parameters(self._observer, node, within, self._without(node))
         except (ServiceMissing, parameters.NoAnswer) as error:
             self._no_parameters(f"`{node}` tells its parameters", node, error, "")
 
     def set_parameter(self, node: str, name: str, value: Any, *, within: float = WITHIN) -> Any:
-        """Ask a node to set a parameter; gives its SetParametersResult."""
+        """Ask a node to set a parameter.
+
+        Args:
+            node: full name.
+            name: of the parameter.
+            value: a bool, an integer, a double, a text or a list of one of these.
+            within: seconds until it must have answered.
+
+        Returns:
+            its SetParametersResult: `successful` and `reason`.
+
+        Example:
+            `reply = ros.set_parameter("/camera", "rate", 5.0)`
+
+        Codes:
+            `no-answer`, `no-service`, and those of `expect_node`.
+        """
         try:
             return parameters.set_parameter(self._observer, node, name, value, within, self._without(node))
         except (ServiceMissing, parameters.NoAnswer) as error:
             self._no_parameters(f"`{node}` answers when `{name}` is set to {value!r}", node, error, "")
 
     def expect_parameter(self, node: str, name: str, value: Any, *, within: float = WITHIN, hint: str = "") -> None:
-        """A node has a parameter with this value and type."""
+        """A node has a parameter with this value and type.
+
+        Args:
+            node: full name.
+            name: of the parameter.
+            value: with its type: 40 is an integer, 40.0 a double.
+            within: seconds until it must have answered.
+            hint: a pointer for the student.
+
+        Example:
+            `ros.expect_parameter("/camera", "rate", 5.0)`
+
+        Codes:
+            `parameter-undeclared`, `parameter-value`, `parameter-as-rule`, `parameter-for-others`, `params-file-key`,
+            `params-file-missing`, and those of `get_parameters`.
+        """
         title = f"Parameter `{name}` of `{node}` is {value!r}"
         try:
             have = parameters.get_parameters(self._observer, node, [name], within, self._without(node))
@@ -103,7 +157,21 @@ class ParameterExpectations(Expectations):
     def expect_parameter_refused(
         self, node: str, name: str, value: Any, *, within: float = WITHIN, hint: str = ""
     ) -> None:
-        """A node refuses a value with a reason, keeps the old one and lives on."""
+        """A node refuses a value with a reason, keeps the old one and lives on.
+
+        Args:
+            node: full name.
+            name: of the parameter.
+            value: that it must refuse.
+            within: seconds until each answer must have come.
+            hint: a pointer for the student.
+
+        Example:
+            `ros.expect_parameter_refused("/camera", "rate", -1.0)`
+
+        Codes:
+            `parameter-accepted`, `parameter-refusal`, and those of `get_parameters`.
+        """
         title = f"`{node}` refuses `{name}` = {value!r} with a reason and lives on"
         before = self.get_parameters(node, [name], within=within)
         try:

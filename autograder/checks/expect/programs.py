@@ -23,21 +23,53 @@ class ProgramExpectations(Expectations):
     """What the programs do as processes."""
 
     def program(self, name: str) -> Program:
-        """The last started program of this name; a missing one is a failed outcome."""
+        """The last started program of this name; a missing one is a failed outcome.
+
+        Args:
+            name: of the program.
+
+        Example:
+            `printed = ros.program("talker").output()`
+
+        Codes:
+            `program-missing`, `nothing-started`.
+        """
         for node, program in reversed(self._running.programs):
             if node.program == name:
                 return program
         self._fail(f"The program `{name}` is there", diagnosis.program_trouble(self._scene()))
 
     def stop(self, name: str, *, kill: bool = False) -> None:
-        """End one of several programs: politely (SIGTERM), or without a chance to clean up."""
+        """End one of several programs: politely (SIGTERM), or without a chance to clean up.
+
+        Args:
+            name: of the program.
+            kill: end it without a chance to clean up.
+
+        Example:
+            `ros.stop("talker")`
+
+        Codes:
+            those of `program`.
+        """
         program = self.program(name)
         self._running.may_end.append(program)
         self._running.stopped.append(program)
         program.stop(grace=0.0 if kill else 2.0)
 
     def expect_running(self, name: str, *, hint: str = "") -> None:
-        """A program has not ended."""
+        """A program has not ended.
+
+        Args:
+            name: of the program.
+            hint: a pointer for the student.
+
+        Example:
+            `ros.expect_running("talker")`
+
+        Codes:
+            `crashed`, `exited` and other reasons why a program ends.
+        """
         self._expect_that(
             self.program(name).running(),
             f"`{name}` is still running",
@@ -46,7 +78,20 @@ class ProgramExpectations(Expectations):
         )
 
     def expect_exit(self, name: str, *, status: int | None = None, within: float = WITHIN, hint: str = "") -> None:
-        """A program ends by itself, with this exit status if one is given."""
+        """A program ends by itself.
+
+        Args:
+            name: of the program.
+            status: its exit status; by default any.
+            within: seconds until it must have ended.
+            hint: a pointer for the student.
+
+        Example:
+            `ros.expect_exit("stopper", status=0)`
+
+        Codes:
+            `still-running`, `exit-status`, `shutdown-in-callback`, and reasons why a program ends or does not.
+        """
         program = self.program(name)
         self._running.may_end.append(program)
         title = f"`{name}` ends by itself" + ("" if status is None else f" with exit status {status}")
@@ -79,7 +124,18 @@ class ProgramExpectations(Expectations):
         )
 
     def expect_argument_needed(self, name: str, *, hint: str = "") -> None:
-        """The launch file cannot be run, because its launch argument `name` has no default and was not given."""
+        """The launch file cannot be run, because a launch argument has no default and was not given.
+
+        Args:
+            name: of the launch argument.
+            hint: a pointer for the student.
+
+        Example:
+            `ros.expect_argument_needed("vehicle")`
+
+        Codes:
+            `argument-not-needed`, and those of launch files.
+        """
         title = f"Without `{name}` the launch file is refused"
         told = self._running.trouble[0].because if self._running.trouble else ""
         if f"the launch argument `{name}` has no value" in told:
@@ -107,8 +163,14 @@ class ProgramExpectations(Expectations):
             level: DEBUG, INFO, WARN, ERROR or FATAL, exactly.
             node: logger name, as rosout gives it: dots for slashes, no leading one.
             count: exactly so many; by default at least one.
-            within: seconds.
+            within: seconds until they must have come.
             hint: a pointer for the student.
+
+        Example:
+            `ros.expect_log("too hot", level="WARN", node="oven")`
+
+        Codes:
+            `no-log`, and errors in callbacks.
         """
         from rcl_interfaces.msg import Log
 

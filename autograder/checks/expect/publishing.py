@@ -28,16 +28,23 @@ class Publishing(GraphExpectations):
         return {}
 
     def open_publisher(self, topic: str, msg_type: type, *, qos: QoSProfile | int = RELIABLE_DEEP) -> Any:
-        """Make the publisher that a later `publish` uses, before the program subscribes.
+        """Make one more publisher: the one that a later `publish` uses, before the program subscribes.
 
         A best-effort subscription hears only what comes after it has matched, and only the program can tell when that
         is: one that is made after the publisher has matched it by the time its other messages arrive.
+
+        Args:
+            topic: full name.
+            msg_type: message class.
+            qos: what is offered, a profile or a depth.
+
+        Example:
+            `ros.open_publisher("/chatter", String, qos=profile)`
         """
         profile = qos if isinstance(qos, QoSProfile) else QoSProfile(depth=qos)
-        key = (topic, str(profile))  # its repr would tell objects apart, not policies
-        if key not in self._publishers:
-            self._publishers[key] = self._observer.publisher(topic, msg_type, profile)
-        return self._publishers[key]
+        publisher = self._observer.publisher(topic, msg_type, profile)
+        self._publishers[_key(topic, profile)] = publisher
+        return publisher
 
     def publish(
         self,
@@ -47,14 +54,27 @@ class Publishing(GraphExpectations):
         within: float = WITHIN,
         hint: str = "",
     ) -> None:
-        """Send messages to the student's node, after its subscription has matched, and the recordings what answers.
+        """Send messages to the student's node, once its subscription has matched.
 
         What the messages set off is heard from the first one on if its topic is recorded: `listen` before.
         A missing or incompatible subscription is a failed outcome with its reason.
+
+        Args:
+            topic: full name.
+            messages: one or more, of one class.
+            qos: what is offered, a profile or a depth.
+            within: seconds until a subscription must have matched.
+            hint: a pointer for the student.
+
+        Example:
+            `ros.publish("/chatter", String(data="hello"))`
+
+        Codes:
+            those of `expect_subscription` and `qos-reliability` and so on, by the policy that does not match.
         """
         msg_type = type(messages[0])
         profile = qos if isinstance(qos, QoSProfile) else QoSProfile(depth=qos)
-        publisher = self.open_publisher(topic, msg_type, qos=profile)
+        publisher = self._publishers.get(_key(topic, profile)) or self.open_publisher(topic, msg_type, qos=profile)
         self._wait_until_heard(publisher.get_subscription_count, topic, msg_type, profile, within, hint)
         self._observer.wait(self._observer.hears_all, MATCHES_WITHIN)
         for message in messages:
@@ -85,9 +105,19 @@ class Publishing(GraphExpectations):
             message: what is sent.
             rate: hertz.
             qos: what is offered.
+
+        Example:
+            `sensor = ros.stream("/range", Range(range=1.0), rate=20, qos=profile)`
+
+        Codes:
+            those of `publish`, at `start()`.
         """
 
         def expect_heard(matched: Callable[[], int]) -> None:
             self._wait_until_heard(matched, topic, type(message), qos, WITHIN, "")
 
         return Stream(self._observer, topic, message, rate, qos, expect_heard)
+
+
+def _key(topic: str, profile: QoSProfile) -> tuple[str, str]:
+    return topic, str(profile)  # its repr would tell objects apart, not policies

@@ -97,7 +97,7 @@ class QosExpectations(GraphExpectations):
             `ros.expect_match("/scan")`
 
         Codes:
-            those of `expect_publisher` and `expect_subscription`, and `qos-mismatch`.
+            those of `expect_publisher` and `expect_subscription`, and `qos-reliability` and so on by the policy.
         """
         title = f"Publishers and subscriptions on `{topic}` match"
 

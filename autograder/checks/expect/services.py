@@ -19,7 +19,20 @@ class ServiceExpectations(Expectations):
     """What must answer."""
 
     def expect_service(self, name: str, srv_type: type, *, within: float = WITHIN, hint: str = "") -> None:
-        """A node offers this service with this type."""
+        """A node offers this service with this type.
+
+        Args:
+            name: full name.
+            srv_type: service class.
+            within: seconds until it must be there.
+            hint: a pointer for the student.
+
+        Example:
+            `ros.expect_service("/add", AddTwoInts)`
+
+        Codes:
+            `no-service`, `service-name`, `wrong-type`.
+        """
         wanted = type_name(srv_type)
         found = self.wait_for_graph(lambda: wanted in self._observer.services().get(name, []), within)
         self._expect_that(
@@ -33,7 +46,24 @@ class ServiceExpectations(Expectations):
     def call_many(
         self, name: str, srv_type: type, requests: Sequence[Any], *, within: float = ANSWER_WITHIN, hint: str = ""
     ) -> list[Answer]:
-        """Send all requests at once; each must be answered. Missing server or answer is a failed outcome."""
+        """Send all requests at once; each must be answered. A missing server or answer is a failed outcome.
+
+        Args:
+            name: full name.
+            srv_type: service class.
+            requests: of that class.
+            within: seconds until every answer must have come.
+            hint: a pointer for the student.
+
+        Returns:
+            the answers, in the order of the requests; `response` is what was said.
+
+        Example:
+            `answers = ros.call_many("/add", AddTwoInts, [AddTwoInts.Request(a=1, b=2), AddTwoInts.Request(a=3, b=4)])`
+
+        Codes:
+            those of `expect_service`, `no-answer`, and what blocks a callback.
+        """
         title = f"The service `{name}` answers"
         gone = self._running.hopeless_without(lambda: name in self._observer.services())
         try:
@@ -55,5 +85,22 @@ class ServiceExpectations(Expectations):
         return answers
 
     def call(self, name: str, srv_type: type, request: Any, *, within: float = ANSWER_WITHIN, hint: str = "") -> Any:
-        """Call a service of the student's and give the response."""
+        """Call a service of the student's; a missing server or answer is a failed outcome.
+
+        Args:
+            name: full name.
+            srv_type: service class.
+            request: of that class.
+            within: seconds until the answer must have come.
+            hint: a pointer for the student.
+
+        Returns:
+            the response.
+
+        Example:
+            `total = ros.call("/add", AddTwoInts, AddTwoInts.Request(a=1, b=2)).sum`
+
+        Codes:
+            those of `call_many`.
+        """
         return self.call_many(name, srv_type, [request], within=within, hint=hint)[0].response
