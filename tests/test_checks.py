@@ -440,12 +440,65 @@ def test_names_keep_their_capitals_and_an_end_that_is_not_there_has_its_nearest_
     assert failure(result).code == "topic-name" and "`/camRaw/Image`" in failure(result).because
 
 
-def test_what_a_lab_author_gets_wrong_is_no_students_failure(grade: Grade) -> None:
-    for wrong, word in (('reliabilty="reliable"', "reliabilty"), ("depth=10", "depth")):
-        result = grade(
-            f'with launch("talker") as ros:\n    ros.expect_qos("/chatter", {wrong})\nros.score(2)', talker__py=TALKER
-        )
-        assert result.points is None and word in result.outcomes[0].because
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ('ros.expect_qos("/chatter", reliabilty="reliable")', "no policy called reliabilty"),
+        ('ros.expect_qos("/chatter", depth=10)', "no policy called depth"),
+        ('ros.expect_qos("/chatter", reliability="relaible")', "'relaible' is neither 'reliable' nor 'best_effort'"),
+        ('ros.expect_qos("/chatter", deadline="0.2")', "a number of seconds"),
+        ('ros.expect_node("/talker", wihtin=3)', "wihtin"),
+        ('ros.expect_node("/talker", within=-1)', "within=-1 is no time"),
+        ("ros.wait(lambda: True, -1)", "within=-1 is no time"),
+        ('ros.expect_silence("/chatter", String, for_seconds=-0.5)', "for_seconds=-0.5 is no time"),
+        ("ros.pause(-1)", "-1 is no time"),
+        ('ros.expect_messages("/chatter", String, exactly=3, at_most=4)', "exactly"),
+        ('ros.expect_messages("/chatter", String, at_least=-1)', "not negative"),
+        ('ros.expect_overlap("/activity", "tick", itself=True)', "no list"),
+        ('ros.expect_log("x", level="WARNING")', "none of DEBUG"),
+        ('with launch("talker") as second: pass', "inside another one"),
+        ("with ros: pass", "inside another one"),
+    ],
+)
+def test_what_a_lab_author_gets_wrong_is_refused_with_its_line_and_is_no_students_failure(
+    grade: Grade, line: str, said: str
+) -> None:
+    result = grade(f"with launch() as ros:\n    {line}\nros.score(2)")
+    (outcome,) = result.outcomes
+    assert result.points is None and outcome.status is Status.UNKNOWN
+    assert said in outcome.because and f"line 2: {line}" in outcome.because
+
+
+def test_a_launch_that_ran_is_refused_a_second_time_and_the_next_one_runs(grade: Grade) -> None:
+    again = grade("ros = launch()\nwith ros: pass\nwith ros: pass\nros.score(2)")
+    assert "has run already" in again.outcomes[0].because and "line 3" in again.outcomes[0].because
+    assert grade(
+        'with launch("talker") as ros:\n    ros.expect_node("/talker")\nros.score(2)', talker__py=TALKER
+    ).points
+
+
+def test_what_is_required_holds_if_it_is_true_in_pythons_sense(grade: Grade) -> None:
+    result = grade(
+        """\
+        import re
+        import numpy as np
+        with launch() as ros:
+            ros.require(np.bool_(True), "numpy's truth")
+            ros.require(re.match("a", "abc"), "a match")
+            ros.require_equal("two lists", [1, 2], [1, 2])
+            with ros.part("nothing"):
+                ros.require(None, "None")
+            with ros.part("zero"):
+                ros.require(0, "0")
+            with ros.part("equal"):
+                ros.require_equal("The order is right", ["b", "a"], ["a", "b"])
+        ros.score({"nothing": 0.5, "zero": 0.5, "equal": 1})
+        """
+    )
+    assert [outcome.status for outcome in result.outcomes] == [Status.PASSED] * 3 + [Status.FAILED] * 3
+    last = result.outcomes[-1]
+    assert (last.expected, last.observed, last.because) == ("a, b", "b, a", "It is b, a, not a, b.")
+    assert last.code == "content"
 
 
 def test_what_is_true_in_another_form_holds_and_none_at_all_means_silence(grade: Grade) -> None:

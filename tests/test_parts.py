@@ -86,7 +86,10 @@ def test_what_fails_outside_the_parts_takes_those_of_its_launch(grade: Grade) ->
 @pytest.mark.parametrize("mistake", ['{"the name": 2}', '{"the name": 1, "the words": 0.5}', "2"])
 def test_a_score_that_does_not_fit_the_parts_decides_nothing(grade: Grade, mistake: str) -> None:  # noqa: F811
     check = PARTS.format(word="", within=5).rsplit("ros.score", 1)[0] + f"ros.score({mistake})"
-    assert grade(check, talker__py=TALKER).points is None
+    result = grade(check, talker__py=TALKER)
+    assert result.points is None
+    if mistake != "2":
+        assert f"ros.score({mistake})" in result.outcomes[-1].because
 
 
 def released(check: str) -> str:

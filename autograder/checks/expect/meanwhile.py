@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from autograder import diagnosis
 from autograder.checks import outcomes
 from autograder.checks.expect.concurrency import ConcurrencyExpectations
@@ -84,22 +86,21 @@ class MeanwhileExpectations(ConcurrencyExpectations, SourceExpectations, Offerin
         if not enough():
             if not service and not seen:
                 self._wait_for_runs(activity, [callback], 1, title, 0.0, hint)
-            told = ", ".join(str(count) for count in seen) or "no complete run"
-            scene = self._scene()
-            self._fail(
-                title,
-                diagnosis.program_trouble(scene)
-                or diagnosis.inside_reason(scene)
-                or diagnosis.waits_for_its_group(scene)
-                or diagnosis.why_not_together(scene, activity or topic)
-                or Diagnosis(
-                    f"The most that came on `{topic}` in one run is {max(seen, default=0)}. "
-                    + diagnosis.layout(scene, activity or topic),
-                    "paused",
-                ),
-                expected=f"at least {at_least} messages in one run",
-                observed=told,
-                hint=hint,
-            )
+            self._paused(title, topic, activity or topic, seen, at_least, hint)
         self._one_source(title, topic, msg_type, "", 1, self._observer.record(topic, msg_type).messages)
         outcomes.passed(title, observed=", ".join(str(count) for count in seen))
+
+    def _paused(self, title: str, topic: str, activity: str, seen: Sequence[int], at_least: int, hint: str) -> None:
+        scene = self._scene()
+        most = f"The most that came on `{topic}` in one run is {max(seen, default=0)}."
+        self._fail(
+            title,
+            diagnosis.program_trouble(scene)
+            or diagnosis.inside_reason(scene)
+            or diagnosis.waits_for_its_group(scene)
+            or diagnosis.why_not_together(scene, activity)
+            or Diagnosis(f"{most} {diagnosis.layout(scene, activity)}", "paused"),
+            expected=f"at least {at_least} messages in one run",
+            observed=", ".join(str(count) for count in seen) or "no complete run",
+            hint=hint,
+        )

@@ -6,13 +6,16 @@ import re
 from functools import cached_property
 from typing import Any
 
+from rcl_interfaces.msg import Log
 from rclpy.qos import QoSDurabilityPolicy, QoSProfile
 
 from autograder import diagnosis
 from autograder.checks import outcomes
 from autograder.checks.expect.expectations import WITHIN, Expectations
+from autograder.checks.misuse import Misuse
 from autograder.diagnosis import Diagnosis
 from autograder.graph.clock import ClockDriver
+from autograder.graph.recording import Recording
 from autograder.sandbox.nodes import Program
 
 _LEVELS = {"DEBUG": 10, "INFO": 20, "WARN": 30, "ERROR": 40, "FATAL": 50}
@@ -172,12 +175,9 @@ class ProgramExpectations(Expectations):
         Codes:
             `no-log`, and errors in callbacks.
         """
-        from rcl_interfaces.msg import Log
-
-        # rosout is transient local: who asks for that hears the last ten seconds too.
-        rosout = self._observer.record(
-            "/rosout", Log, QoSProfile(depth=1000, durability=QoSDurabilityPolicy.TRANSIENT_LOCAL)
-        )
+        if level and level not in _LEVELS:
+            raise Misuse(f"expect_log: level={level!r} is none of {', '.join(_LEVELS)}.")
+        rosout = self._rosout
 
         def matching() -> list[Any]:
             return [
@@ -195,20 +195,22 @@ class ProgramExpectations(Expectations):
         self._expect_that(
             found,
             f"A log message{f' of level {level}' if level else ''} says {text!r}",
-            lambda: (
-                diagnosis.program_trouble(self._scene())
-                or diagnosis.inside_reason(self._scene())
-                or Diagnosis(
-                    {0: "No such message was logged.", 1: "It came once."}.get(
-                        len(matching()), f"It came {len(matching())} times."
-                    ),
-                    "no-log",
-                )
-            ),
+            lambda: self._why_not_logged(len(matching())),
             expected=text,
             observed="; ".join(r.msg.msg for r in rosout.messages[-3:]),
             hint=hint,
         )
+
+    @cached_property
+    def _rosout(self) -> Recording:
+        # It is transient local: who asks for that hears the last ten seconds too.
+        profile = QoSProfile(depth=1000, durability=QoSDurabilityPolicy.TRANSIENT_LOCAL)
+        return self._observer.record("/rosout", Log, profile)
+
+    def _why_not_logged(self, times: int) -> Diagnosis:
+        came = {0: "No such message was logged.", 1: "It came once."}.get(times, f"It came {times} times.")
+        scene = self._scene()
+        return diagnosis.program_trouble(scene) or diagnosis.inside_reason(scene) or Diagnosis(came, "no-log")
 
     @cached_property
     def clock(self) -> ClockDriver:

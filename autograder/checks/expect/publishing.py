@@ -9,8 +9,8 @@ from typing import Any
 from rclpy.qos import QoSProfile
 
 from autograder import diagnosis
+from autograder.checks.expect.endpoints import EndExpectations
 from autograder.checks.expect.expectations import WITHIN
-from autograder.checks.expect.graph import GraphExpectations
 from autograder.graph.stream import Stream
 
 RELIABLE_DEEP = 1000
@@ -20,7 +20,7 @@ MATCHES_WITHIN = 1.0
 """Seconds to wait for the check's recordings before it sends something that may be answered at once."""
 
 
-class Publishing(GraphExpectations):
+class Publishing(EndExpectations):
     """What the check sends."""
 
     @cached_property

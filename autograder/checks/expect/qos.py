@@ -7,8 +7,8 @@ from typing import Any, get_args
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from autograder import diagnosis
+from autograder.checks.expect.endpoints import End, EndExpectations
 from autograder.checks.expect.expectations import WITHIN
-from autograder.checks.expect.graph import End, GraphExpectations
 from autograder.checks.misuse import Misuse
 from autograder.diagnosis import Diagnosis
 from autograder.graph import qos
@@ -24,7 +24,7 @@ _WORDS = {
 Policies = dict[str, str | float | None]
 
 
-class QosExpectations(GraphExpectations):
+class QosExpectations(EndExpectations):
     """What QoS the ends of a topic must have."""
 
     def expect_qos(

@@ -5,13 +5,13 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 
-from autograder.checks.expect.graph import GraphExpectations
+from autograder.checks.expect.endpoints import EndExpectations
 from autograder.diagnosis import Diagnosis
 from autograder.graph.names import full_name
 from autograder.graph.recording import Received
 
 
-class SourceExpectations(GraphExpectations):
+class SourceExpectations(EndExpectations):
     """What expectations of messages ask of their publishers."""
 
     def _one_source(

@@ -1,0 +1,155 @@
+"""Expectations of the ends of topics: publishers and subscriptions, and whose they are."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import replace
+from typing import Literal
+
+from rclpy.topic_endpoint_info import TopicEndpointInfo
+
+from autograder import diagnosis
+from autograder.checks import outcomes
+from autograder.checks.expect.expectations import WITHIN
+from autograder.checks.expect.graph import GONE_WITHIN, GraphExpectations
+from autograder.diagnosis import Diagnosis
+from autograder.graph.names import full_name, type_name
+
+End = Literal["publisher", "subscription"]
+
+
+class EndExpectations(GraphExpectations):
+    """What ends a topic must have, and what not."""
+
+    def _ends(self, topic: str, msg_type: type | None, kind: End, node: str) -> list[TopicEndpointInfo]:
+        ends = self._observer.publishers(topic) if kind == "publisher" else self._observer.subscriptions(topic)
+        return [
+            end
+            for end in ends
+            if (msg_type is None or end.topic_type == type_name(msg_type))
+            and (not node or full_name(end.node_namespace, end.node_name) == node)
+        ]
+
+    def _expect_end(
+        self, topic: str, msg_type: type, kind: End, node: str, count: int, within: float, hint: str
+    ) -> None:
+        title = f"{f'`{node}`' if node else 'A node'} has a {kind} on `{topic}` ({type_name(msg_type)})"
+        if count != 1:
+            title = f"{f'`{node}`' if node else 'The topic'} has {count} {kind}s on `{topic}` ({type_name(msg_type)})"
+
+        def number() -> int:
+            return len(self._ends(topic, msg_type, kind, node))
+
+        found = self.wait_for_graph(lambda: number() >= count, within)
+        if found and number() == count:
+            outcomes.passed(title, observed=topic)
+            return
+        those = f"{number()} {kind}{'s' * (number() != 1)}"
+        owners = self._owners(topic, kind, msg_type, node)
+        reason = Diagnosis(f"`{topic}` has {those}, not {count}: {owners}.", "count")
+        if found:
+            reason = replace(reason, code=f"extra-{kind}")
+        elif not number():
+            reason = diagnosis.why_no_endpoint(self._scene(), topic, msg_type, kind, node)
+        self._fail(
+            title,
+            reason,
+            expected=f"{count} {kind}{'s' * (count != 1)} on {topic} ({type_name(msg_type)})",
+            observed=f"{those}: {owners}" if owners else f"none; topics: {self._topics()}",
+            hint=hint,
+        )
+
+    def expect_publisher(
+        self, topic: str, msg_type: type, *, node: str = "", count: int = 1, within: float = WITHIN, hint: str = ""
+    ) -> None:
+        """The topic has exactly `count` publishers of this type, of the node `node` if one is given.
+
+        Args:
+            topic: full name.
+            msg_type: message class.
+            node: full name of the node whose they are; by default of any.
+            count: how many publishers.
+            within: seconds until they must be there.
+            hint: a pointer for the student.
+
+        Example:
+            `ros.expect_publisher("/chatter", String, node="/talker")`
+
+        Codes:
+            `no-topic`, `topic-name`, `wrong-type`, `wrong-node`, `wrong-end`, `absolute-name`, `count`,
+            `extra-publisher`.
+        """
+        self._expect_end(topic, msg_type, "publisher", node, count, within, hint)
+
+    def expect_subscription(
+        self, topic: str, msg_type: type, *, node: str = "", count: int = 1, within: float = WITHIN, hint: str = ""
+    ) -> None:
+        """The topic has exactly `count` subscriptions of this type, of the node `node` if one is given.
+
+        Args:
+            topic: full name.
+            msg_type: message class.
+            node: full name of the node whose they are; by default of any.
+            count: how many subscriptions.
+            within: seconds until they must be there.
+            hint: a pointer for the student.
+
+        Example:
+            `ros.expect_subscription("/chatter", String, node="/listener")`
+
+        Codes:
+            `no-topic`, `topic-name`, `wrong-type`, `wrong-node`, `wrong-end`, `absolute-name`, `count`,
+            `extra-subscription`.
+        """
+        self._expect_end(topic, msg_type, "subscription", node, count, within, hint)
+
+    def _owners(self, topic: str, kind: End, msg_type: type | None = None, node: str = "") -> str:
+        """Whose ends of this kind are on the topic, with their number where a node has several."""
+        owners = Counter(
+            full_name(end.node_namespace, end.node_name) for end in self._ends(topic, msg_type, kind, node)
+        )
+        return ", ".join(owner if times == 1 else f"{owner} ({times})" for owner, times in sorted(owners.items()))
+
+    def _expect_no_end(self, topic: str, kind: End, within: float, hint: str) -> None:
+        gone = self._observer.wait(lambda: not self._ends(topic, None, kind, ""), within)
+        self._expect_that(
+            gone,
+            f"`{topic}` has no {kind}",
+            lambda: Diagnosis(
+                f"A {kind} on `{topic}` is still there, of {self._owners(topic, kind)}.",
+                f"{kind}-present",
+            ),
+            hint=hint,
+        )
+
+    def expect_no_publisher(self, topic: str, *, within: float = GONE_WITHIN, hint: str = "") -> None:
+        """Nobody publishes on the topic.
+
+        Args:
+            topic: full name.
+            within: seconds until they must be gone.
+            hint: a pointer for the student.
+
+        Example:
+            `ros.expect_no_publisher("/chatter")`
+
+        Codes:
+            `publisher-present`.
+        """
+        self._expect_no_end(topic, "publisher", within, hint)
+
+    def expect_no_subscription(self, topic: str, *, within: float = GONE_WITHIN, hint: str = "") -> None:
+        """Nobody subscribes to the topic.
+
+        Args:
+            topic: full name.
+            within: seconds until they must be gone.
+            hint: a pointer for the student.
+
+        Example:
+            `ros.expect_no_subscription("/chatter")`
+
+        Codes:
+            `subscription-present`.
+        """
+        self._expect_no_end(topic, "subscription", within, hint)
