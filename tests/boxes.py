@@ -8,9 +8,9 @@ import sys
 from pathlib import Path
 
 from autograder.core.results import Isolation
-from autograder.sandbox import bubblewrap
 from autograder.sandbox.environment import python_environment
 from autograder.sandbox.outer import run_in_sandbox
+from autograder.sandbox.walls import bubblewrap
 
 ROOT = Path(__file__).parent.parent
 ATTACKS = {path.stem: path.read_text() for path in sorted((Path(__file__).parent / "attacks").glob("*.py"))}
@@ -38,7 +38,7 @@ def as_ordinary_user(source: str) -> str:
         f"os.execve(sys.executable,[sys.executable,'-c',sys.stdin.read()],{environment!r})"
     )
     # A world-writable /tmp of its own, since this user may write nowhere else.
-    options = bubblewrap.level_zero_options()
+    options = bubblewrap.options_for_root()
     place = options.index("--tmpfs")
     options[place:place] = ["--perms", "1777"]
     process = bubblewrap.start_bwrap(

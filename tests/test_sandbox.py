@@ -103,7 +103,7 @@ def test_links_to_the_interpreter_open_no_home(tmp_path: Path) -> None:
         "print('CANARIES', [name for name in seen if name.endswith('canary.txt')])\n"
     )
     show = (
-        "import subprocess, sys\nfrom pathlib import Path\nfrom autograder.sandbox import bubblewrap\n"
+        "import subprocess, sys\nfrom pathlib import Path\nfrom autograder.sandbox.walls import bubblewrap\n"
         "from autograder.sandbox.limits import Limits\n"
         f"options = bubblewrap.inner_options(Path({str(programs)!r}), Limits(), {{}})\n"
         f"line = [sys.executable, '-I', '-S', '-c', {look!r}]\n"
@@ -115,6 +115,20 @@ def test_links_to_the_interpreter_open_no_home(tmp_path: Path) -> None:
         check=False,
     )  # fmt: skip
     assert done.stdout.splitlines() == [f"PYTHON {environment}/bin/python {real}", "CANARIES []", "0"], done
+
+
+@needs_full
+def test_what_the_launcher_loads_is_never_a_students_file() -> None:
+    # Loaded there, it would run with what the launcher keeps for making namespaces.
+    run = in_sandbox(
+        "import tempfile\nfrom pathlib import Path\nfrom autograder.core.results import Isolation\n"
+        "from autograder.sandbox.nodes import NodeSandbox\n"
+        "folder = Path(tempfile.mkdtemp()); (folder / 'honest.py').write_text('print(\"fine\")')\n"
+        "(folder / 'numpy.py').write_text('import os; os._exit(3)')\n"
+        "with NodeSandbox(folder, Isolation.FULL) as sandbox, sandbox.group() as group:\n"
+        "    program = group.start('honest'); program.wait(20); print(program.output())\n"
+    )
+    assert "fine" in run.stdout, run.stdout + run.stderr
 
 
 @pytest.fixture(params=[Isolation.NONE, Isolation.REDUCED])

@@ -11,8 +11,8 @@ from pathlib import Path
 
 from autograder.core.errors import KitError
 from autograder.core.results import Isolation
-from autograder.sandbox import bubblewrap, landlock
 from autograder.sandbox.outer import run_in_sandbox
+from autograder.sandbox.walls import bubblewrap, landlock
 
 _TIME_LIMIT = 60.0
 

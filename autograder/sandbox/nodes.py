@@ -18,13 +18,13 @@ from pathlib import Path
 
 from autograder.core.errors import KitError
 from autograder.core.results import Isolation
-from autograder.sandbox import bubblewrap, seccomp
 from autograder.sandbox.environment import INSIDE, python_environment
 from autograder.sandbox.group import GroupLost, ProgramGroup
 from autograder.sandbox.limits import Limits
 from autograder.sandbox.loop import Loop
 from autograder.sandbox.program import Program
 from autograder.sandbox.scratch import Scratch
+from autograder.sandbox.walls import bubblewrap, seccomp
 
 __all__ = ["Limits", "NodeSandbox", "Program", "ProgramGroup"]
 
@@ -177,7 +177,7 @@ class NodeSandbox:
             else:
                 command = [*python, str(INSIDE / "launcher.py"), end, str(self._scratch.folder)]
                 if self.isolation is Isolation.REDUCED:
-                    from autograder.sandbox.landlock import confined
+                    from autograder.sandbox.walls.landlock import confined
 
                     command = confined(command, self.folder, self._scratch.folder)
                 self._launcher = subprocess.Popen(

@@ -14,9 +14,9 @@ import time
 from dataclasses import dataclass
 
 from autograder.core.results import Isolation
-from autograder.sandbox import bubblewrap
 from autograder.sandbox.environment import python_environment
 from autograder.sandbox.limits import MIB
+from autograder.sandbox.walls import bubblewrap
 
 OUTPUT_LIMIT = 64 * MIB
 """Bytes of stdout after which the run is ended."""
@@ -27,12 +27,12 @@ _STOP_POLL = 0.2
 DROPPED_ID = 61771
 """The user and group that root becomes for grading: one that owns nothing."""
 
-_DROP = (
+_GIVE_UP_ROOT = (
     f"import os,sys;n={DROPPED_ID};os.setgroups([]);os.setresgid(n,n,n);os.setresuid(n,n,n);"
     "os.execve(sys.argv[1],sys.argv[1:],{})"
 )
 
-_RUN_LEASHED = (
+_RUN_AND_END_WITH_PARENT = (
     "import ctypes,os,runpy,sys;ctypes.CDLL(None).prctl(1,9);"
     "os.getppid()==int(sys.argv[1]) or sys.exit('nobody waits for this');sys.argv=sys.argv[2:];"
     "runpy.run_module(sys.argv[0],run_name='__main__',alter_sys=True)"
@@ -105,7 +105,7 @@ def start_in_sandbox(module_args: list[str], isolation: Isolation) -> subprocess
     command = [sys.executable, "-m", *module_args]
     pipe = subprocess.PIPE
     if isolation is not Isolation.FULL:
-        command = [sys.executable, "-c", _RUN_LEASHED, str(os.getpid()), *module_args]
+        command = [sys.executable, "-c", _RUN_AND_END_WITH_PARENT, str(os.getpid()), *module_args]
         return subprocess.Popen(
             command, env=variables, start_new_session=True, stdin=pipe, stdout=pipe, stderr=pipe, cwd="/"
         )
@@ -113,7 +113,7 @@ def start_in_sandbox(module_args: list[str], isolation: Isolation) -> subprocess
     if os.getuid() == 0:
         # Namespaces nest only for an ordinary user, and only root may read below /root: give up root inside a mount
         # tree of our own, in which this Python lies under folders that everyone may enter.
-        around = (bubblewrap.level_zero_options(), [sys.executable, "-I", "-S", "-c", _DROP])
+        around = (bubblewrap.options_for_root(), [sys.executable, "-I", "-S", "-c", _GIVE_UP_ROOT])
     return bubblewrap.start_bwrap(
         bubblewrap.outer_options(variables), command, around=around, stdin=pipe, stdout=pipe, stderr=pipe
     )

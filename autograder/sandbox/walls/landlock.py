@@ -1,7 +1,7 @@
 """Reduced isolation: the kernel's Landlock hides files and signals where there are no user namespaces.
 
 It hides neither the network nor the process list. Run as a module it confines itself and becomes another program:
-`python -m autograder.sandbox.landlock READ_ONLY… -- WRITABLE… -- COMMAND…`.
+`python -m autograder.sandbox.walls.landlock READ_ONLY… -- WRITABLE… -- COMMAND…`.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from autograder.sandbox import seccomp
 from autograder.sandbox.environment import HERE, INSIDE, SYSTEM_FILES, SYSTEM_FOLDERS, python_places
+from autograder.sandbox.walls import seccomp
 
 NEEDED_VERSION = 6
 """The first that also keeps signals and abstract sockets inside."""
@@ -41,7 +41,7 @@ def confined(command: Sequence[str], folder: Path, scratch: Path) -> list[str]:
     readable = [*SYSTEM_FOLDERS, *SYSTEM_FILES, *map(str, python_places().paths), str(folder), "/proc", str(INSIDE)]
     return [
         sys.executable, "-I", "-c", f"import sys; sys.path.append({str(HERE.parent.parent)!r}); "
-        "from autograder.sandbox.landlock import main; main()",
+        "from autograder.sandbox.walls.landlock import main; main()",
         *readable, "--", str(scratch), *_DEVICES, "--", *command,
     ]  # fmt: skip
 

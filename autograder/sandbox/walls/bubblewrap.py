@@ -65,7 +65,7 @@ def _environment(variables: Mapping[str, str]) -> list[str]:
     return ["--clearenv", *(part for item in variables.items() for part in ("--setenv", *item))]
 
 
-def level_zero_options() -> list[str]:
+def options_for_root() -> list[str]:
     """For real root only: a private mount tree in which another user can reach this Python, wherever it lies."""
     places = python_places()
     shown = [*places.paths, *places.links, PACKAGE, *map(Path, SYSTEM_FILES)]
