@@ -11,9 +11,9 @@ import time
 from pathlib import Path
 from typing import Any
 
+from autograder.core.processes import descendants, memory
 from autograder.core.results import Isolation
-from autograder.sandbox.nodes import NodeSandbox, Program
-from autograder.sandbox.processes import descendants, memory
+from autograder.sandbox.node_sandbox import NodeSandbox, RunningProgram
 
 ATTACKS: dict[str, str] = globals().get("ATTACKS", {})
 AT_ONCE = 6
@@ -52,7 +52,7 @@ def run(sandbox: NodeSandbox, names: list[str], resting: int) -> dict[str, Any]:
     return {name: {**entry, **common} for name, entry in report.items()}
 
 
-def watched(program: Program, wanted: str) -> dict[str, Any]:
+def watched(program: RunningProgram, wanted: str) -> dict[str, Any]:
     """Wait for the end that a program must come to, and say how it stands."""
     if "goes on" in wanted:
         if not program.wait(1.0):

@@ -28,12 +28,12 @@ from rclpy.qos import (
 from autograder.checks import runtime
 from autograder.checks.concurrency import Concurrency
 from autograder.checks.program import Node
+from autograder.core.cpu_use import CpuUse, cpu_uses, kept_waiting
 from autograder.graph.names import nearest
 from autograder.graph.observer import Observer
 from autograder.graph.qos import first_mismatch
 from autograder.graph.recording import Received
 from autograder.sandbox.environment import profile_environment
-from autograder.sandbox.processes import CpuUse, cpu_uses, kept_waiting
 
 
 def profiles() -> st.SearchStrategy[QoSProfile]:

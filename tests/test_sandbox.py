@@ -16,12 +16,12 @@ import pytest
 from boxes import ATTACKS, ROOT, RUN_STDIN, in_sandbox
 
 from autograder.core.errors import KitError
+from autograder.core.processes import descendants
 from autograder.core.results import Isolation
 from autograder.sandbox import isolation
 from autograder.sandbox.isolation import Preflight, choose, preflight
-from autograder.sandbox.nodes import Limits, NodeSandbox
+from autograder.sandbox.node_sandbox import Limits, NodeSandbox
 from autograder.sandbox.outer import run_in_sandbox
-from autograder.sandbox.processes import descendants
 
 HONEST = "print('fine')\n"
 
@@ -37,7 +37,7 @@ def test_when_the_parent_is_killed_nothing_remains(kind: Isolation, processes: i
         pytest.skip(f"no {kind.value} isolation here")
     inner = (
         "from pathlib import Path\nfrom autograder.core.results import Isolation\n"
-        "from autograder.sandbox.nodes import NodeSandbox\n"
+        "from autograder.sandbox.node_sandbox import NodeSandbox\n"
         "import tempfile; p = Path(tempfile.mkdtemp()); (p / 'sleeper.py').write_text('import time; time.sleep(600)')\n"
         f"s = NodeSandbox(p, Isolation.{kind.name}); g = s.group(); g.start('sleeper'); g.start('sleeper').wait(600)\n"
     )
@@ -122,7 +122,7 @@ def test_what_the_launcher_loads_is_never_a_students_file() -> None:
     # Loaded there, it would run with what the launcher keeps for making namespaces.
     run = in_sandbox(
         "import tempfile\nfrom pathlib import Path\nfrom autograder.core.results import Isolation\n"
-        "from autograder.sandbox.nodes import NodeSandbox\n"
+        "from autograder.sandbox.node_sandbox import NodeSandbox\n"
         "folder = Path(tempfile.mkdtemp()); (folder / 'honest.py').write_text('print(\"fine\")')\n"
         "(folder / 'numpy.py').write_text('import os; os._exit(3)')\n"
         "with NodeSandbox(folder, Isolation.FULL) as sandbox, sandbox.group() as group:\n"
@@ -228,7 +228,7 @@ def test_a_program_that_only_computes_is_ended_and_says_so(tmp_path: Path) -> No
 def test_a_submission_that_only_computes_has_little_left_for_its_later_launches() -> None:
     run = in_sandbox(
         "import time, tempfile\nfrom pathlib import Path\nfrom autograder.core.results import Isolation\n"
-        "from autograder.sandbox.nodes import Limits, NodeSandbox\n"
+        "from autograder.sandbox.node_sandbox import Limits, NodeSandbox\n"
         "folder = Path(tempfile.mkdtemp()); (folder / 'burns.py').write_text('while True: pass')\n"
         "(folder / 'asks.py').write_text('import resource; print(resource.getrlimit(resource.RLIMIT_CPU)[0])')\n"
         "limits = Limits(cpu_seconds=3, cpu_together=4, cpu_last=1)\n"
@@ -280,7 +280,7 @@ def test_a_killed_notebook_leaves_nothing(tmp_path: Path) -> None:
     )
     source = (
         "import time\nfrom pathlib import Path\nfrom autograder.core.results import Isolation\n"
-        "from autograder.sandbox.nodes import NodeSandbox\n"
+        "from autograder.sandbox.node_sandbox import NodeSandbox\n"
         f"sandbox = NodeSandbox(Path({str(programs)!r}), Isolation.NONE)\ngroup = sandbox.group()\n"
         "program = group.start('stays')\nwhile not program.output(): time.sleep(0.01)\n"
         "print('ready', flush=True)\ntime.sleep(600)\n"

@@ -36,7 +36,7 @@ from autograder.diagnosis import Diagnosis
 from autograder.graph.observer import Observer
 from autograder.launch_files import LaunchFileError, remove_written
 from autograder.sandbox.environment import profile_environment, remove_logs
-from autograder.sandbox.nodes import ProgramGroup
+from autograder.sandbox.node_sandbox import ProgramGroup
 
 
 @watched

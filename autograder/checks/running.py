@@ -10,7 +10,7 @@ from autograder.checks.program import Node
 from autograder.checks.settling import Settling
 from autograder.diagnosis import Diagnosis, Scene
 from autograder.graph.observer import Observer
-from autograder.sandbox.nodes import Program
+from autograder.sandbox.node_sandbox import RunningProgram
 
 SETTLE = 2.0
 """Seconds that a new program may take to show that it lives."""
@@ -31,15 +31,15 @@ class Running:
         """Begin without programs."""
         self.described: list[Node] = []
         """What the launch was asked to start."""
-        self.programs: list[tuple[Node, Program]] = []
+        self.programs: list[tuple[Node, RunningProgram]] = []
         """What has been started."""
         self.missing: list[str] = []
         """Programs that no cell has written."""
         self.trouble: list[Diagnosis] = []
         """Why a program, or the whole launch file, could not be started."""
-        self.stopped: list[Program] = []
+        self.stopped: list[RunningProgram] = []
         """Programs that the check itself has stopped."""
-        self.may_end: list[Program] = []
+        self.may_end: list[RunningProgram] = []
         """Programs that the check itself has stopped, or that are asked to end by themselves."""
         self._ended: float | None = None
 
@@ -69,7 +69,7 @@ class Running:
         settling = Settling(self.observer, [program for _, program in self.programs])
         return lambda: self.all_ended() or (not needs() and settling.decided())
 
-    def gone_program(self) -> Program | None:
+    def gone_program(self) -> RunningProgram | None:
         """A program that has ended by itself, though it had to go on: it failed, or it ended as the last one."""
         ended = [program for _, program in self.programs if not program.running() and program not in self.may_end]
         failed = [program for program in ended if program.exit_status() != 0]

@@ -16,7 +16,7 @@ from autograder.core import front_end
 from autograder.core.front_end import FrontEnd
 from autograder.core.results import Isolation
 from autograder.graph.domains import free_domains
-from autograder.sandbox.nodes import NodeSandbox
+from autograder.sandbox.node_sandbox import NodeSandbox
 
 
 class Runtime:

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from autograder.diagnosis.events import Event, ExecutorSeen, NodeSeen, ProbeFailed, Thing, read
 from autograder.graph.names import full_name
 from autograder.graph.observer import Observer
-from autograder.sandbox.nodes import Program
+from autograder.sandbox.node_sandbox import RunningProgram
 
 QUIET = 1.5
 """Seconds without anything new, besides the longest period of a timer: what timers' callbacks make is there then."""
@@ -30,7 +30,7 @@ class Settling:
         programs: that were started.
     """
 
-    def __init__(self, observer: Observer, programs: Sequence[Program]) -> None:
+    def __init__(self, observer: Observer, programs: Sequence[RunningProgram]) -> None:
         """Begin to watch."""
         self._observer, self._programs = observer, list(programs)
         self._seen: object = None

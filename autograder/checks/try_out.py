@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from autograder.checks.running import Running
 from autograder.core.output import tidy
 from autograder.graph.names import full_name
-from autograder.sandbox.nodes import Program
+from autograder.sandbox.node_sandbox import RunningProgram
 
 TRIAL = 3.0
 """Seconds for which the programs run."""
@@ -24,7 +24,7 @@ class Log(str):
         return self or "(nothing was printed)"
 
 
-def log_of(programs: Sequence[Program], name: str) -> Log:
+def log_of(programs: Sequence[RunningProgram], name: str) -> Log:
     """Return what the programs of a launch have printed so far, or one of them."""
     chosen = [program for program in programs if name in ("", program.name)]
     many = len(chosen) > 1

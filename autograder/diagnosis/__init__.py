@@ -15,15 +15,15 @@ from autograder.diagnosis.chain import inside_reason
 from autograder.diagnosis.matching import why_not_matched
 from autograder.diagnosis.names import why_doubled, why_no_endpoint, why_no_node, why_no_service, why_topic_present
 from autograder.diagnosis.programs import program_trouble, shut_down_inside
-from autograder.diagnosis.reason import Diagnosis, RunningProgram
+from autograder.diagnosis.reason import DiagnosedProgram, Diagnosis
 from autograder.diagnosis.scene import Scene
 from autograder.diagnosis.silence import SILENT, account, lifecycle_silence, why_no_answer, why_silent
 from autograder.diagnosis.together import layout, waits_for_its_group, why_not_together, why_starved
 
 __all__ = [
     "SILENT",
+    "DiagnosedProgram",
     "Diagnosis",
-    "RunningProgram",
     "Scene",
     "account",
     "failed_in_a_callback",

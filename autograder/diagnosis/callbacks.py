@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from autograder.diagnosis.events import BadMessage, BadReturn, CallbackError, Event, ThreadError, read
 from autograder.diagnosis.inside import Inside
-from autograder.diagnosis.reason import Diagnosis, RunningProgram
+from autograder.diagnosis.reason import DiagnosedProgram, Diagnosis
 from autograder.diagnosis.scene import Scene
 from autograder.diagnosis.traces import KNOWN_ERRORS, quoted
 
@@ -36,7 +36,7 @@ def thread_failed(inside: Inside) -> Diagnosis | None:
     return None
 
 
-def failed_in_a_callback(scene: Scene) -> RunningProgram | None:
+def failed_in_a_callback(scene: Scene) -> DiagnosedProgram | None:
     """A program with an error in a callback, which ends it.
 
     A lifecycle node outlives its own. A node outlives a parameter callback that returns nothing, too: the value is

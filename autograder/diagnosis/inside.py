@@ -11,7 +11,7 @@ from typing import TypeVar
 
 from autograder.diagnosis import events, sources
 from autograder.diagnosis.events import Call, Event, ExecutorSeen, NodeSeen, ParameterSeen, Thing
-from autograder.diagnosis.reason import RunningProgram
+from autograder.diagnosis.reason import DiagnosedProgram
 from autograder.graph.observer import Observer
 
 _T = TypeVar("_T")
@@ -20,7 +20,7 @@ _T = TypeVar("_T")
 class Inside:
     """One program as its probe shows it. Where the probe could not attach, nothing is known and nothing is said."""
 
-    def __init__(self, program: RunningProgram, folder: Path, observer: Observer) -> None:
+    def __init__(self, program: DiagnosedProgram, folder: Path, observer: Observer) -> None:
         """Read the program's events; its source lies in `folder`, its launch's graph is what `observer` sees."""
         self.folder, self.observer = folder, observer
         self.program = program

@@ -18,7 +18,7 @@ class Diagnosis:
     """What to do or where to read on."""
 
 
-class RunningProgram(Protocol):
+class DiagnosedProgram(Protocol):
     """What a diagnosis needs of a program."""
 
     name: str

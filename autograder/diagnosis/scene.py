@@ -8,7 +8,7 @@ from functools import cached_property
 from pathlib import Path
 
 from autograder.diagnosis.inside import Inside
-from autograder.diagnosis.reason import Diagnosis, RunningProgram
+from autograder.diagnosis.reason import DiagnosedProgram, Diagnosis
 from autograder.graph.observer import Observer
 
 RECORDS_FOLLOW = 0.3
@@ -20,7 +20,7 @@ class Scene:
     """The launch that is looked at."""
 
     observer: Observer
-    programs: Sequence[RunningProgram]
+    programs: Sequence[DiagnosedProgram]
     missing: Sequence[str]
     """Programs that should have been launched, but that no cell defines."""
     folder: Path
@@ -29,7 +29,7 @@ class Scene:
     """The remap rules given to each of the programs, as on the command line."""
     trouble: Sequence[Diagnosis] = field(default=())
     """What kept programs from being started at all."""
-    stopped: Sequence[RunningProgram] = ()
+    stopped: Sequence[DiagnosedProgram] = ()
     """Programs that the check itself has ended."""
 
     @cached_property
@@ -39,7 +39,7 @@ class Scene:
             self.observer.pause(RECORDS_FOLLOW)
         return [self.inside(program) for program in self.programs]
 
-    def inside(self, program: RunningProgram) -> Inside:
+    def inside(self, program: DiagnosedProgram) -> Inside:
         """What one program's probe says now."""
         return Inside(program, self.folder, self.observer)
 

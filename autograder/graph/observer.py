@@ -21,10 +21,10 @@ from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
+from autograder.core.cpu_use import CpuUse, cpu_uses, kept_waiting
 from autograder.core.errors import KitError
 from autograder.graph.names import full_name
 from autograder.graph.recording import Recording, quiet_profile
-from autograder.sandbox.processes import CpuUse, cpu_uses, kept_waiting
 
 POLL = 0.02
 """Seconds between two looks at the graph while waiting: rclpy reports messages, but not every graph change."""

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from autograder.graph.observer import Observer
     from autograder.notebook.saved_notebook import SavedNotebook
     from autograder.notebook.watch import Watch
-    from autograder.sandbox.program import Program
+    from autograder.sandbox.running_program import RunningProgram
 
 _SCORED = re.compile(r"\bscore\(")
 
@@ -83,7 +83,7 @@ class Kernel:
         """The folder in which the programs and files of the cells lie."""
         return self.folder.path
 
-    def watch(self, observer: Observer, programs: Callable[[], Sequence[Program]]) -> Watch:
+    def watch(self, observer: Observer, programs: Callable[[], Sequence[RunningProgram]]) -> Watch:
         """Begin to show what goes on in a launch; what programs print is shown where no check is made of it."""
         from autograder.notebook.watch import Watch
 

@@ -10,7 +10,7 @@ from typing import Any
 
 from autograder.core.output import tidy
 from autograder.graph.observer import Observer
-from autograder.sandbox.program import Program
+from autograder.sandbox.running_program import RunningProgram
 
 _MUTE = 0.7
 """Seconds of waiting after which a line says what for: most waits are over by then."""
@@ -31,7 +31,7 @@ class Watch:
     """
 
     def __init__(
-        self, observer: Observer, programs: Callable[[], Sequence[Program]], streams: bool, updates: bool
+        self, observer: Observer, programs: Callable[[], Sequence[RunningProgram]], streams: bool, updates: bool
     ) -> None:
         """Begin to watch."""
         self._programs = programs

@@ -15,11 +15,11 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from autograder.core.errors import KitError
+from autograder.core.processes import cpu_time, memory, pid_of
 from autograder.sandbox import watch
 from autograder.sandbox.limits import Limits
 from autograder.sandbox.loop import Loop
-from autograder.sandbox.processes import cpu_time, memory, pid_of
-from autograder.sandbox.program import Program
+from autograder.sandbox.running_program import RunningProgram
 
 _ANSWER = 10.0
 """Seconds after which a first process that does not answer is given up."""
@@ -59,7 +59,7 @@ class ProgramGroup:
         self._limits = limits
         self._loop = loop
         self._channel = channel
-        self._programs: dict[int, Program] = {}
+        self._programs: dict[int, RunningProgram] = {}
         self._started = 0
         self._first = -1
         """A pidfd of the first process."""
@@ -98,7 +98,7 @@ class ProgramGroup:
 
     def start(
         self, program: str, args: Sequence[str] = (), env: Mapping[str, str] | None = None, cores: int = 2
-    ) -> Program:
+    ) -> RunningProgram:
         """Start `program`.py of the folder as a process of its own.
 
         Args:
@@ -113,7 +113,7 @@ class ProgramGroup:
         """
         if not (self.folder / f"{program}.py").is_file():
             raise FileNotFoundError(f"{program}.py")
-        started = Program(program, self._limits, self.changed, self._catch_up)
+        started = RunningProgram(program, self._limits, self.changed, self._catch_up)
         try:
             known = self._request(started, list(args), dict(env or {}), cores)
         except OSError:
@@ -154,7 +154,7 @@ class ProgramGroup:
 
     # Starting.
 
-    def _request(self, program: Program, args: list[str], env: dict[str, str], cores: int) -> bool:
+    def _request(self, program: RunningProgram, args: list[str], env: dict[str, str], cores: int) -> bool:
         ends = [os.pipe2(os.O_CLOEXEC) for _ in range(3)]
         for ours, _ in ends:
             os.set_blocking(ours, False)
@@ -280,11 +280,11 @@ class ProgramGroup:
             with contextlib.suppress(ValueError, LookupError, TypeError, AttributeError):
                 self._take_answer(json.loads(packet), handles)
 
-    def _watch_pipes(self, program: Program, readers: list[tuple[int, Callable[[bytes], None]]]) -> None:
+    def _watch_pipes(self, program: RunningProgram, readers: list[tuple[int, Callable[[bytes], None]]]) -> None:
         for descriptor, taker in readers:
             self._loop.when_readable(descriptor, self._reader(program, descriptor, taker))
 
-    def _reader(self, program: Program, descriptor: int, taker: Callable[[bytes], None]) -> Callable[[], None]:
+    def _reader(self, program: RunningProgram, descriptor: int, taker: Callable[[bytes], None]) -> Callable[[], None]:
         def read() -> None:
             if descriptor not in program.readers:
                 return  # closed by what came before it in the same round
@@ -301,12 +301,12 @@ class ProgramGroup:
 
         return read
 
-    def _catch_up(self, program: Program) -> None:
+    def _catch_up(self, program: RunningProgram) -> None:
         """Take what lies in a running program's pipes: its answer may have come by DDS before its notes were read."""
         if program.readers and not self._over:
             self._loop.do(lambda: self._drain(program))
 
-    def _drain(self, program: Program) -> None:
+    def _drain(self, program: RunningProgram) -> None:
         """Take what a program has left in its pipes, at most one limit's worth."""
         for descriptor in list(program.readers):
             for _ in range(64):
@@ -317,7 +317,7 @@ class ProgramGroup:
                 if program._written + program._noted == before:
                     break
 
-    def _forget_pipe(self, program: Program, descriptor: int) -> None:
+    def _forget_pipe(self, program: RunningProgram, descriptor: int) -> None:
         if descriptor in program.readers:
             program.readers.remove(descriptor)
             self._loop.forget(descriptor)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from autograder.core.errors import KitError
 from autograder.core.results import Isolation
-from autograder.sandbox.nodes import NodeSandbox
+from autograder.sandbox.node_sandbox import NodeSandbox
 
 
 def main() -> int:

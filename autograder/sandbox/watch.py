@@ -7,12 +7,12 @@ import os
 import signal
 from collections.abc import Sequence
 
+from autograder.core.processes import Process, descendants, memory, proportional_memory
 from autograder.sandbox.limits import Limits
-from autograder.sandbox.processes import Process, descendants, memory, proportional_memory
-from autograder.sandbox.program import Program
+from autograder.sandbox.running_program import RunningProgram
 
 
-def enforce(first: int, base: int, programs: Sequence[Program], limits: Limits) -> bool:
+def enforce(first: int, base: int, programs: Sequence[RunningProgram], limits: Limits) -> bool:
     """Look at what a launch uses, and end the biggest of its programs if that is too much.
 
     Args:
@@ -37,7 +37,9 @@ def enforce(first: int, base: int, programs: Sequence[Program], limits: Limits) 
     return True
 
 
-def _end_biggest(programs: Sequence[Program], family: dict[int, Process], sizes: dict[int, int], why: str) -> None:
+def _end_biggest(
+    programs: Sequence[RunningProgram], family: dict[int, Process], sizes: dict[int, int], why: str
+) -> None:
     """End the program whose processes use most, and all processes that belong to no program any more."""
     owned: dict[int, list[int]] = {}
     roots = {program.pid for program in programs}
@@ -46,11 +48,11 @@ def _end_biggest(programs: Sequence[Program], family: dict[int, Process], sizes:
         while owner in family and owner not in roots:
             owner = family[owner].session if family[owner].session in roots else family[owner].parent
         owned.setdefault(owner if owner in roots else 0, []).append(pid)
-    doomed = owned.pop(0, [])
+    ending = owned.pop(0, [])
     if owned:
         worst = max(owned, key=lambda owner: sum(sizes[pid] for pid in owned[owner]))
-        doomed += owned[worst]
+        ending += owned[worst]
         next(program for program in programs if program.pid == worst)._kill(why)
-    for pid in doomed:
+    for pid in ending:
         with contextlib.suppress(ProcessLookupError, PermissionError):
             os.kill(pid, signal.SIGKILL)

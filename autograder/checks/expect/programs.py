@@ -16,7 +16,7 @@ from autograder.checks.misuse import Misuse
 from autograder.diagnosis import Diagnosis
 from autograder.graph.clock import ClockDriver
 from autograder.graph.recording import Recording
-from autograder.sandbox.nodes import Program
+from autograder.sandbox.node_sandbox import RunningProgram
 
 _LEVELS = {"DEBUG": 10, "INFO": 20, "WARN": 30, "ERROR": 40, "FATAL": 50}
 """Numbers of rcl_interfaces/msg/Log."""
@@ -25,7 +25,7 @@ _LEVELS = {"DEBUG": 10, "INFO": 20, "WARN": 30, "ERROR": 40, "FATAL": 50}
 class ProgramExpectations(Expectations):
     """What the programs do as processes."""
 
-    def program(self, name: str) -> Program:
+    def program(self, name: str) -> RunningProgram:
         """The last started program of this name; a missing one is a failed outcome.
 
         Args:

@@ -1,4 +1,4 @@
-"""Reading the process list: who descends from whom, how much memory is whose, and who waits for a CPU."""
+"""Who waits for a CPU: what the processes of a launch have had of them, and by how much that made a message late."""
 
 from __future__ import annotations
 
@@ -8,82 +8,12 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-_HAD_ITS_CHANCE = 3.0
+from autograder.core.processes import cpu_time, descendants
+
+_NOT_KEPT_FROM_ANYTHING = 3.0
 """Seconds of CPU in one wait after which a process was not kept from anything; a node starts in a third of one."""
-_BEGINNING = 1.0
-"""Seconds of CPU that a program may take to begin; one that computes on takes what it gets, and waits for ever."""
-
-
-@dataclass(frozen=True)
-class Process:
-    """One line of the process list."""
-
-    pid: int
-    parent: int
-    session: int
-    threads: int
-
-
-def descendants(root: int) -> dict[int, Process]:
-    """Return the living processes below `root`, without itself. What cannot be read has just ended."""
-    everyone: dict[int, list[str]] = {}
-    children: dict[int, list[int]] = {}
-    for entry in os.listdir("/proc"):
-        if not entry.isdigit():
-            continue
-        with contextlib.suppress(OSError):
-            fields = Path(f"/proc/{entry}/stat").read_text().rpartition(")")[2].split()
-            if fields[0] in "ZX":
-                continue
-            everyone[int(entry)] = fields
-            children.setdefault(int(fields[1]), []).append(int(entry))
-    found: dict[int, Process] = {}
-    front = [root]
-    while front:
-        for pid in children.get(front.pop(), []):
-            fields = everyone[pid]
-            found[pid] = Process(pid, int(fields[1]), int(fields[3]), int(fields[17]))
-            front.append(pid)
-    return found
-
-
-def memory(pid: int) -> int:
-    """Return the bytes of memory, swapped out or not, that belong to no file; 0 if the process is gone.
-
-    What is mapped to be shared counts in full, and so do pages that a fork still shares.
-    """
-    total = 0
-    with contextlib.suppress(OSError):
-        for line in Path(f"/proc/{pid}/status").read_text().splitlines():
-            if line.startswith(("RssAnon:", "RssShmem:", "VmSwap:")):
-                total += int(line.split()[1]) * 1024
-    return total
-
-
-def proportional_memory(pid: int) -> int:
-    """Return the bytes of memory that are this process's own; a shared page counts in parts. 0 if it is gone."""
-    total = 0
-    with contextlib.suppress(OSError):
-        for line in Path(f"/proc/{pid}/smaps_rollup").read_text().splitlines():
-            if line.startswith(("Pss:", "SwapPss:")):
-                total += int(line.split()[1]) * 1024
-    return total
-
-
-def cpu_time(pid: int) -> float:
-    """Return the seconds of CPU that a process has had, with those of its children that have ended; 0 if it is gone."""
-    with contextlib.suppress(OSError):
-        fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
-        return sum(map(int, fields[11:15])) / os.sysconf("SC_CLK_TCK")
-    return 0.0
-
-
-def pid_of(handle: int) -> int:
-    """Return the process id, as this process sees it, behind a pidfd; -1 if it has been reaped."""
-    for line in Path(f"/proc/self/fdinfo/{handle}").read_text().splitlines():
-        if line.startswith("Pid:"):
-            return int(line.split()[1])
-    return -1
+_CPU_TO_BEGIN = 1.0
+"""Seconds of CPU that a program may take to begin; one that computes on takes what it gets, and always waits."""
 
 
 @dataclass(frozen=True)
@@ -113,7 +43,7 @@ class CpuUse:
     def computes(self) -> bool:
         """Whether it has computed for most of the time in which nobody kept it from that."""
         free = self.age - max((wait.waited for wait in self.threads.values()), default=0.0)
-        return self.cpu > _BEGINNING and self.cpu > free / 2
+        return self.cpu > _CPU_TO_BEGIN and self.cpu > free / 2
 
 
 def cpu_uses() -> dict[int, CpuUse]:
@@ -154,7 +84,7 @@ def kept_waiting(before: dict[int, CpuUse], after: dict[int, CpuUse]) -> float:
     together = sum(used.values())
     kept = 0.0
     for pid, use in after.items():
-        if used[pid] > _HAD_ITS_CHANCE or (pid != os.getpid() and use.computes()):
+        if used[pid] > _NOT_KEPT_FROM_ANYTHING or (pid != os.getpid() and use.computes()):
             continue
         known = before[pid].threads if pid in before else {}
         waited = max(_waited_since(known.get(thread), wait) for thread, wait in use.threads.items())

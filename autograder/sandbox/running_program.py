@@ -11,8 +11,8 @@ import time
 from collections.abc import Callable
 from typing import Any
 
+from autograder.core.processes import pid_of
 from autograder.sandbox.limits import Limits
-from autograder.sandbox.processes import pid_of
 
 STACK_SIGNAL = signal.SIGRTMIN + 10
 """The launcher makes a program write its threads' stacks at this signal."""
@@ -28,7 +28,7 @@ _RECORDS = 500
 """Notes that stand for a thing: only the last one of each is kept."""
 
 
-class Program:
+class RunningProgram:
     """A program that was started. Its output is read all the time by the sandbox's own thread.
 
     Attributes:
@@ -36,7 +36,7 @@ class Program:
     """
 
     def __init__(
-        self, name: str, limits: Limits, changed: threading.Condition, catch_up: Callable[[Program], None]
+        self, name: str, limits: Limits, changed: threading.Condition, catch_up: Callable[[RunningProgram], None]
     ) -> None:
         """Made by `ProgramGroup.start`."""
         self.name = name
