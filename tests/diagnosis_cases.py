@@ -36,6 +36,10 @@ def silent(scene: Scene, name: str) -> Diagnosis | None:
     return diagnosis.why_silent(scene, f"/{name}/out", String, quiet_profile())
 
 
+def silent_late(scene: Scene, name: str) -> Diagnosis | None:
+    return diagnosis.why_silent(scene, f"/{name}/map", String, LATCHED)
+
+
 def inside(scene: Scene, name: str) -> Diagnosis | None:
     return diagnosis.inside_reason(scene, f"/{name}")
 
@@ -110,6 +114,11 @@ ANSWER = "def answer(self, request, response):\n    {}\n"
 CONFIGURE = "def on_configure(self, state):\n    {}\n"
 TRIGGER = "node.trigger_configure()\nrclpy.spin(node)"
 MANAGED = "self.create_timer(0.05, lambda: self.managed.publish(String()))\n"
+MAP = (
+    "kept = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL{})\n"
+    "self.map = self.create_publisher(String, '~/map', kept)\nself.map.publish(String())\n"
+)
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 STRICT = QoSProfile(
     depth=1,
     durability=DurabilityPolicy.TRANSIENT_LOCAL,
@@ -289,6 +298,16 @@ CASES = {
         because="every 500 s) has not fired, the timer (line",
         never=("timer-period",),
     ),
+    "outlived": Case(
+        MAP.format(", lifespan=Duration(seconds=0.2)") + TALK,
+        says="lifespan",
+        because="the publisher's lifespan is 0.2 s",
+        never=("silent",),
+        ask=silent_late,
+    ),
+    "outlives": Case(
+        MAP.format(", lifespan=Duration(seconds=600)") + TALK, says="silent", never=("lifespan",), ask=silent_late
+    ),
     # Together.
     "one_thread": Case(
         TWO.format("", ""), SLOW, says="single-threaded-executor", because="one callback at a time", ask=together()
@@ -404,6 +423,13 @@ CASES = {
     "undeclared": Case(
         "self.get_parameter('rate')\n", says="parameter-not-declared", ask=trouble, never=("parameter-type", "crashed")
     ),
+    "builtin_callback": Case(
+        "from collections import deque\nself.create_subscription(String, '~/in', deque().append, 10)\n",
+        says="builtin-callback",
+        ask=trouble,
+        never=("crashed",),
+    ),
+    "other_value_error": Case("int('x')\n", says="crashed", ask=trouble, never=("builtin-callback",)),
     "wrong_parameter": Case(
         main="given = [rclpy.Parameter('rate', value='x')]\n"
         "rclpy.create_node('other', parameter_overrides=given).declare_parameter('rate', 1)",

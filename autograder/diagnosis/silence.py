@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from rclpy.qos import QoSProfile
+from rclpy.qos import DurabilityPolicy, QoSProfile
 
 from autograder.diagnosis import spinning
 from autograder.diagnosis.chain import inside_reason
@@ -14,6 +14,7 @@ from autograder.diagnosis.programs import program_trouble
 from autograder.diagnosis.reason import Diagnosis
 from autograder.diagnosis.scene import Scene, first
 from autograder.diagnosis.together import why_starved
+from autograder.graph import qos
 from autograder.graph.names import full_name, type_name
 
 SILENT = "silent"
@@ -35,6 +36,7 @@ def why_silent(scene: Scene, topic: str, msg_type: type, profile: QoSProfile) ->
     return (
         inside_reason(scene, node)
         or lifecycle_silence(scene, topic)
+        or too_old(scene, topic, profile)
         or not_due(scene, topic)
         or why_starved(scene)
         or Diagnosis(account(scene, topic), SILENT)
@@ -60,6 +62,28 @@ def lifecycle_silence(scene: Scene, topic: str = "") -> Diagnosis | None:
                 "lifecycle-inactive",
                 "It sends from `on_activate` to `on_deactivate` only.",
             )
+    return None
+
+
+def too_old(scene: Scene, topic: str, profile: QoSProfile) -> Diagnosis | None:
+    """Must have seen: a publisher that keeps messages for late joiners, all of them older than its lifespan by now."""
+    if profile.durability != DurabilityPolicy.TRANSIENT_LOCAL:
+        return None
+    for end in scene.observer.publishers(topic):
+        node, have = full_name(end.node_namespace, end.node_name), qos.describe(end.qos_profile)
+        lifespan = have["lifespan"]
+        for inside, publisher in _publishers(scene, topic):
+            age = inside.now - publisher.last
+            if have["durability"] != "transient_local" or publisher.node != node or not publisher.runs:
+                continue
+            if isinstance(lifespan, float) and lifespan < age:
+                return Diagnosis(
+                    f"`{inside.name}` published {publisher.runs} message{'s' * (publisher.runs > 1)} on `{topic}`, "
+                    f"{'the last of them ' * (publisher.runs > 1)}{age:.1f} s ago, and the publisher's lifespan is "
+                    f"{qos.in_words(lifespan)}: nothing is kept for who comes later than that.",
+                    "lifespan",
+                    "A publisher without a lifespan keeps its last messages for late joiners.",
+                )
     return None
 
 

@@ -25,6 +25,12 @@ KNOWN_ERRORS = (
         "what it may not ask for: use threads, or one more program in the launch.",
     ),
     (
+        "no signature found for builtin",
+        "builtin-callback",
+        "rclpy takes only functions and methods written in Python as callbacks: put the call into a `def` or a "
+        "`lambda` of your own.",
+    ),
+    (
         "InvalidHandle",
         "used-after-destroy",
         "It used something that had been destroyed. Under a MultiThreadedExecutor the executor does this itself, now "

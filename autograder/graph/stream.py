@@ -30,7 +30,8 @@ class Stream:
             message: what is sent.
             rate: hertz.
             qos: what the publisher offers. With manual liveliness each message asserts it.
-            expect_heard: waits until the number of matched subscriptions, which it is given, is not 0, or fails.
+            expect_heard: waits until the number of matched subscriptions, which it is given, is not 0 and these know
+                the publisher, or fails.
         """
         self._observer, self._topic, self._message, self._qos = observer, topic, message, qos
         self._period = 1 / rate

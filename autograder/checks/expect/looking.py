@@ -79,6 +79,23 @@ class Looking(Expectations):
             raise Misuse(f"pause: {for_seconds!r} is no time; it is a number of seconds, 0 or more.")
         self._observer.pause(for_seconds)
 
+    def seen_runs(self, program: str, kind: str, name: str) -> int | None:
+        """How often a callback was seen to begin inside a program: evidence for reasons only.
+
+        Args:
+            program: its name.
+            kind: `subscription` or `service`.
+            name: full name of its topic or service.
+
+        Returns:
+            None where the inside of the program cannot be seen.
+
+        Example:
+            `runs = ros.seen_runs("recorder", "subscription", "/frames")`
+        """
+        things = [t for inside in self._scene().insides if inside.name == program for t in inside.callbacks]
+        return next((thing.runs for thing in things if (thing.kind, thing.name) == (kind, name)), None)
+
     def seen_at_once(self, program: str, kind: str, name: str = "") -> int | None:
         """How many runs of a program's callbacks of one kind were seen at once inside it: evidence for reasons only.
 

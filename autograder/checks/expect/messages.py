@@ -35,6 +35,7 @@ class _Wanted:
     rate: float | None
     skip: int
     where: Callable[[Any], object] | None
+    saying: str
     hint: str
 
     def counted(self) -> list[Received]:
@@ -51,8 +52,14 @@ class _Wanted:
             return f"No message arrives on `{topic}`"
         number = f"Exactly {self.need}" if self.most == self.need else f"At least {self.need}"
         number += f", at most {self.most}," if self.most and self.most != self.need else ""
-        arrive = "message arrives" if self.need == 1 else "messages arrive"
-        return f"{number} {arrive} on `{topic}`" + (f" at {self.rate:g} Hz" if self.rate else "")
+        which = f" that {'says' if self.need == 1 else 'say'} {self.saying}" if self.saying else ""
+        which += " arrives" if self.need == 1 else " arrive"
+        rate = f" at {self.rate:g} Hz" if self.rate else ""
+        return f"{number} message{'s' * (self.need != 1)}{which} on `{topic}`{rate}"
+
+
+def _number(messages: int) -> str:
+    return f"{messages} message{'s' * (messages != 1)}"
 
 
 class MessageExpectations(SourceExpectations):
@@ -84,6 +91,7 @@ class MessageExpectations(SourceExpectations):
         for_seconds: float = 1.0,
         skip: int = 0,
         where: Callable[[Any], object] | None = None,
+        saying: str = "",
         values: Callable[[list[Any]], object] | None = None,
         publisher: str = "",
         publishers: int = 1,
@@ -105,6 +113,7 @@ class MessageExpectations(SourceExpectations):
             for_seconds: how long it is watched, in seconds, whether more than `at_most` come.
             skip: leaves out the first so many messages of the topic, for example those of a node's first life.
             where: counts only messages for which it gives something true.
+            saying: what `where` asks for, in words for the student, such as "`ok`".
             values: looks at all counted messages; a sentence that says what is wrong fails, and so does what is false.
             publisher: full name of the node that they must come from.
             publishers: how many publishers the topic may have.
@@ -128,7 +137,7 @@ class MessageExpectations(SourceExpectations):
         most = exactly if exactly is not None else at_most
         need = exactly if exactly is not None else at_least or (0 if most == 0 else 10 if rate else 1)
         recording = self._observer.record(topic, msg_type, qos)
-        wanted = _Wanted(recording, need, most, rate, skip, where, hint)
+        wanted = _Wanted(recording, need, most, rate, skip, where, saying, hint)
         if not self.wait(wanted.enough, within, lambda: self._ends(topic, msg_type, "publisher", "")):
             self._too_few(wanted, qos or quiet_profile(), within)
         if most is not None:
@@ -147,18 +156,19 @@ class MessageExpectations(SourceExpectations):
         if wanted.where and not got and recording.count > wanted.skip:
             # Messages do come, so what keeps callbacks waiting is not the reason.
             last = shorten(in_words(recording.messages[-1].msg, wanted.where), 120)
+            which = f"that says {wanted.saying}" if wanted.saying else "as expected"
             reason = (
                 diagnosis.program_trouble(scene)
                 or diagnosis.inside_reason(scene)
                 or diagnosis.lifecycle_silence(scene)
-                or Diagnosis(f"Messages came, but none as expected; the last of them is `{last}`.", "content")
+                or Diagnosis(f"Messages came, but none {which}; the last of them is `{last}`.", "content")
             )
         else:
             reason = diagnosis.why_silent(scene, recording.topic, recording.msg_type, qos)
             if got and reason.code == diagnosis.SILENT:
                 came = f"Only {got} of {wanted.need} messages came in {within:g} s."
                 reason = Diagnosis(f"{came} {reason.because}", "too-few")
-        expected, observed = f"{wanted.need} messages", f"{got} messages"
+        expected, observed = _number(wanted.need), _number(got)
         self._fail(wanted.title, reason, expected=expected, observed=observed, hint=wanted.hint)
 
     def _not_more(self, wanted: _Wanted, most: int, for_seconds: float) -> None:
@@ -199,7 +209,8 @@ class MessageExpectations(SourceExpectations):
         if not isinstance(verdict, str) and verdict:
             return
         said = verdict if isinstance(verdict, str) and verdict else "The messages do not say what they should."
-        observed = shorten("; ".join(in_words(r.msg, values) for r in received[:3]))
+        said_by = [in_words(r.msg, values) for r in received]
+        observed = shorten("; ".join(said_by if len(said_by) <= 4 else [*said_by[:2], "…", *said_by[-2:]]))
         self._fail(wanted.title, Diagnosis(said, "content"), observed=observed, hint=wanted.hint)
 
     def expect_silence(

@@ -6,11 +6,12 @@ from collections.abc import Callable
 from functools import cached_property
 from typing import Any
 
-from rclpy.qos import QoSProfile
+from rclpy.qos import QoSProfile, ReliabilityPolicy
 
 from autograder import diagnosis
 from autograder.checks.expect.endpoints import EndExpectations
 from autograder.checks.expect.expectations import WITHIN
+from autograder.graph.names import full_name
 from autograder.graph.stream import Stream
 
 RELIABLE_DEEP = 1000
@@ -26,6 +27,11 @@ class Publishing(EndExpectations):
     @cached_property
     def _publishers(self) -> dict[tuple[str, str], Any]:
         return {}
+
+    @cached_property
+    def _known(self) -> list[Any]:
+        """Publishers that have been used: what subscribed by then knows them."""
+        return []
 
     def open_publisher(self, topic: str, msg_type: type, *, qos: QoSProfile | int = RELIABLE_DEEP) -> Any:
         """Make one more publisher: the one that a later `publish` uses, before the program subscribes.
@@ -76,6 +82,11 @@ class Publishing(EndExpectations):
         profile = qos if isinstance(qos, QoSProfile) else QoSProfile(depth=qos)
         publisher = self._publishers.get(_key(topic, profile)) or self.open_publisher(topic, msg_type, qos=profile)
         self._wait_until_heard(publisher.get_subscription_count, topic, msg_type, profile, within, hint)
+        if publisher not in self._known:
+            self._known.append(publisher)
+            ends = self._observer.subscriptions(topic)
+            if any(end.qos_profile.reliability == ReliabilityPolicy.BEST_EFFORT for end in ends):
+                self._make_known(topic)
         self._observer.wait(self._observer.hears_all, MATCHES_WITHIN)
         for message in messages:
             publisher.publish(message)
@@ -86,16 +97,24 @@ class Publishing(EndExpectations):
         """Wait until a subscription has matched a publisher of the observer's; fail with what keeps them apart."""
         if self.wait_for_graph(matched, within):
             return
-        reason = diagnosis.why_not_matched(self._scene(), topic, profile, "subscription") or diagnosis.why_no_endpoint(
-            self._scene(), topic, msg_type, "subscription"
-        )
+        mismatch = diagnosis.why_not_matched(self._scene(), topic, profile, "subscription")
         self._fail(
-            f"A node listens to `{topic}`",
-            reason,
-            expected=f"a subscription on {topic}",
-            observed=self._topics(),
+            f"A node listens to `{topic}`" if mismatch is None else f"What is sent on `{topic}` reaches a subscription",
+            mismatch or diagnosis.why_no_endpoint(self._scene(), topic, msg_type, "subscription"),
+            expected=f"a subscription on {topic}" + " that matches" * (mismatch is not None),
+            observed=self._topics() if mismatch is None else "a subscription whose QoS does not match",
             hint=hint,
         )
+
+    def _make_known(self, topic: str) -> None:
+        """Wait until the nodes that subscribe to a topic know the check's publisher, which knows them already.
+
+        What is sent before that never reaches a best-effort subscription, and only the other side can tell. It tells
+        by answering a question: a program learns of the check's ends in the order in which they were made, and the
+        question's own end is the last.
+        """
+        for owner in {full_name(end.node_namespace, end.node_name) for end in self._observer.subscriptions(topic)}:
+            self._settle(owner)
 
     def stream(self, topic: str, message: Any, *, rate: float, qos: QoSProfile) -> Stream:
         """A message that is sent again and again, as by a sensor or a controller, between `start()` and `stop()`.
@@ -115,6 +134,7 @@ class Publishing(EndExpectations):
 
         def expect_heard(matched: Callable[[], int]) -> None:
             self._wait_until_heard(matched, topic, type(message), qos, WITHIN, "")
+            self._make_known(topic)
 
         return Stream(self._observer, topic, message, rate, qos, expect_heard)
 

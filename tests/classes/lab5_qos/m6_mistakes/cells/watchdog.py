@@ -13,6 +13,7 @@ class Watchdog(Node):
     def __init__(self):
         super().__init__("watchdog")
         self.state = "waiting"
+        self.fine = 0
         self.publisher = self.create_publisher(String, "health", 10)
         self.create_timer(0.1, lambda: self.publisher.publish(String(data=self.state)))
         requested = QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT, deadline=Duration(seconds=0.5))
@@ -20,7 +21,8 @@ class Watchdog(Node):
         self.create_subscription(Range, "range", self.heard, requested, event_callbacks=events)
 
     def heard(self, message):
-        self.state = "fine" if self.state == "degraded" else "ok"
+        self.fine = 10 if self.state == "degraded" else self.fine - 1  # messages, half a second of them
+        self.state = "fine" if self.fine > 0 else "ok"
 
     def missed(self, event):
         self.state = "degraded"

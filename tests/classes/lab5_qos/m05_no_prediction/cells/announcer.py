@@ -1,0 +1,29 @@
+%%node announcer
+import time
+
+import rclpy
+from rclpy.executors import ExternalShutdownException
+from rclpy.node import Node
+from std_msgs.msg import String
+
+
+class Announcer(Node):
+    def __init__(self):
+        super().__init__("announcer")
+        self.declare_parameter("text", "ready")
+        self.publisher = self.create_publisher(String, "announcement", 10)
+        while not self.publisher.get_subscription_count():
+            time.sleep(0.02)
+        self.publisher.publish(String(data=self.get_parameter("text").value))
+
+
+def main():
+    rclpy.init()
+    try:
+        rclpy.spin(Announcer())
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    rclpy.try_shutdown()
+
+
+main()
