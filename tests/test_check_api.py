@@ -27,7 +27,7 @@ SENDING = """
 """
 LOOKING = """
     available_transitions changes concurrency descriptions get_parameters list_parameters listen log
-    messages_during nodes program programs publishers requests seen_at_once served state subscriptions topics
+    messages_during nodes program programs publishers requests seen_at_once seen_runs served state subscriptions topics
     watch_transitions
 """
 SCORING = "part score"
