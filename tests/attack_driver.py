@@ -91,7 +91,7 @@ def run_beside_honest_node(sandbox: NodeSandbox, names: list[str]) -> dict[str, 
         entry = {
             "heard": heard,
             "own": all(message.msg.data == "honest" for message in talk.messages),
-            "seen": "/honest" in observer.nodes(),
+            "seen": observer.wait(lambda: "/honest" in observer.nodes(), 40),
             "running": honest.running(),
             "grown": grown >> 20,
             "flood": flood.count,

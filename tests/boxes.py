@@ -26,11 +26,11 @@ def in_sandbox(source: str, time_limit: float = 120.0) -> subprocess.CompletedPr
     return subprocess.CompletedProcess([], run.status, run.stdout.decode(), run.stderr)
 
 
-def as_ordinary_user(source: str) -> str:
+def as_ordinary_user(source: str, time_limit: float = 150.0) -> str:
     """Run Python source outside any sandbox, as a user that owns nothing; return what it prints."""
     if os.getuid() != 0:
         command = [sys.executable, "-c", source]
-        return subprocess.run(command, capture_output=True, text=True, timeout=150, cwd=ROOT, check=False).stdout
+        return subprocess.run(command, capture_output=True, text=True, timeout=time_limit, cwd=ROOT, check=False).stdout
     environment = {**python_environment(), "PYTHONPATH": str(ROOT), "HOME": "/tmp"}
     become = (
         f"import os,sys;os.setgroups([]);os.setresgid({ORDINARY_USER},{ORDINARY_USER},{ORDINARY_USER});"
@@ -45,5 +45,5 @@ def as_ordinary_user(source: str) -> str:
         options, [sys.executable, "-c", become],
         stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
     )  # fmt: skip
-    out, error = process.communicate(source.encode(), timeout=150)
+    out, error = process.communicate(source.encode(), timeout=time_limit)
     return out.decode() + error.decode()

@@ -27,6 +27,8 @@ MUST = {
     if name[0] != "_" and name != "honest"
 }
 BESIDE_NODE = [name for name, source in ATTACKS.items() if "Must, beside an honest node:" in source]
+RUN = 600.0
+"""Seconds for all attacks together: about 40 on a quiet machine."""
 TEARDOWN = 2.0
 """Seconds, on a crowded machine."""
 GROWN = 400
@@ -43,14 +45,15 @@ def report(request: pytest.FixtureRequest) -> dict[str, dict[str, Any]]:
         driver = (ROOT / "tests" / "attack_driver.py").read_text().replace("from __future__ import annotations\n", "")
         source = given + driver
         if request.param == "own user":
-            said = in_sandbox(source)
+            said = in_sandbox(source, RUN)
             text = said.stdout + said.stderr
         else:
             text = as_ordinary_user(
                 "from autograder.core.results import Isolation\n"
                 "from autograder.sandbox.outer import run_in_sandbox\n"
-                f"run = run_in_sandbox({[*RUN_STDIN]!r}, {source.encode()!r}, Isolation.FULL, 120.0)\n"
-                "print(run.stdout.decode(), run.stderr)\n"
+                f"run = run_in_sandbox({[*RUN_STDIN]!r}, {source.encode()!r}, Isolation.FULL, {RUN})\n"
+                "print(run.stdout.decode(), run.stderr)\n",
+                RUN + 30,
             )
     lines = [line for line in text.splitlines() if line.startswith("REPORT")]
     assert lines, text
