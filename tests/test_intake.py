@@ -20,7 +20,7 @@ import yaml
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from autograder.checks import answers, findings, runtime
+from autograder.checks import findings, runtime
 from autograder.checks.command_line import CommandLineError, command_line
 from autograder.checks.forms import NAME_OR_NONE
 from autograder.core.errors import KitError
@@ -228,6 +228,7 @@ tables = st.dictionaries(st.sampled_from(["number", "word", "name", "words", 7])
 # A cell of its own, as in a lab: below a function, the kit would look for the check in every file that called it.
 CHECK = compile(
     """
+from autograder.checks import answers
 with answers("table.yaml") as table:
     table.expect_filled(FORMS)
     table.expect_answer("number", 4)
