@@ -10,6 +10,7 @@ from typing import Any
 
 import pytest
 
+from autograder.cli import doctor
 from autograder.diagnosis import events
 from autograder.sandbox.inside.probe import forms
 
@@ -56,6 +57,15 @@ def test_the_installed_rclpy_has_all_that_the_probe_relies_on() -> None:
 )
 def test_a_name_that_an_update_of_rclpy_moves_is_named_in_a_sentence(change: str, said: str) -> None:
     assert any(said in sentence and sentence.endswith(".") for sentence in missed(change))
+
+
+def test_the_doctor_says_when_the_probe_cannot_attach(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert doctor.probe().good
+    moved = "import rclpy.executors; del rclpy.executors.Executor._take_timer; "
+    monkeypatch.setattr(doctor, "TRY_PROBE", moved + doctor.TRY_PROBE)
+    found = doctor.probe()
+    assert not found.good
+    assert "Executor._take_timer" in found.found and "locked rclpy" in found.do
 
 
 def fields_written(form: Any) -> dict[str, dict[str, Any]]:

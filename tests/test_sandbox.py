@@ -194,7 +194,7 @@ def test_stacks_name_the_waiting_line(local: NodeSandbox) -> None:
     (local.folder / "stuck.py").write_text("import threading\nprint('here')\nthreading.Event().wait()\n")
     program = local.group().start("stuck")
     _wait_for(program.output, 10)
-    assert 'stuck.py", line 3' in program.stacks()
+    assert _wait_for(lambda: 'stuck.py", line 3' in program.stacks(), 10)  # it has printed, and goes on to wait
     assert program.running()
 
 

@@ -53,6 +53,9 @@ rclpy.try_shutdown()
 print(json.dumps(found))
 """
 
+TRY_PROBE = "import json; from autograder.sandbox.inside.probe import attach; print(json.dumps(attach.prepare()))"
+"""In a process of its own: to try is to put notes around rclpy's functions."""
+
 
 @dataclass(frozen=True)
 class Finding:
@@ -67,7 +70,7 @@ class Finding:
 
 def run(as_json: bool) -> int:
     """Look at everything and print it; return 0 if the machine can grade, 2 if something is lacking."""
-    looks = (python, environment, foreign_ros, ros, isolation, cores, space)
+    looks = (python, environment, foreign_ros, ros, probe, isolation, cores, space)
     findings: list[Finding] = []
     for look in looks:
         try:
@@ -156,6 +159,29 @@ def ros() -> Finding:
     if found["middleware"] != "rmw_fastrtps_cpp":
         return Finding(name, False, f"the middleware is {found['middleware']}", "Run: unset RMW_IMPLEMENTATION")
     return Finding(name, True, f"Jazzy, rclpy {found['version']}, Fast DDS: a message arrived".replace("  ", " "))
+
+
+def probe() -> Finding:
+    """Whether a failed check can be explained: the probe watches rclpy from inside a program, by some private names."""
+    name = "explanations"
+    process = subprocess.run(
+        [sys.executable, "-P", "-c", TRY_PROBE],
+        env={**os.environ, **profile_environment()},
+        capture_output=True,
+        text=True,
+        timeout=ROS_TIME_LIMIT,
+        check=False,
+    )
+    if process.returncode:
+        why = (process.stderr.strip().splitlines() or ["it does not start"])[-1]
+        return Finding(name, False, f"the probe cannot attach to rclpy: {why}", "Mend ROS 2 first.")
+    moved = json.loads(process.stdout.strip().splitlines()[-1])
+    if moved:
+        found = f"the probe cannot attach to this rclpy. {moved[0]}"
+        found += f" ({len(moved)} such places)" if len(moved) > 1 else ""
+        repair = "Use the locked rclpy (make distclean setup); until then failed checks are given fewer reasons."
+        return Finding(name, False, found, repair)
+    return Finding(name, True, "the probe attaches to this rclpy")
 
 
 def isolation() -> Finding:
