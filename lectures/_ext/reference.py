@@ -10,7 +10,9 @@ In a page, a line `<!-- generated: NAME -->` is replaced by what the code says o
 from __future__ import annotations
 
 import ast
+import dataclasses
 import inspect
+import itertools
 import json
 import re
 import textwrap
@@ -21,6 +23,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from docutils import nodes
 from sphinx.application import Sphinx
 
 ROOT = Path(__file__).resolve().parent.parent.parent
@@ -109,8 +112,8 @@ def _reason(node: ast.AST, tuples: bool) -> tuple[ast.expr | None, ast.expr | No
         return keywords.get("because", because), keywords.get("code", code), keywords.get("hint", hint)
     if tuples and isinstance(node, ast.Tuple) and len(node.elts) == 3:
         first, code, hint = node.elts
-        word = isinstance(first, ast.Constant) and " " not in str(first.value)  # what a traceback is known by
-        return None if word else first, code, hint
+        words = isinstance(first, ast.Constant) and not str(first.value).endswith(".")  # that a traceback is known by
+        return None if words else first, code, hint
     return None, None, None
 
 
@@ -188,7 +191,8 @@ def _label(code: str) -> str:
 
 def _shown(sentence: str) -> str:
     """A sentence as Markdown shows it: an odd backtick would swallow the rest, and tags are text."""
-    text = " ".join(sentence.split()).replace("<", "&lt;")
+    text = " ".join(re.sub(r"…(\s*…)+", "…", sentence).split()).replace("<", "&lt;")
+    text = re.sub(r"(`…`|\w)…", r"\1 …", text)
     return text if text.count("`") % 2 == 0 else text.replace("`", "'")
 
 
@@ -209,11 +213,23 @@ def documented(thing: Any) -> Documented:
     text = inspect.getdoc(thing) or ""
     pieces = _SECTION.split(text)
     sections = dict(zip(pieces[1::2], map(textwrap.dedent, pieces[2::2]), strict=True))
-    args = [
+    args = _fields(thing) + [
         (entry.group(1), " ".join(entry.group(2).split()))
         for entry in re.finditer(r"^(\w+): (.*(?:\n[ \t]+.*)*)", sections.pop("Args", "").strip(), re.MULTILINE)
     ]
     return Documented(pieces[0].strip(), args, {name: body.strip("\n") for name, body in sections.items()})
+
+
+def _fields(thing: Any) -> list[tuple[str, str]]:
+    """The fields of a data class, with the text that stands below each."""
+    if not dataclasses.is_dataclass(thing):
+        return []
+    body = ast.parse(textwrap.dedent(inspect.getsource(thing))).body[0].body
+    return [
+        (field.target.id, " ".join(text.value.value.split()))
+        for field, text in itertools.pairwise(body)
+        if isinstance(field, ast.AnnAssign) and isinstance(text, ast.Expr) and isinstance(text.value, ast.Constant)
+    ]
 
 
 def signature_of(name: str, thing: Any) -> str:
@@ -264,12 +280,15 @@ def _calls(source: str) -> Iterator[tuple[str, str]]:
         return
     for node in ast.walk(tree):
         statements = [child for child in ast.iter_child_nodes(node) if isinstance(child, (ast.Expr, ast.Assign))]
-        heads = [item.context_expr for item in node.items] if isinstance(node, ast.With) else []
+        heads = {item.context_expr: item for item in node.items} if isinstance(node, ast.With) else {}
         for part in [*statements, *heads]:
             text = textwrap.dedent(ast.get_source_segment(source, part) or "")
-            text = f"with {text} as ros:" if part in heads else text
+            if part in heads:
+                variable = heads[part].optional_vars
+                text = f"with {text}" + (f" as {ast.unparse(variable)}" if variable else "") + ":"
             for call in ast.walk(part):
-                if isinstance(call, ast.Call):
+                plain = isinstance(call, ast.Call) and not any(keyword.arg is None for keyword in call.keywords)
+                if plain and (call.args or call.keywords):
                     name = call.func.attr if isinstance(call.func, ast.Attribute) else getattr(call.func, "id", "")
                     yield name, _undented(text)
 
@@ -417,6 +436,13 @@ def on_read(app: Sphinx, docname: str, source: list[str]) -> None:
                 app.env.note_dependency(str(path))
 
 
+def on_doctree(app: Sphinx, doctree: nodes.document) -> None:
+    """Leave out what a cell showed only while it ran: how long it has been waiting for what."""
+    for block in list(doctree.findall(nodes.literal_block)):
+        if not block.astext().strip():
+            block.parent.remove(block)
+
+
 def on_builder(app: Sphinx) -> None:
     """Make no slides of the part for instructors; the book, which is built first, has followed the links to it."""
     if app.builder.name == "revealjs":
@@ -428,4 +454,5 @@ def setup(app: Sphinx) -> dict[str, Any]:
     """Register with Sphinx."""
     app.connect("builder-inited", on_builder)
     app.connect("source-read", on_read)
+    app.connect("doctree-read", on_doctree)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
