@@ -41,7 +41,7 @@ _RULES = ("rule_effect.py", "rule_grammar.py", "traces.py")
 """Modules that give a reason as a tuple of three."""
 GENERAL = 4
 """So many groups of the diagnosis' codes, from the first, are about the program itself: every expectation has them."""
-_SECTION = re.compile(r"^(Args|Returns|Raises|Example|Examples|Failures|Note):\s*$", re.MULTILINE)
+_SECTION = re.compile(r"^(Args|Returns|Raises|Example|Codes):\s*$", re.MULTILINE)
 
 
 # Reason codes.
@@ -339,22 +339,25 @@ def failures(name: str) -> list[str]:
     return sorted(codes)
 
 
-def _entry(name: str, thing: Any, with_failures: bool) -> list[str]:
+def _entry(name: str, thing: Any, with_failures: bool, of: str = "") -> list[str]:
     from autograder.checks.codes import GROUPS
     from autograder.diagnosis.codes import CODES
 
     said = documented(thing)
-    lines = [f"### {name}", "", "```python", signature_of(f"ros.{name}" if with_failures else name, thing), "```", ""]
+    heading = name if of in ("", "ros") else f"{of}.{name}"
+    lines = [f"### {heading}", "", "```python", signature_of(f"{of}.{name}" if of else name, thing), "```", ""]
     lines += [said.text, ""]
     lines += [f"- `{argument}`: {meaning}" for argument, meaning in said.args] + [""]
-    for title, body in said.others.items():
-        example = title.startswith("Example")
-        inner = f"```python\n{textwrap.dedent(body)}\n```" if example else " ".join(body.split())
-        lines += ["Example:" if example else f"{title}: {inner}", "", *([inner, ""] if example else [])]
-    short = name.rpartition(".")[2]
-    if not any(title.startswith("Example") for title in said.others) and short in examples():
-        lines += ["Example:", "", "```python", examples()[short], "```", ""]
-    if with_failures and "Failures" not in said.others:
+    for title in ("Returns", "Raises"):
+        if title in said.others:
+            lines += [f"{title}: {' '.join(said.others[title].split())}", ""]
+    example = said.others.get("Example", "")
+    example = "\n".join(re.findall(r"`([^`]+)`", example)) or example or examples().get(name, "")
+    if example and heading != "table.score":  # the labs' examples are those of `ros.score`
+        lines += ["Example:", "", "```python", example.strip("\n"), "```", ""]
+    if "Codes" in said.others:
+        lines += [f"Can fail with {re.sub('`([a-z-]+)`', _linked, ' '.join(said.others['Codes'].split()))}", ""]
+    elif with_failures:
         general = list(_by_comment(KIT / "diagnosis" / "codes.py", CODES).values())[:GENERAL]
         known = [code for code in CODES if not any(code in group for group in general)]
         known += [code for group in GROUPS.values() for code in group]
@@ -365,9 +368,20 @@ def _entry(name: str, thing: Any, with_failures: bool) -> list[str]:
     return lines
 
 
+def _linked(word: re.Match[str]) -> str:
+    """A code in a docstring as a link to what it stands for; another word as it is."""
+    from autograder.checks.codes import GROUPS
+    from autograder.diagnosis.codes import CODES
+
+    listed = word[1] in CODES or any(word[1] in group for group in GROUPS.values())
+    return f"[{word[0]}](#{_label(word[1])})" if listed else word[0]
+
+
 def check_api() -> str:
     """The page of the check API: what `autograder.checks` offers, then what `ros` does, group by group."""
     from autograder import checks
+    from autograder.checks.answers import Answers
+    from autograder.checks.forms import seal
     from autograder.checks.launch import Launch
 
     lines = ["## What a check cell imports", ""]
@@ -386,8 +400,30 @@ def check_api() -> str:
         if group is not owner:
             lines += [f"## {_title(group)}", ""]
             owner = group
-        lines += _entry(name, inspect.unwrap(getattr(Launch, name)), with_failures=True)
+        lines += _entry(name, inspect.unwrap(getattr(Launch, name)), with_failures=True, of="ros")
+    lines += ["## A table of answers", "", "`answers` gives a table, which a check looks at in a block of its own.", ""]
+    for name, _ in offered(Answers):
+        lines += _entry(name, getattr(Answers, name), with_failures=False, of="table")
+    lines += [*_entry("seal", seal, with_failures=False, of="forms"), "## What these calls give", ""]
+    for thing in _given_back(Launch):
+        lines += [f"### {thing.__name__}", "", documented(thing).text, ""]
+        lines += [f"- `{field}`: {meaning}" for field, meaning in _fields(thing)]
+        for name, _ in offered(thing):
+            call = signature_of(name, getattr(thing, name))
+            lines.append(f"- `{' '.join(call.split())}`: {documented(getattr(thing, name)).text.splitlines()[0]}")
+        lines.append("")
     return "\n".join(lines)
+
+
+def _given_back(launch: type) -> list[type]:
+    """The kit's own classes that the methods of a launch return, in order."""
+    found: list[type] = []
+    for name, _ in offered(launch):
+        method = inspect.unwrap(getattr(launch, name))
+        words = re.findall(r"\w+", str(inspect.signature(method).return_annotation))
+        things = [method.__globals__.get(word) for word in words]
+        found += [thing for thing in things if inspect.isclass(thing) and thing.__module__.startswith("autograder.")]
+    return [thing for thing in dict.fromkeys(found) if offered(thing) or _fields(thing)]
 
 
 def offered(launch: type) -> list[tuple[str, type]]:
