@@ -52,6 +52,10 @@ def starved(scene: Scene, name: str) -> Diagnosis | None:
     return diagnosis.why_starved(scene)
 
 
+def kept_waiting(scene: Scene, name: str) -> Diagnosis | None:
+    return diagnosis.why_kept_waiting(scene, f"/{name}/gate")
+
+
 def trouble(scene: Scene, name: str) -> Diagnosis | None:
     return diagnosis.program_trouble(scene)
 
@@ -138,7 +142,118 @@ OFFERS = {
     for policy in ("reliability", *_BEST)
 }
 
+WORKS_AND_ANSWERS = """
+self.lock = threading.Lock()
+self.own = Reentrant()
+self.create_timer(0.05, self.work, callback_group=self.{0})
+self.create_service(Trigger, "~/gate", self.gate, callback_group=self.{1})
+self.client = self.create_client(Trigger, "~/gate", callback_group=Reentrant())
+self.create_timer(0.05, lambda: self.client.call_async(Trigger.Request()), callback_group=Reentrant())
+"""
+WORK_AND_GATE = """
+def work(self):
+    {}:
+        time.sleep(0.3)
+
+def gate(self, request, response):
+    {}:
+        return response
+"""
+
+
+def no_end(scene: Scene, name: str) -> Diagnosis | None:
+    return diagnosis.why_no_endpoint(scene, f"/{name}/more", String, "publisher", f"/{name}")
+
+
+LATER = "def {}(self, state):\n    self.more = self.create_publisher(String, '~/more', 10)\n{}"
+SUCCESS = "    return TransitionCallbackReturn.SUCCESS\n"
+ANSWERED = lambda it: any(thing.kind == "service" and thing.done >= 2 for thing in it.callbacks)  # noqa: E731
+
 CASES = {
+    # Ends that the code makes later.
+    "makes_it_in_activate": Case(
+        methods=LATER.format("on_activate", SUCCESS),
+        main=TRIGGER,
+        base="LifecycleNode",
+        says="not-made-yet",
+        because="in `on_activate`, line",
+        ask=no_end,
+    ),
+    "made_it_and_took_it_away": Case(
+        TALK,
+        LATER.format("on_configure", "    self.destroy_publisher(self.more)\n" + SUCCESS),
+        TRIGGER,
+        base="LifecycleNode",
+        says="topic-name",
+        never=("not-made-yet",),
+        ask=no_end,
+    ),
+    # Why a service waits for another callback.
+    "waits_in_its_group": Case(
+        WORKS_AND_ANSWERS.format("default_callback_group", "default_callback_group"),
+        WORK_AND_GATE.format("if True", "if True"),
+        THREADS.format(4),
+        says="one-group",
+        because="the node's default group",
+        ask=kept_waiting,
+    ),
+    "waits_for_the_thread": Case(
+        WORKS_AND_ANSWERS.format("default_callback_group", "own"),
+        WORK_AND_GATE.format("with self.lock", "with self.lock"),
+        says="single-threaded-executor",
+        because="has one thread",
+        ask=kept_waiting,
+    ),
+    "waits_for_the_lock": Case(
+        WORKS_AND_ANSWERS.format("default_callback_group", "own"),
+        WORK_AND_GATE.format("with self.lock", "with self.lock"),
+        THREADS.format(4),
+        says="waits-for-lock",
+        because="takes `self.lock` in line",
+        ask=kept_waiting,
+    ),
+    "answers_at_once": Case(
+        WORKS_AND_ANSWERS.format("default_callback_group", "own"),
+        WORK_AND_GATE.format("with self.lock", "if True"),
+        THREADS.format(4),
+        never=("one-group", "single-threaded-executor", "waits-for-lock"),
+        ask=kept_waiting,
+        ready=ANSWERED,
+    ),
+    "never_gets_the_lock": Case(
+        "self.lock = threading.Lock()\nself.lock.acquire()\n" + TALK + "self.create_timer(0.05, self.work)\n",
+        "def work(self):\n    with self.lock:\n        pass\n",
+        says="waits-for-lock",
+        because="with self.lock:",
+        never=("stuck-callback",),
+    ),
+    "holds_the_lock": Case(
+        "self.lock = threading.Lock()\nself.create_timer(0.05, self.work)\n",
+        "def work(self):\n    with self.lock:\n        time.sleep(60)\n",
+        says="stuck-callback",
+        never=("waits-for-lock",),
+    ),
+    "leaves_a_thread": Case(
+        TALK,
+        main="threading.Thread(target=node.stay).start()\nrclpy.spin_once(node)",
+        methods="def stay(self):\n    while True:\n        time.sleep(0.1)\n",
+        says="thread-left",
+        because="still runs `stay`",
+        never=("spinning-ended",),
+    ),
+    "keeps_a_thread": Case(
+        TALK,
+        main="threading.Thread(target=node.stay).start()\nrclpy.spin(node)",
+        methods="def stay(self):\n    while True:\n        time.sleep(0.1)\n",
+        says="silent",
+        never=("thread-left",),
+    ),
+    "calls_its_callback": Case(
+        "self.create_timer(0.05, self.tick())\n",
+        "def tick(self):\n    pass\n",
+        says="callback-exception",
+        because="has None for its callback",
+    ),
     # Blocked callbacks.
     "calls": Case(ASKER.format(""), CALL, says="call-in-callback", because="holds the only thread"),
     "calls_same_group": Case(

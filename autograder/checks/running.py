@@ -51,6 +51,7 @@ class Running:
             self.missing,
             runtime.current.folder,
             [node.all_rules() for node, _ in self.programs],
+            [list(node.parameters) for node, _ in self.programs],
             self.trouble,
             self.stopped,
         )

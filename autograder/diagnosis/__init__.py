@@ -17,8 +17,9 @@ from autograder.diagnosis.names import why_doubled, why_no_endpoint, why_no_node
 from autograder.diagnosis.programs import program_trouble, shut_down_inside
 from autograder.diagnosis.reason import DiagnosedProgram, Diagnosis
 from autograder.diagnosis.scene import Scene
-from autograder.diagnosis.silence import SILENT, account, lifecycle_silence, why_no_answer, why_silent
+from autograder.diagnosis.silence import SILENT, account, lifecycle_silence, paces, why_no_answer, why_silent
 from autograder.diagnosis.together import layout, waits_for_its_group, why_not_together, why_starved
+from autograder.diagnosis.turns import why_kept_waiting
 
 __all__ = [
     "SILENT",
@@ -30,10 +31,12 @@ __all__ = [
     "inside_reason",
     "layout",
     "lifecycle_silence",
+    "paces",
     "program_trouble",
     "shut_down_inside",
     "waits_for_its_group",
     "why_doubled",
+    "why_kept_waiting",
     "why_no_answer",
     "why_no_endpoint",
     "why_no_node",

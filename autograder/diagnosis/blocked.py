@@ -11,6 +11,8 @@ from autograder.graph.names import nearest
 STUCK_AFTER = 1.5
 """Seconds that a run must have taken to count as one that does not end."""
 
+ONE_LOCK = "Callbacks that take one lock run one after another, whatever their groups and threads."
+
 _OWN_GROUP = "Give the client, or the callback that waits, a callback group of its own."
 
 
@@ -89,7 +91,9 @@ def _nobody_offers(client: Thing, services: dict[str, list[str]], said: str) -> 
         f"{said}the service `{client.name}`{given}, and no node offers that"
         + (f"; the nearest name is `{close}`." if close else "."),
         "waits-for-service",
-        "Compare the names, namespace included.",
+        "The name in the code begins with a slash, so no namespace reaches it: write it without."
+        if close and client.given.startswith("/") and close.endswith(client.given)
+        else "Compare the names, namespace included.",
     )
 
 
@@ -181,6 +185,21 @@ def busy_wait(inside: Inside) -> Diagnosis | None:
                 "Let the callback end: `future.add_done_callback(...)` goes on when the answer is there, and so does "
                 "`await` with the client in another group.",
             )
+    return None
+
+
+def takes_turn(inside: Inside) -> Diagnosis | None:
+    """Must have seen: one run of a callback that lasts, and its thread where it takes a lock, each time."""
+    for thing, since, _ in _stuck(inside):
+        for _, thread in thing.running:
+            place = inside.turn(thread)
+            if place:
+                return Diagnosis(
+                    f"`{inside.name}`: {called(thing)} has waited for its turn for {since:.1f} s, in {place}: somebody "
+                    "else has taken what it wants.",
+                    "waits-for-lock",
+                    ONE_LOCK,
+                )
     return None
 
 

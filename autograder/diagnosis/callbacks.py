@@ -18,7 +18,7 @@ _CODES = {"service": "service-exception", "lifecycle": "lifecycle-exception"}
 def failed(inside: Inside) -> Diagnosis | None:
     """Must have seen: an exception leave a callback, a return value of the wrong type, or a message refused."""
     for event in inside.events:
-        found = _of(inside.name, event)
+        found = _of(inside, event)
         if found:
             return found
     return None
@@ -52,14 +52,28 @@ def failed_in_a_callback(scene: Scene) -> DiagnosedProgram | None:
     return None
 
 
-def _of(program: str, event: Event) -> Diagnosis | None:
+def _of(inside: Inside, event: Event) -> Diagnosis | None:
     if isinstance(event, BadMessage):
-        return _bad_message(program, event)
+        return _bad_message(inside.name, event)
     if isinstance(event, BadReturn):
-        return _bad_return(program, event)
+        return _bad_return(inside.name, event)
     if isinstance(event, CallbackError):
-        return _error(program, event)
+        return _no_callback(inside, event) or _error(inside.name, event)
     return None
+
+
+def _no_callback(inside: Inside, event: CallbackError) -> Diagnosis | None:
+    """Must have seen: nothing was called, and a timer or the like that was made without a function."""
+    empty = [t for t in inside.things.values() if t.kind == event.kind and t.has_callback and not t.line and t.made]
+    if event.line or "'NoneType' object is not callable" not in event.text or not empty:
+        return None
+    number = int(empty[0].made.rpartition(":")[2] or 0)
+    return Diagnosis(
+        f"`{inside.name}`: the {event.kind} made in line {number} (`{inside.source.line(number)}`) has None for its "
+        "callback.",
+        "callback-exception",
+        "Hand over the function itself: with brackets it is called at once, and what it returns is handed over.",
+    )
 
 
 def _bad_message(program: str, event: BadMessage) -> Diagnosis:
@@ -105,7 +119,8 @@ def _bad_return(program: str, event: BadReturn) -> Diagnosis:
 def _error(program: str, event: CallbackError) -> Diagnosis:
     error = f"{event.type}: {event.text}".strip(": ")
     at = f" ({event.line})" if event.line else ""
-    callback = f"A {event.kind} callback of `{program}`{at}" if event.kind else f"A callback of `{program}`{at}"
+    kind = "done" if event.kind == "task" else event.kind  # rclpy runs done callbacks as tasks
+    callback = f"A {kind} callback of `{program}`{at}" if kind else f"A callback of `{program}`{at}"
     source = quoted(event.code, error)
     if "no running event loop" in error:
         return Diagnosis(
@@ -121,7 +136,9 @@ def _error(program: str, event: CallbackError) -> Diagnosis:
             "Declare parameters in `__init__`, once for all lives of the node.",
         )
     code = _CODES.get(event.kind, "callback-exception")
-    hint = "The line that raised it, and what was in its variables, is where to begin."
+    hint = "The line that raised it, and what was in its variables, is where to begin." if event.line else ""
+    if event.kind == "task" and not event.line:
+        hint = "What `add_done_callback` is given is called with one argument, the future."
     for exception, word, advice in KNOWN_ERRORS:
         if exception in error and word.startswith("parameter"):
             code, hint = word, advice

@@ -36,7 +36,9 @@ SEEN: tuple[Link, ...] = (
     spinning.not_added,
     spinning.never_spun,
     spinning.pulled_down,
+    spinning.thread_left,
     spinning.no_longer_spun,
+    blocked.takes_turn,
     blocked.stuck,
 )
 """What is concluded from all that the probe has seen; nothing where it could not see all."""

@@ -38,11 +38,13 @@ CODES = {
     "rate-unspun": "rate.sleep() has not come back; no executor spins",
     "await-same-group": "a callback awaits a client's answer; both are in one exclusive group",
     "busy-wait": "a callback stays in a loop that asks a future; its answer cannot be taken meanwhile",
+    "waits-for-lock": "a run of a callback lasts, and its thread is where it takes a lock; or two callbacks take one",
     "stuck-callback": "one run of a callback lasts; its thread is in one line or loop each time",
     # Spinning.
     "stuck-in-init": "nothing was ever spun; the program is in one place of an __init__ each time",
     "node-not-added": "an executor without nodes spins; the node was never spun",
     "not-spinning": "a node with callbacks was never spun, or the program ended without spinning",
+    "thread-left": "the main thread has come to its end and waits for another, which is in the student's code",
     "spinning-ended": "the node was spun, and no spinning executor has held it for a while",
     # At the same time.
     "single-threaded-executor": "all callbacks ran on one single-threaded executor",
@@ -63,6 +65,7 @@ CODES = {
     "wrong-node": "the end is there and belongs to another node",
     "wrong-end": "only the other end is there",
     "absolute-name": "the code gives a name with a leading slash, and the end is on that",
+    "not-made-yet": "a method of the source makes the end in a line where the probe has seen none made",
     "topic-name": "the end is on a topic with a similar name",
     "topic-present": "somebody uses the topic",
     "no-topic": "no node has such an end, on no similar topic",
@@ -77,7 +80,7 @@ CODES = {
     "no-super-on-activate": "a lifecycle publisher that was not activated dropped a message in state active",
     "lifecycle-inactive": "a lifecycle publisher dropped a message in another state",
     "lifespan": "a transient local publisher's last message is older than its lifespan; nothing came",
-    "timer-period": "nothing published, and no timer of the node is due yet",
+    "timer-period": "nothing published, a timer of the node is not due yet, and the others have run",
     "silent": "no reason was established: what was seen is said",
     "no-answer": "no reason was established: what was seen is said",
 }

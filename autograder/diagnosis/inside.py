@@ -79,6 +79,10 @@ class Inside:
         """Where the student's own code on this thread is, in the callback that runs there."""
         return self.source.place(self.name, [stacks.get(thread, []) for stacks in self.stacks])
 
+    def turn(self, thread: int) -> sources.Place | None:
+        """Where this thread waits to take a lock or the like, in the student's own code."""
+        return self.source.turn(self.name, [stacks.get(thread, []) for stacks in self.stacks]) if self.stacks else None
+
     def main_place(self) -> sources.Place | None:
         """Where the program's main thread is, in the student's own code."""
         return self.source.place(self.name, [next(reversed(stacks.values()), []) for stacks in self.stacks], True)

@@ -11,6 +11,7 @@ from autograder.diagnosis.inside import Inside
 from autograder.diagnosis.programs import program_trouble
 from autograder.diagnosis.reason import Diagnosis
 from autograder.diagnosis.scene import Scene
+from autograder.diagnosis.unmade import not_made_yet
 from autograder.graph.names import full_name, nearest, type_name
 
 _LETTER_BY_LETTER = "Compare the two names letter by letter, namespace included."
@@ -192,7 +193,8 @@ def why_no_endpoint(scene: Scene, topic: str, msg_type: type | None, kind: str, 
         for name in (meant or used)
         if not {full_name(end.node_namespace, end.node_name) for end in reach(name)} <= twins
     ]
-    found = _idle_rule(scene, topic, node) or _elsewhere(scene, topic, kind, near)
+    found = _idle_rule(scene, topic, node) or not_made_yet(scene, topic, kind, node)
+    found = found or _elsewhere(scene, topic, kind, near)
     if found:
         return found
     opposite = observer.subscriptions(topic) if kind == "publisher" else observer.publishers(topic)

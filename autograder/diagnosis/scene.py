@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -27,6 +27,8 @@ class Scene:
     """Where the programs' sources are."""
     rules: Sequence[Sequence[str]] = ()
     """The remap rules given to each of the programs, as on the command line."""
+    parameters: Sequence[Collection[str]] = ()
+    """The names of the parameters given to each of the programs by the check."""
     trouble: Sequence[Diagnosis] = field(default=())
     """What kept programs from being started at all."""
     stopped: Sequence[DiagnosedProgram] = ()

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from rclpy.qos import DurabilityPolicy, QoSProfile
 
 from autograder.diagnosis import spinning
 from autograder.diagnosis.chain import inside_reason
 from autograder.diagnosis.events import LifecyclePublishOff, Thing
-from autograder.diagnosis.inside import Inside, called
+from autograder.diagnosis.inside import Inside, called, listed
 from autograder.diagnosis.matching import why_not_matched
 from autograder.diagnosis.names import why_no_endpoint
 from autograder.diagnosis.programs import program_trouble
@@ -16,6 +18,9 @@ from autograder.diagnosis.scene import Scene, first
 from autograder.diagnosis.together import why_starved
 from autograder.graph import qos
 from autograder.graph.names import full_name, type_name
+
+_EVERY_NODE = ("use_sim_time", "start_type_description_service")
+"""Parameters that a node has without declaring them."""
 
 SILENT = "silent"
 """The code where no reason is established."""
@@ -88,17 +93,44 @@ def too_old(scene: Scene, topic: str, profile: QoSProfile) -> Diagnosis | None:
 
 
 def not_due(scene: Scene, topic: str) -> Diagnosis | None:
-    """Must have seen: a node that is spun and has published nothing, and a timer of it that is not due for long yet."""
+    """Must have seen: a node that is spun and has published nothing, a timer of it that is not due for long yet, and
+    complete runs of its other timers.
+    """
     for inside, publisher in _publishers(scene, topic):
         timers = [t for t in inside.callbacks if t.kind == "timer" and t.node == publisher.node and not t.cancelled]
         late = [t for t in timers if not t.runs and t.period > inside.age]
-        if inside.alive and not publisher.runs and late and len(late) == len(timers):
+        if inside.alive and not publisher.runs and late and all(timer in late or timer.done for timer in timers):
             return Diagnosis(
                 f"`{inside.name}`: {called(late[0])} has not fired yet; the program has run for {inside.age:.0f} s.",
                 "timer-period",
                 "`create_timer` takes its period in seconds.",
             )
     return None
+
+
+def paces(scene: Scene, topic: str) -> str:
+    """What decides how often messages come on a topic, as seen: timers, and given parameters that nobody declared."""
+    said = []
+    for number, inside in enumerate(scene.insides):
+        nodes = {thing.node for thing in inside.things.values() if thing.kind == "publisher" and thing.name == topic}
+        timers = [t for t in inside.callbacks if t.kind == "timer" and t.node in nodes and not t.cancelled and t.runs]
+        if not inside.attached or not timers:
+            continue
+        said.append(f"`{inside.name}` runs {listed(timers[:4])}.")
+        declared = {parameter.name for parameter in inside.parameters if parameter.declared}
+        given = scene.parameters[number] if number < len(scene.parameters) else ()
+        lost = [name for name in given if name not in declared]
+        own = sorted(name for name in declared if name not in _EVERY_NODE and "qos_overrides" not in name)
+        if lost and inside.parameters:
+            said.append(
+                f"It was given {_quoted(lost)}, which it has not declared"
+                + (f" (it has {_quoted(own)})." if own else " (it has declared none).")
+            )
+    return " ".join(said)
+
+
+def _quoted(names: Sequence[str]) -> str:
+    return ", ".join(f"`{name}`" for name in names)
 
 
 def _publishers(scene: Scene, topic: str) -> list[tuple[Inside, Thing]]:

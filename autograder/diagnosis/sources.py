@@ -19,6 +19,9 @@ Frame = tuple[str, int, str]
 Stacks = dict[int, list[Frame]]
 """By thread: its frames, newest call first. The main thread comes last."""
 
+_TAKING = ("acquire", "__enter__", "wait")
+"""Functions of `threading` in which a thread waits for its turn."""
+
 _THREAD = re.compile(r"(?:Current thread|Thread) 0x([0-9a-f]+)")
 _FRAME = re.compile(r'\s+File "(.*)", line (\d{1,9}) in (.*)')
 
@@ -100,6 +103,61 @@ class Source:
             return None
         (number,) = lines
         return Place(number, number, self.line(number), "", places[0][2])
+
+    def turn(self, name: str, looks: Sequence[list[Frame]]) -> Place | None:
+        """Where a thread waits, each time it was looked at, to take a lock, a semaphore or the like."""
+        for frames in looks:
+            own = next((number for number, frame in enumerate(frames) if frame[0].endswith(f"/{name}.py")), None)
+            if own is None or frames[own][1] not in self._takes(self._tree):
+                return None
+            if not all(f[0].endswith("/threading.py") and f[2] in _TAKING for f in frames[:own]):
+                return None
+        numbers = {next(f for f in frames if f[0].endswith(f"/{name}.py"))[1] for frames in looks}
+        if len(numbers) != 1:
+            return None
+        (number,) = numbers
+        return Place(number, number, self.line(number), "", "")
+
+    def locks(self, line: int) -> dict[str, int]:
+        """What the function that begins in a line takes for itself (`with self.lock`), and in which line; what it
+        calls of the same file, too.
+        """
+        functions = {node.name: node for node in ast.walk(self._tree) if isinstance(node, ast.FunctionDef)}
+        begun = [f for f in functions.values() if min([f.lineno, *(d.lineno for d in f.decorator_list)]) == line]
+        called = [
+            functions[node.func.attr]
+            for function in begun
+            for node in ast.walk(function)
+            if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr in functions
+        ]
+        found: dict[str, int] = {}
+        for function in [*called, *begun]:
+            found |= {what: number for number, what in self._takes(function).items()}
+        return found
+
+    def method_calls(self) -> list[tuple[str, ast.Call]]:
+        """Every call in a method of a class, with the method's name."""
+        return [
+            (method.name, call)
+            for part in ast.walk(self._tree)
+            if isinstance(part, ast.ClassDef)
+            for method in part.body
+            if isinstance(method, ast.FunctionDef)
+            for call in ast.walk(method)
+            if isinstance(call, ast.Call)
+        ]
+
+    @staticmethod
+    def _takes(tree: ast.AST) -> dict[int, str]:
+        """The lines where something is taken, and what."""
+        found: dict[int, str] = {}
+        for node in ast.walk(tree):
+            if isinstance(node, ast.With):
+                names = [item.context_expr for item in node.items]
+                found |= {one.lineno: ast.unparse(one) for one in names if isinstance(one, (ast.Name, ast.Attribute))}
+            elif isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr == "acquire":
+                found[node.lineno] = ast.unparse(node.func.value)
+        return found
 
     def _own(self, name: str, frames: list[Frame], innermost: bool) -> Frame | None:
         """The frame of the student's callback: the outermost of the innermost row of the student's frames."""

@@ -86,6 +86,23 @@ def pulled_down(inside: Inside) -> Diagnosis | None:
     return None
 
 
+def thread_left(inside: Inside) -> Diagnosis | None:
+    """Must have seen: the main thread wait for others at the end of Python, and one of them in the student's code."""
+    mains = [next(reversed(stacks.values()), []) for stacks in inside.stacks]
+    if not mains or not all(any(frame[2] == "_shutdown" for frame in frames) for frames in mains):
+        return None
+    for thread in inside.stacks[0]:
+        place = inside.place(thread)
+        if place:
+            return Diagnosis(
+                f"`{inside.name}`: `main` has come to its end, but a thread of the program still runs "
+                f"`{place.function}`, in {place}. Python waits for each thread that is no daemon.",
+                "thread-left",
+                "Tell the thread to end and `join` it, or make it with `daemon=True`.",
+            )
+    return None
+
+
 def no_longer_spun(inside: Inside) -> Diagnosis | None:
     """Must have seen: a node that was spun, and that no spinning executor holds now, while the program lives on."""
     for node in inside.nodes.values():

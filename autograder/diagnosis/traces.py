@@ -9,6 +9,11 @@ from autograder.diagnosis.reason import Diagnosis
 
 KNOWN_ERRORS = (
     (
+        "add_entity() missing 1 required positional argument",
+        "crashed",
+        "A callback group is an object: it is made with brackets, `ReentrantCallbackGroup()`, and then handed over.",
+    ),
+    (
         "ParameterNotDeclaredException",
         "parameter-not-declared",
         "A parameter exists from `declare_parameter` on: declare it before you read it, even if a value was given.",

@@ -81,6 +81,8 @@ class Expectations:
         """
         self._running.settle_programs()
         gone = self._running.gone_program() or diagnosis.failed_in_a_callback(self._scene())
+        if gone in self._running.may_end:
+            gone = None
         if gone is not None:
             scene = self._scene()
             # An error in a callback is the reason whether or not it has ended the program by now.

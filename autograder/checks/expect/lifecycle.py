@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from typing import NoReturn
@@ -16,6 +17,26 @@ from autograder.graph.services import ServiceMissing
 
 WORD_FROM_INSIDE = 0.5
 """Seconds that a failed check waits for what the student's process says about it."""
+
+
+_LOGGED = re.compile(r"^\[\w+\] \[[\d.]+\] \[[^]]*\]: ")
+"""What stands before the text of a line that was logged."""
+
+
+def _other_way(seen: Sequence[tuple[str, str]], wanted: Sequence[tuple[str, str]]) -> str:
+    """What the first step that is another one says about the callback before it; empty where it says nothing."""
+    at = next((n for n, (a, b) in enumerate(zip(seen, wanted, strict=False)) if a != b), None)
+    if at is None or seen[at][0] != wanted[at][0]:
+        return ""
+    during, goal = seen[at]
+    callback = {"configuring": "on_configure", "activating": "on_activate", "deactivating": "on_deactivate"}.get(during)
+    if during == "errorprocessing" and goal == "finalized":
+        return "`on_error` did not return SUCCESS: that is the end of the node, which is finalized now."
+    if callback and goal == "errorprocessing":
+        return f"`{callback}` returned ERROR, or raised. What is not possible now is FAILURE: that leads straight back."
+    if callback and goal == {"configuring": "unconfigured", "activating": "inactive", "deactivating": "active"}[during]:
+        return f"`{callback}` returned FAILURE: the node is as it was, and `on_error` is not called."
+    return f"`{callback}` returned SUCCESS." if callback else ""
 
 
 class LifecycleExpectations(Expectations):
@@ -113,6 +134,13 @@ class LifecycleExpectations(Expectations):
         self._observer.wait(look, WORD_FROM_INSIDE)
         return look()
 
+    def _last_line(self) -> str:
+        """What the only program of the launch printed last, without the time and the name of the logger."""
+        programs = self._running.programs
+        lines = programs[0][1].output().splitlines() if len(programs) == 1 else []
+        last = next((line.strip() for line in reversed(lines) if line.strip()), "")
+        return f" The last line of its log is `{_LOGGED.sub('', last)[:200]}`." if last else ""
+
     def available_transitions(self, node: str, *, within: float = WITHIN) -> Mapping[str, str]:
         """Labels of the transitions that a node offers now, each with the state it leads to.
 
@@ -172,7 +200,8 @@ class LifecycleExpectations(Expectations):
                 title,
                 self._what_they_say()
                 or Diagnosis(
-                    f"The callback of {label} did not return SUCCESS; the node is {done.after} now.",
+                    f"The callback of {label} did not return SUCCESS; the node is {done.after} now."
+                    + self._last_line(),
                     "transition-failed",
                 ),
                 expected="success",
@@ -224,7 +253,7 @@ class LifecycleExpectations(Expectations):
         self._expect_that(
             seen == list(steps),
             f"`{node}` goes " + ", ".join(f"{a} to {b}" for a, b in steps),
-            lambda: self._what_they_say() or Diagnosis(f"It went {told}.", "transitions"),
+            lambda: self._what_they_say() or Diagnosis(_other_way(seen, steps) or f"It went {told}.", "transitions"),
             expected=", ".join(f"{a} to {b}" for a, b in steps),
             observed=told,
             hint=hint,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
+from autograder import diagnosis
 from autograder.checks.expect.expectations import Expectations
 from autograder.checks.misuse import Misuse
 from autograder.checks.program import Node
@@ -115,3 +116,29 @@ class Looking(Expectations):
             if inside.name == program and inside.attached and things:
                 return max(thing.most for thing in things)
         return None
+
+    def account(self, topic: str) -> str:
+        """What was seen of a topic's publisher, of the callbacks of its node and of its messages: for reasons only.
+
+        Args:
+            topic: full name.
+
+        Example:
+            `ros.require(heard, "The status goes on", because=f"Nothing came. {ros.account('/status')}")`
+        """
+        return diagnosis.account(self._scene(), topic)
+
+    def kept_waiting(self, service: str) -> str:
+        """Why a service answers only after another callback of its program: a sentence, for reasons only.
+
+        Args:
+            service: full name.
+
+        Returns:
+            empty where no reason is established.
+
+        Example:
+            `because = ros.kept_waiting("/get_total") or "The answer came late."`
+        """
+        found = diagnosis.why_kept_waiting(self._scene(), service)
+        return found.because if found else ""

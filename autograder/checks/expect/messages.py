@@ -198,7 +198,11 @@ class MessageExpectations(SourceExpectations):
             measured = rates.in_words(last)
             self._fail(
                 wanted.title,
-                Diagnosis(f"The messages come at {measured} instead of {rate:g} Hz.", "rate"),
+                Diagnosis(
+                    f"The messages come at {measured} instead of {rate:g} Hz. "
+                    + diagnosis.paces(self._scene(), wanted.recording.topic),
+                    "rate",
+                ),
                 expected=f"{rate:g} Hz within {tolerance:.0%}",
                 observed=measured,
                 hint=wanted.hint,

@@ -1,0 +1,73 @@
+"""Why one callback waits for the end of another: their group, their thread, or a lock that both take."""
+
+from __future__ import annotations
+
+from autograder.diagnosis.blocked import ONE_LOCK
+from autograder.diagnosis.events import Thing
+from autograder.diagnosis.inside import Inside, called
+from autograder.diagnosis.reason import Diagnosis
+from autograder.diagnosis.scene import Scene
+
+TAKES_TIME = 0.05
+"""Seconds from which on a run of a callback is noticed by one that waits for it."""
+
+
+def why_kept_waiting(scene: Scene, service: str) -> Diagnosis | None:
+    """Why a service answers only when another callback of its program has ended.
+
+    Must have seen: another callback whose runs take time, and the service's in its exclusive group, or on its only
+    thread; or runs of the service's callback that take time themselves, and a lock that the source of both takes.
+    """
+    for inside in scene.insides:
+        asked = [thing for thing in inside.callbacks if (thing.kind, thing.name) == ("service", service)]
+        slow = [thing for thing in inside.callbacks if _takes_time(thing) and thing.name != service]
+        for answers in asked:
+            for works in slow:
+                found = _group(inside, answers, works) or _thread(inside, answers, works)
+                found = found or _lock(inside, answers, works)
+                if found:
+                    return found
+    return None
+
+
+def _takes_time(thing: Thing) -> bool:
+    return bool(thing.running) or thing.spent > TAKES_TIME * max(thing.done, 1)
+
+
+def _group(inside: Inside, answers: Thing, works: Thing) -> Diagnosis | None:
+    if not works.exclusive or works.group_id != answers.group_id:
+        return None
+    group = "the node's default group" if works.default_group else "one group"
+    return Diagnosis(
+        f"`{inside.name}`: {called(answers)} and {called(works)} are in {group}, which is mutually exclusive: the "
+        "answer waits until the other callback has ended.",
+        "one-group",
+        "Callbacks that may overlap need different groups.",
+    )
+
+
+def _thread(inside: Inside, answers: Thing, works: Thing) -> Diagnosis | None:
+    executor = inside.executor_of(works.node)
+    if not executor or executor.size != 1 or executor is not inside.executor_of(answers.node):
+        return None
+    return Diagnosis(
+        f"`{inside.name}`: its {executor.type} has one thread, so {called(answers)} waits until {called(works)} has "
+        "ended.",
+        "single-threaded-executor" if executor.threads is None else "few-threads",
+        "Callbacks that must not wait for each other need threads of their own.",
+    )
+
+
+def _lock(inside: Inside, answers: Thing, works: Thing) -> Diagnosis | None:
+    if not _takes_time(answers):
+        return None
+    mine, others = (inside.source.locks(int(t.line.rpartition(":")[2] or 0)) for t in (answers, works))
+    for lock, line in mine.items():
+        if lock in others:
+            return Diagnosis(
+                f"`{inside.name}`: {called(answers)} takes `{lock}` in line {line}, and {called(works)} holds that "
+                f"while it works (from line {others[lock]} on): the answer waits for it.",
+                "waits-for-lock",
+                ONE_LOCK,
+            )
+    return None
