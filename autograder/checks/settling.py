@@ -18,7 +18,7 @@ from autograder.sandbox.node_sandbox import RunningProgram
 QUIET = 1.5
 """Seconds without anything new, besides the longest period of a timer: what timers' callbacks make is there then."""
 
-_EACH = 0.2
+_LOOK_EVERY = 0.2
 """Seconds between two looks."""
 
 
@@ -42,7 +42,7 @@ class Settling:
     def decided(self) -> bool:
         """Whether nothing more can be expected to come."""
         now = time.monotonic()
-        if now - self._looked >= _EACH:
+        if now - self._looked >= _LOOK_EVERY:
             self._looked = now
             self._look(now)
         return self._complete and now - self._since > self._pause

@@ -44,7 +44,7 @@ def open_api(root: Path, gradebook: bool = True, **directories: Any) -> Any:
     if not gradebook:
         leave_gradebook_alone(config)
     config.NbGraderAPI.log_level = logging.ERROR
-    # What nbgrader logs is read from its answers; it shall not also go to the terminal.
+    # What nbgrader logs is read from its answers; it must not also go to the terminal.
     logging.getLogger("traitlets").addHandler(logging.NullHandler())
     warnings.filterwarnings("ignore", module=r"nbgrader\.api")
     config.CourseDirectory.merge(directories)

@@ -162,7 +162,7 @@ class LifecycleClient:
     def wait_for_state(self, label: str, within: float = 10.0, give_up: GiveUp = lambda: False) -> str:
         """Wait until the node is in a state; the label of its state then, or when the time was over. Raises as `state`.
 
-        The events tell when it is worth while to ask, so that a waiting observer does not flood the node.
+        The events tell when asking can help, so that a waiting observer does not flood the node.
         """
         while True:
             heard = self._events.count

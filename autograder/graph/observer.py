@@ -29,10 +29,10 @@ from autograder.graph.recording import Recording, quiet_profile
 POLL = 0.02
 """Seconds between two looks at the graph while waiting: rclpy reports messages, but not every graph change."""
 
-_LOOK_AFTER = 0.25
+_CPU_ASKED_AFTER = 0.25
 """Seconds of waiting after which it pays to ask what the machine keeps the programs from."""
 
-_LONGEST = 3.0
+_STRETCH = 3.0
 """How often its own length a wait may take on a busy machine."""
 
 PATIENCE = 60.0
@@ -40,7 +40,7 @@ PATIENCE = 60.0
 
 RECORDED = 128 * 1024 * 1024
 """Bytes of messages that one observer keeps; what comes later is let go by."""
-_EACH = 1024
+_MESSAGE_OVERHEAD = 1024
 """Bytes that a message takes besides its own, about."""
 
 OBSERVER_NAME = "grading_observer"
@@ -112,7 +112,7 @@ class Observer:
 
     def room_for(self, size: int) -> bool:
         """Take room for one more message of `size` bytes; False if there is none left."""
-        self._room -= size + _EACH
+        self._room -= size + _MESSAGE_OVERHEAD
         return self._room >= 0
 
     def notify(self) -> None:
@@ -138,10 +138,10 @@ class Observer:
         before: dict[int, CpuUse] | None = None
         while True:
             now = time.monotonic()
-            if before is None and now - began > _LOOK_AFTER:
+            if before is None and now - began > _CPU_ASKED_AFTER:
                 before = cpu_uses()
             elif before is not None and now >= deadline:
-                more = min(kept_waiting(before, cpu_uses()), (_LONGEST - 1) * within, self.patience)
+                more = min(kept_waiting(before, cpu_uses()), (_STRETCH - 1) * within, self.patience)
                 deadline = began + within + max(0.0, more)
             late = now >= deadline or give_up()
             if ready():

@@ -81,7 +81,7 @@ class ProgramFolder:
             if _digest(path) == entry.get("sha256"):
                 path.unlink()
             else:
-                self.kept.append(self._keep(path))
+                self.kept.append(self._move_aside(path))
         if files:
             self._note()
 
@@ -97,7 +97,7 @@ class ProgramFolder:
         told = []
         text = written.file.text.encode("utf-8", "replace")
         if path.exists() and path.read_bytes() != text and (before is None or self.changed_by_hand(name)):
-            told.append(self._keep(path))
+            told.append(self._move_aside(path))
         self.path.mkdir(parents=True, exist_ok=True)
         write_beside(path, text.decode("utf-8"))
         self.written[name] = written
@@ -119,7 +119,7 @@ class ProgramFolder:
         if self.notebook is None and self.written:
             _clear(self.path)
 
-    def _keep(self, path: Path) -> str:
+    def _move_aside(self, path: Path) -> str:
         """Move a student's own file out of the way, and say so."""
         number = 1
         while (kept := path.with_name(f"{path.name}.mine{number if number > 1 else ''}")).exists():

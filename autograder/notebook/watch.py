@@ -14,7 +14,7 @@ from autograder.sandbox.running_program import RunningProgram
 
 _MUTE = 0.7
 """Seconds of waiting after which a line says what for: most waits are over by then."""
-_EACH = 0.25
+_LOOK_EVERY = 0.25
 """Seconds between two looks at what the programs have printed."""
 _LINES = 100
 """Lines of one program that are shown while it runs; `ros.log()` has more."""
@@ -64,7 +64,7 @@ class Watch:
     def look(self) -> None:
         """Show what is new."""
         now = time.monotonic()
-        if now - self._looked < _EACH:
+        if now - self._looked < _LOOK_EVERY:
             return
         self._looked = now
         if self._streams:

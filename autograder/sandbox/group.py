@@ -11,7 +11,7 @@ import signal
 import socket
 import threading
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from autograder.core.errors import KitError
@@ -19,12 +19,15 @@ from autograder.core.processes import cpu_time, memory, pid_of
 from autograder.sandbox import watch
 from autograder.sandbox.limits import Limits
 from autograder.sandbox.loop import Loop
+from autograder.sandbox.program_pipes import ProgramPipes
 from autograder.sandbox.running_program import RunningProgram
 
-_ANSWER = 10.0
+_ANSWER_WITHIN = 10.0
 """Seconds after which a first process that does not answer is given up."""
-_END = 5.0
+_ENDED_WITHIN = 5.0
 """Seconds that the kernel may take to end killed processes."""
+_SET_BY_THE_SANDBOX = ("FASTRTPS_DEFAULT_PROFILES_FILE", "ROS_LOG_DIR", "HOME", "TMPDIR", "LD_LIBRARY_PATH")
+"""What a caller cannot set for a program: it depends on where the program runs."""
 
 
 class GroupLost(Exception):
@@ -59,6 +62,7 @@ class ProgramGroup:
         self._limits = limits
         self._loop = loop
         self._channel = channel
+        self._pipes = ProgramPipes(loop, self.changed)
         self._programs: dict[int, RunningProgram] = {}
         self._started = 0
         self._first = -1
@@ -113,7 +117,7 @@ class ProgramGroup:
         """
         if not (self.folder / f"{program}.py").is_file():
             raise FileNotFoundError(f"{program}.py")
-        started = RunningProgram(program, self._limits, self.changed, self._catch_up)
+        started = RunningProgram(program, self._limits, self.changed, self._pipes.catch_up)
         try:
             known = self._request(started, list(args), dict(env or {}), cores)
         except OSError:
@@ -155,11 +159,6 @@ class ProgramGroup:
     # Starting.
 
     def _request(self, program: RunningProgram, args: list[str], env: dict[str, str], cores: int) -> bool:
-        ends = [os.pipe2(os.O_CLOEXEC) for _ in range(3)]
-        for ours, _ in ends:
-            os.set_blocking(ours, False)
-        for _, theirs in ends[1:]:
-            os.set_blocking(theirs, False)  # the probe drops what does not fit, it never waits
         usable = sorted(os.sched_getaffinity(0))
         with self.changed:
             self._started += 1
@@ -169,24 +168,19 @@ class ProgramGroup:
             "id": number,
             "path": f"{self._inside}/{program.name}.py",
             "args": args,
-            "env": {**self._variables, **env, **{name: self._variables[name] for name in _FIXED}},
+            "env": {**self._variables, **env, **{name: self._variables[name] for name in _SET_BY_THE_SANDBOX}},
             # A random choice: with the same two CPUs for everyone, a big machine would be idle beside them.
             "cpus": sorted(random.sample(usable, min(cores, len(usable)))),
             "cores": cores,
         }
-        takers: tuple[Callable[[bytes], None], ...] = (
-            program._take_output, program._take_events, program._take_stacks,
-        )  # fmt: skip
-        readers = [(ours, taker) for (ours, _), taker in zip(ends, takers, strict=True)]
-        program.readers = [ours for ours, _ in readers]
-        self._loop.do(lambda: self._watch_pipes(program, readers))
+        theirs = self._pipes.open(program)
         try:
-            socket.send_fds(self._channel, [json.dumps(request).encode()], [theirs for _, theirs in ends])
+            socket.send_fds(self._channel, [json.dumps(request).encode()], theirs)
         finally:
-            for _, theirs in ends:
-                os.close(theirs)
+            for descriptor in theirs:
+                os.close(descriptor)
         with self.changed:
-            self.changed.wait_for(lambda: program.pid >= 0 or not program.running() or self._over, _ANSWER)
+            self.changed.wait_for(lambda: program.pid >= 0 or not program.running() or self._over, _ANSWER_WITHIN)
             return program.pid >= 0 or not program.running()
 
     # In the sandbox's thread.
@@ -228,10 +222,9 @@ class ProgramGroup:
     def _forget(self, number: int, status: int) -> None:
         program = self._programs.pop(number, None)
         if program is not None:
-            self._drain(program)
+            self._pipes.drain(program)
             program._ended(status)
-            for descriptor in list(program.readers):
-                self._forget_pipe(program, descriptor)
+            self._pipes.close(program)
 
     def _end(self) -> None:
         if self._over:
@@ -242,7 +235,7 @@ class ProgramGroup:
             self._kill()
         finally:
             with self.changed:
-                self._hear_out()
+                self._take_last_answers()
                 for number in list(self._programs):
                     self._forget(number, -signal.SIGKILL)
                 self.changed.notify_all()
@@ -260,7 +253,7 @@ class ProgramGroup:
             with contextlib.suppress(ProcessLookupError):
                 signal.pidfd_send_signal(handle, signal.SIGKILL)
         poll = select.poll()
-        deadline = time.monotonic() + _END
+        deadline = time.monotonic() + _ENDED_WITHIN
         for handle in handles:
             poll.register(handle, select.POLLIN)
             # The first process of a PID namespace is gone only when everything in it is.
@@ -268,7 +261,7 @@ class ProgramGroup:
                 raise KitError("Programs that were killed do not end.", "Look at the machine's process list.")
             poll.unregister(handle)
 
-    def _hear_out(self) -> None:
+    def _take_last_answers(self) -> None:
         """Take what the first process said before its end: how programs that ended by themselves did."""
         while True:
             try:
@@ -279,50 +272,3 @@ class ProgramGroup:
                 return
             with contextlib.suppress(ValueError, LookupError, TypeError, AttributeError):
                 self._take_answer(json.loads(packet), handles)
-
-    def _watch_pipes(self, program: RunningProgram, readers: list[tuple[int, Callable[[bytes], None]]]) -> None:
-        for descriptor, taker in readers:
-            self._loop.when_readable(descriptor, self._reader(program, descriptor, taker))
-
-    def _reader(self, program: RunningProgram, descriptor: int, taker: Callable[[bytes], None]) -> Callable[[], None]:
-        def read() -> None:
-            if descriptor not in program.readers:
-                return  # closed by what came before it in the same round
-            data = b""
-            with contextlib.suppress(BlockingIOError):
-                data = os.read(descriptor, 1 << 16)
-                if not data:
-                    self._forget_pipe(program, descriptor)
-                    return
-            if data:
-                with self.changed:
-                    taker(data)
-                    self.changed.notify_all()
-
-        return read
-
-    def _catch_up(self, program: RunningProgram) -> None:
-        """Take what lies in a running program's pipes: its answer may have come by DDS before its notes were read."""
-        if program.readers and not self._over:
-            self._loop.do(lambda: self._drain(program))
-
-    def _drain(self, program: RunningProgram) -> None:
-        """Take what a program has left in its pipes, at most one limit's worth."""
-        for descriptor in list(program.readers):
-            for _ in range(64):
-                before = program._written + program._noted
-                if descriptor not in program.readers:
-                    break
-                self._loop.read_now(descriptor)
-                if program._written + program._noted == before:
-                    break
-
-    def _forget_pipe(self, program: RunningProgram, descriptor: int) -> None:
-        if descriptor in program.readers:
-            program.readers.remove(descriptor)
-            self._loop.forget(descriptor)
-            os.close(descriptor)
-
-
-_FIXED = ("FASTRTPS_DEFAULT_PROFILES_FILE", "ROS_LOG_DIR", "HOME", "TMPDIR", "LD_LIBRARY_PATH")
-"""What a caller cannot set for a program: it depends on where the program runs."""

@@ -13,10 +13,10 @@ from collections.abc import Callable
 
 from autograder.core.errors import KitError
 
-_WATCH = 0.1
+_LOOK_EVERY = 0.1
 """Seconds between two looks."""
-_SHARE = 50
-"""A look never takes more than this part of the time: on a machine with a thousand processes it costs a lot."""
+_TIME_BETWEEN_LOOKS = 50
+"""How many times its own length lies between two looks: with a thousand processes on the machine one costs a lot."""
 
 
 class Loop:
@@ -95,15 +95,15 @@ class Loop:
         due = 0.0
         while not self._stopped:
             for key, _ in self._selector.select(max(0.0, due - time.monotonic()) if self._busy() else None):
-                self._guarded(key.data)
+                self._call_and_go_on(key.data)
             if time.monotonic() >= due and self._busy():
                 began = time.thread_time()
-                self._guarded(self._look)
-                due = time.monotonic() + max(_WATCH, _SHARE * (time.thread_time() - began))
+                self._call_and_go_on(self._look)
+                due = time.monotonic() + max(_LOOK_EVERY, _TIME_BETWEEN_LOOKS * (time.thread_time() - began))
 
     @staticmethod
-    def _guarded(action: Callable[[], object]) -> None:
-        """Whatever goes wrong must not end this thread, which everyone waits for."""
+    def _call_and_go_on(action: Callable[[], object]) -> None:
+        """Call it; whatever goes wrong must not end this thread, which everyone waits for."""
         try:
             action()
         except Exception:

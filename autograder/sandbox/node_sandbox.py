@@ -28,9 +28,9 @@ from autograder.sandbox.walls import bubblewrap, seccomp
 
 __all__ = ["Limits", "NodeSandbox", "ProgramGroup", "RunningProgram"]
 
-_READY = 30.0
+_READY_WITHIN = 30.0
 """Seconds that a launcher may take to load rclpy on a machine that is busy."""
-_END = 2.0
+_ENDED_WITHIN = 2.0
 """Seconds that a launcher may take to end what is below it, where no PID namespace does."""
 
 
@@ -79,7 +79,7 @@ class NodeSandbox:
         for _ in range(2):
             try:
                 group = self._new_group()
-                group.wait_ready(_READY)
+                group.wait_ready(_READY_WITHIN)
             except (OSError, GroupLost) as error:
                 why = self._last_words() or str(error)
                 self._loop.do(self._end_launcher)
@@ -204,7 +204,7 @@ class NodeSandbox:
         if self._scratch is not None:
             # At the end of its channel it ends what is below it, and itself.
             with contextlib.suppress(subprocess.TimeoutExpired):
-                launcher.wait(_END)
+                launcher.wait(_ENDED_WITHIN)
         launcher.kill()  # in a PID namespace, everything with it
         launcher.wait()
         os.close(self._said)

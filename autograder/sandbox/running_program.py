@@ -17,7 +17,7 @@ from autograder.sandbox.limits import Limits
 STACK_SIGNAL = signal.SIGRTMIN + 10
 """The launcher makes a program write its threads' stacks at this signal."""
 
-_QUIET = 0.05
+_COMPLETE_AFTER = 0.05
 """Seconds without a further line after which a dump of stacks counts as complete: it has no end mark."""
 
 _LONGEST_NOTE = 4096
@@ -193,7 +193,7 @@ class RunningProgram:
                 left = deadline - time.monotonic()
                 grown = self._changed.wait_for(
                     lambda: len(self._stacks) > size or self._status is not None,  # noqa: B023
-                    min(left, _QUIET) if size else left,
+                    min(left, _COMPLETE_AFTER) if size else left,
                 )
                 if not grown or self._status is not None:
                     return self._stacks.decode("utf-8", "replace")

@@ -24,9 +24,9 @@ from autograder.submission.notebook_file import NOTEBOOK_BYTES
 
 _NAME_BYTES = 120
 """A longer name is shortened: a gradebook takes 128 characters, a file's name 255 bytes with what is put around it."""
-_NOBODYS = (".", "__MACOSX")
+_PACKERS_PREFIXES = (".", "__MACOSX")
 """What the name of a folder begins with that a system or a packer made."""
-_MANY = 20_000
+_MOST_ENTRIES = 20_000
 """More entries than this in a zip are no class."""
 _NAMED = 5
 """Of more bad names than this only their number is said."""
@@ -129,7 +129,7 @@ def _make_room(submitted: Path, student: str, lab: str) -> None:
 def _from_folder(source: Path, lab: str, refused: list[str]) -> dict[str, bytes]:
     found: dict[str, bytes] = {}
     for entry in sorted(source.iterdir()):
-        if entry.name.startswith(_NOBODYS):
+        if entry.name.startswith(_PACKERS_PREFIXES):
             continue
         if entry.is_symlink():
             refused.append(f"{_shown(entry)} is a link; links are not followed, so it was left out.")
@@ -182,7 +182,7 @@ def _from_zip(source: Path, lab: str, refused: list[str]) -> dict[str, bytes]:
     others: dict[str, list[zipfile.ZipInfo]] = {}
     with _open_zip(source, lab) as archive:
         members = archive.infolist()
-        if len(members) > _MANY:
+        if len(members) > _MOST_ENTRIES:
             raise KitError(f"{source} has {len(members)} entries; that is no class.", "Check the file.")
         paths = _paths(members, refused)
         depth = _depth([parts for parts, _ in paths], lab)
@@ -210,7 +210,7 @@ def _paths(members: Sequence[zipfile.ZipInfo], refused: list[str]) -> list[tuple
         path = PurePosixPath(_name(member).replace("\\", "/"))
         if not path.parts or path.is_absolute() or ".." in path.parts or "\0" in member.orig_filename:
             bad.append(repr(member.orig_filename[:60]))
-        elif not member.is_dir() and not any(part.startswith(_NOBODYS) for part in path.parts):
+        elif not member.is_dir() and not any(part.startswith(_PACKERS_PREFIXES) for part in path.parts):
             paths.append((path.parts, member))
     if bad:
         names = ", ".join(bad[:_NAMED]) + (f" and {len(bad) - _NAMED} more" if len(bad) > _NAMED else "")

@@ -1,0 +1,91 @@
+"""The pipes from a program: its output, its probe's notes, its threads' stacks."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import threading
+from collections.abc import Callable
+
+from autograder.sandbox.loop import Loop
+from autograder.sandbox.running_program import RunningProgram
+
+_PIECE = 1 << 16
+"""Bytes read at once."""
+_MOST_PIECES = 64
+"""Of one pipe before others have their turn: more than a program may write."""
+
+
+class ProgramPipes:
+    """Reads the programs of one group in the sandbox's thread.
+
+    Args:
+        loop: that thread.
+        changed: held and notified whenever a program is told something.
+    """
+
+    def __init__(self, loop: Loop, changed: threading.Condition) -> None:
+        """Begin with no program."""
+        self._loop = loop
+        self._changed = changed
+
+    def open(self, program: RunningProgram) -> list[int]:
+        """Make a program's pipes, and read them from now on; return the ends to write to, closed by the caller."""
+        ends = [os.pipe2(os.O_CLOEXEC) for _ in range(3)]
+        for ours, _ in ends:
+            os.set_blocking(ours, False)
+        for _, theirs in ends[1:]:
+            os.set_blocking(theirs, False)  # the probe drops what does not fit, it never waits
+        takers = (program._take_output, program._take_events, program._take_stacks)
+        program.readers = [ours for ours, _ in ends]
+
+        def watch() -> None:
+            for (ours, _), taker in zip(ends, takers, strict=True):
+                self._loop.when_readable(ours, self._reader(program, ours, taker))
+
+        self._loop.do(watch)
+        return [theirs for _, theirs in ends]
+
+    def catch_up(self, program: RunningProgram) -> None:
+        """Take what lies in a running program's pipes: its answer may have come by DDS before its notes were read."""
+        if program.readers:
+            self._loop.do(lambda: self.drain(program))
+
+    def drain(self, program: RunningProgram) -> None:
+        """Take what a program has left in its pipes, at most one limit's worth; only from the sandbox's thread."""
+        for descriptor in list(program.readers):
+            for _ in range(_MOST_PIECES):
+                before = program._written + program._noted
+                if descriptor not in program.readers:
+                    break
+                self._loop.read_now(descriptor)
+                if program._written + program._noted == before:
+                    break
+
+    def close(self, program: RunningProgram) -> None:
+        """Close what is still open of a program's pipes; only from the sandbox's thread."""
+        for descriptor in list(program.readers):
+            self._close(program, descriptor)
+
+    def _reader(self, program: RunningProgram, descriptor: int, taker: Callable[[bytes], None]) -> Callable[[], None]:
+        def read() -> None:
+            if descriptor not in program.readers:
+                return  # closed by what came before it in the same round
+            data = b""
+            with contextlib.suppress(BlockingIOError):
+                data = os.read(descriptor, _PIECE)
+                if not data:
+                    self._close(program, descriptor)
+                    return
+            if data:
+                with self._changed:
+                    taker(data)
+                    self._changed.notify_all()
+
+        return read
+
+    def _close(self, program: RunningProgram, descriptor: int) -> None:
+        if descriptor in program.readers:
+            program.readers.remove(descriptor)
+            self._loop.forget(descriptor)
+            os.close(descriptor)
