@@ -71,11 +71,11 @@ def failed(
     _rest_not_checked()
     if findings.current.part:
         raise CheckEnded(title)
-    _lose_parts()
+    _void_parts()
     raise LaunchEnded(title)
 
 
-def _lose_parts() -> None:
+def _void_parts() -> None:
     """Take the points of every part that the current launch or table has looked at, or would have."""
     found = findings.current.outcomes[findings.current.block_began :]
     findings.current.lost_parts |= {outcome.part for outcome in found if outcome.part}
@@ -89,12 +89,12 @@ def failed_as_a_whole(
     Raises:
         LaunchEnded: always.
     """
-    _lose_parts()
+    _void_parts()
     del findings.current.outcomes[findings.current.block_began :]
     findings.current.part = ""
     _record(_failure(title, expected, observed, because, hint, code))
     _rest_not_checked(whole=True)
-    _lose_parts()
+    _void_parts()
     raise LaunchEnded(title)
 
 
