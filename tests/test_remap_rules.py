@@ -234,3 +234,20 @@ def test_a_parameter_file_that_grows_has_no_keys() -> None:
     )
     assert params_file.node_keys(tree) == []
     assert params_file.node_keys("a: &a {ros__parameters: {b: 1}}\nc: {<<: *a}\n") == []
+
+
+@pytest.mark.parametrize(
+    ("rule", "wanted", "nodes", "says"),
+    [
+        ("rigth_eye:__node:=starboard_eye", "/starboard_eye", ["/port_eye", "/right_eye"], "`rigth_eye` in its code"),
+        ("port_eye:__node:=left_eye", "/port_eye", ["/left_eye", "/right_eye"], "old and new are swapped"),
+        ("old:__ns:=/rear", "/rear/new", ["/new"], "a node named `old`"),
+        ("left_eye:__node:=port_eye", "/starboard_eye", ["/port_eye", "/right_eye"], ""),
+        ("right_eye:__node:=starboard_eye", "/area/starboard_eye", ["/starboard_eye"], ""),
+        ("new:__ns:=/rear", "/rear/other", ["/rear/new"], ""),
+    ],
+)
+def test_a_rule_for_one_node_that_matched_nothing_is_named(rule: str, wanted: str, nodes: list[str], says: str) -> None:
+    reason = remap_rules.node_without_effect([rule], wanted, nodes)
+    assert bool(reason) == bool(says)
+    assert reason is None or says in reason[0]

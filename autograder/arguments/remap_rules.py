@@ -5,10 +5,19 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 
-from autograder.arguments.rule_effect import without_effect
+from autograder.arguments.rule_effect import node_without_effect, without_effect
 from autograder.arguments.rule_grammar import Reason, Rule, parse, why_parameter_refused, why_remap_refused
 
-__all__ = ["Reason", "Rule", "parse", "refused", "refused_parameter", "rules_in", "without_effect"]
+__all__ = [
+    "Reason",
+    "Rule",
+    "node_without_effect",
+    "parse",
+    "refused",
+    "refused_parameter",
+    "rules_in",
+    "without_effect",
+]
 
 
 def rules_in(words: Sequence[str]) -> list[str]:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 from autograder.checks import runtime
 from autograder.core import student_yaml
+from autograder.graph.names import nearest
 
 _WITH_A_WORD = {
     "-r", "--remap", "-p", "--param", "--params-file", "-e", "--enclave",
@@ -82,7 +83,12 @@ class CommandLine:
             raise CommandLineError(error.because, error.code, error.hint or "Write `entry: words`.") from None
         text = table.get(self.entry) if isinstance(table, dict) else None
         if text is None or text == "?":
-            raise CommandLineError(f"`{self.entry}` in `{self.file}` has no answer yet.", "unanswered")
+            near = nearest(self.entry, table) if isinstance(table, dict) and text is None else None
+            raise CommandLineError(
+                f"`{self.entry}` in `{self.file}` has no answer yet."
+                + (f" `{near[:60]}` is there; did you mean `{self.entry}`?" if near else ""),
+                "unanswered",
+            )
         if not isinstance(text, str) or len(text) > _LONGEST:
             raise CommandLineError(
                 f"`{self.entry}` in `{self.file}` is not a command line.",

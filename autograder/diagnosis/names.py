@@ -82,6 +82,10 @@ def why_no_node(scene: Scene, wanted: str) -> Diagnosis:
     silent = [inside for inside in around if inside.alive and inside.nodes.keys().isdisjoint(names)]
     if silent or not own:
         return _nothing_of(silent or around)
+    for inside, rules in zip(scene.insides, scene.rules, strict=False):
+        idle = remap_rules.node_without_effect(rules, wanted, own) if inside in around else None
+        if idle:
+            return Diagnosis(*idle)
     base = wanted.rsplit("/", 1)[-1]
     there = [name for name in own if name.rsplit("/", 1)[-1] == base]
     if there:
@@ -91,11 +95,18 @@ def why_no_node(scene: Scene, wanted: str) -> Diagnosis:
             "A namespace is given at the start (`-r __ns:=/name`, in a launch file `namespace` or "
             "`push_ros_namespace` above it in the same group), and reaches every node that does not fix its own.",
         )
+    space = wanted.rpartition("/")[0]
+    if space in own:
+        return Diagnosis(
+            f"The node is called `{space}`; that was to be its namespace.",
+            "namespace",
+            "`__ns` gives the namespace, `__node` the name of the node: `-r __ns:=" + space + "`.",
+        )
     close = nearest(wanted, own) or own[0]
     return Diagnosis(
         f"There is no node `{wanted}`; the nearest name on the graph is `{close}`.",
         "node-name",
-        "The name given to the Node constructor (or by `-r __node:=`) decides.",
+        "The name given to the Node constructor (or by `-r __node:=`, in a launch file by `name`) decides.",
     )
 
 
