@@ -26,9 +26,9 @@ SENDING = """
     call call_many clock open_publisher publish send_goal serve set_parameter start stop stream transition
 """
 LOOKING = """
-    available_transitions changes concurrency descriptions get_parameters list_parameters listen log
-    messages_during nodes program programs publishers requests seen_at_once seen_runs served state subscriptions topics
-    watch_transitions
+    account available_transitions changes concurrency descriptions get_parameters kept_waiting list_parameters
+    listen log messages_during nodes program programs publishers requests seen_at_once seen_runs served
+    state subscriptions topics watch_transitions
 """
 SCORING = "part score"
 
