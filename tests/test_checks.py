@@ -17,7 +17,7 @@ from autograder.grading.worker import run_job
 
 SET_UP = """\
 %load_ext autograder
-from autograder.checks import Node, answers, launch, vary
+from autograder.checks import Program, answers, launch, vary
 from rclpy.qos import QoSProfile
 from std_msgs.msg import Int32, String
 from std_srvs.srv import Trigger
@@ -546,7 +546,7 @@ launch:
 def test_a_launch_file_starts_the_course_s_program_in_place_of_a_student_s(grade: Grade) -> None:
     check = """\
         from autograder.checks import launch_file
-        course = Node("talker", arguments_of_its_own=("first",))
+        course = Program("talker", arguments_of_its_own=("first",))
         with launch_file("a.launch.yaml", {"side": "left"}, package="lab", programs={"robot": course}) as ros:
             ros.expect_node("/left_robot")
             ros.require(ros.descriptions()[0].arguments()[:2] == ["first", "word"], "Both have their words")

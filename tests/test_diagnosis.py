@@ -14,7 +14,7 @@ import pytest
 from diagnosis_cases import CASES
 
 import autograder.diagnosis
-from autograder.checks import Node, launch, runtime
+from autograder.checks import Program, launch, runtime
 from autograder.core.results import Isolation
 from autograder.diagnosis import Diagnosis, Scene
 from autograder.diagnosis.codes import CODES
@@ -120,7 +120,7 @@ rclpy.spin(rclpy.create_node("twin"))
 def test_where_a_program_runs_twice_the_node_of_one_is_not_the_misplaced_node_of_the_other(tmp_path: Path) -> None:
     (tmp_path / "twin.py").write_text(LATE)
     runtime.current.configure(tmp_path, Isolation.NONE, 7)
-    with launch(Node("twin", namespace="/first"), Node("twin", namespace="/late"), Node("twin")) as ros:
+    with launch(Program("twin", namespace="/first"), Program("twin", namespace="/late"), Program("twin")) as ros:
         ros.wait(lambda: {"/first/twin", "/twin"} <= set(ros.nodes()), 20.0)
         ros.wait(lambda: all(inside.attached for inside in ros._running.scene().insides), 20.0)
         scene = ros._running.scene()

@@ -27,7 +27,7 @@ from rclpy.qos import (
 
 from autograder.checks import runtime
 from autograder.checks.concurrency import Concurrency
-from autograder.checks.program import Node
+from autograder.checks.program import Program
 from autograder.core.cpu_use import CpuUse, cpu_uses, kept_waiting
 from autograder.graph.names import nearest
 from autograder.graph.observer import Observer
@@ -116,7 +116,7 @@ def test_the_nearest_name_is_the_one_that_was_meant(wanted: str, names: list[str
 )
 def test_a_parameter_keeps_its_type_on_the_command_line(value: bool | int | float | str) -> None:
     context = Context()
-    rclpy.init(args=Node("talker", parameters={"p": value}).arguments(), context=context, domain_id=99)
+    rclpy.init(args=Program("talker", parameters={"p": value}).arguments(), context=context, domain_id=99)
     try:
         node = rclpy.create_node("talker", context=context, automatically_declare_parameters_from_overrides=True)
         read = node.get_parameter("p").value

@@ -5,6 +5,6 @@ from autograder.checks.answers import answers
 from autograder.checks.command_line import command_line
 from autograder.checks.forms import NAME_OR_NONE
 from autograder.checks.launching import launch, launch_file
-from autograder.checks.program import Node
+from autograder.checks.program import Program
 
-__all__ = ["NAME_OR_NONE", "Node", "answers", "command_line", "launch", "launch_file", "vary"]
+__all__ = ["NAME_OR_NONE", "Program", "answers", "command_line", "launch", "launch_file", "vary"]

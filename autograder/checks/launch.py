@@ -26,7 +26,7 @@ from autograder.checks.expect.services import ServiceExpectations
 from autograder.checks.launched_file import LaunchedFile
 from autograder.checks.misuse import Misuse
 from autograder.checks.parts import part
-from autograder.checks.program import Node
+from autograder.checks.program import Program
 from autograder.checks.scoring import Score, score
 from autograder.checks.try_out import Log, log_of, try_out
 from autograder.checks.waiting import NotLaunchedError, watched
@@ -58,7 +58,7 @@ class Launch(
 
     def __init__(
         self,
-        nodes: Sequence[Node],
+        nodes: Sequence[Program],
         listen: Iterable[tuple[str, type]],
         serve: Iterable[tuple[Any, ...]],
         lifecycle: Iterable[str],
@@ -117,16 +117,16 @@ class Launch(
         for launched in self._running.described:
             self.start(launched)
 
-    def start(self, node: Node | str) -> None:
+    def start(self, node: Program | str) -> None:
         """Start one more program.
 
         Args:
-            node: a program's name, or a `Node` with arguments.
+            node: a program's name, or a `Program` with arguments.
 
         Example:
-            `ros.start(Node("listener", name="late"))`
+            `ros.start(Program("listener", name="late"))`
         """
-        launched = Node(node) if isinstance(node, str) else node
+        launched = Program(node) if isinstance(node, str) else node
         runtime.current.use(f"{launched.program}.py")
         if launched.params_file:
             runtime.current.use(launched.params_file)

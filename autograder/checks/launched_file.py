@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from autograder.checks import runtime
-from autograder.checks.program import Node
+from autograder.checks.program import Program
 from autograder.launch_files import read_launch_file
 
 
@@ -19,14 +19,14 @@ class LaunchedFile:
     arguments: Mapping[str, str]
     package: str
     """The package that the student's programs are said to be in."""
-    stand_ins: Mapping[str, Node]
+    stand_ins: Mapping[str, Program]
     """The course's own program in place of the one that the file names."""
     includes: Mapping[str, str]
     """The course's own launch file in place of the one that the file includes."""
     namespace: str
     """As if another file included this one after `push_ros_namespace`."""
 
-    def nodes(self) -> list[Node]:
+    def nodes(self) -> list[Program]:
         """What the file starts.
 
         Raises:
@@ -44,7 +44,7 @@ class LaunchedFile:
         found = read_launch_file(folder / self.name, self.arguments, find, programs, self.includes, self.namespace)
         return [
             self._stand_in(
-                Node(
+                Program(
                     one.program,
                     ros_arguments=one.ros_arguments(),
                     arguments_of_its_own=one.arguments,
@@ -55,7 +55,7 @@ class LaunchedFile:
             for one in found
         ]
 
-    def _stand_in(self, node: Node) -> Node:
+    def _stand_in(self, node: Program) -> Program:
         """The course's own program in place of the student's, if the check has one, started with the same words."""
         course = self.stand_ins.get(node.program)
         if course is None:

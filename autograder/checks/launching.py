@@ -12,11 +12,11 @@ from typing import Any
 from autograder.checks.command_line import CommandLine
 from autograder.checks.launch import Launch
 from autograder.checks.launched_file import LaunchedFile
-from autograder.checks.program import Node
+from autograder.checks.program import Program
 
 
 def launch(
-    *programs: str | Node,
+    *programs: str | Program,
     namespace: str = "",
     name: str = "",
     remappings: Sequence[tuple[str, str]] = (),
@@ -32,7 +32,7 @@ def launch(
     """Describe a launch; `with` starts it and ends it.
 
     Args:
-        programs: names of programs (`%%node NAME`), or `Node`s with arguments of their own.
+        programs: names of programs (`%%node NAME`), or `Program`s with arguments of their own.
         namespace: for all programs, such as `/rear_camera`.
         name: node name, as `-r __node:=NAME`.
         remappings: remap rules, first match wins.
@@ -51,7 +51,7 @@ def launch(
         given["use_sim_time"] = True
     nodes = []
     for program in programs:
-        node = Node(program) if isinstance(program, str) else program
+        node = Program(program) if isinstance(program, str) else program
         nodes.append(
             replace(
                 node,
@@ -73,7 +73,7 @@ def launch_file(
     *,
     package: str,
     namespace: str = "",
-    programs: Mapping[str, Node] | None = None,
+    programs: Mapping[str, Program] | None = None,
     includes: Mapping[str, str] | None = None,
     listen: Iterable[tuple[str, type]] = (),
     lifecycle: Iterable[str] = (),

@@ -13,7 +13,7 @@ from autograder.checks.command_line import CommandLine
 
 
 @dataclass(frozen=True)
-class Node:
+class Program:
     """One program of the student's and the ROS arguments it is started with, named as in a launch description."""
 
     program: str

@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable
 
 from autograder.checks import runtime
-from autograder.checks.program import Node
+from autograder.checks.program import Program
 from autograder.checks.settling import Settling
 from autograder.diagnosis import Diagnosis, Scene
 from autograder.graph.observer import Observer
@@ -29,9 +29,9 @@ class Running:
 
     def __init__(self) -> None:
         """Begin without programs."""
-        self.described: list[Node] = []
+        self.described: list[Program] = []
         """What the launch was asked to start."""
-        self.programs: list[tuple[Node, RunningProgram]] = []
+        self.programs: list[tuple[Program, RunningProgram]] = []
         """What has been started."""
         self.missing: list[str] = []
         """Programs that no cell has written."""

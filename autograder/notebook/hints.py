@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Any
 
-_NAMES = ("Node", "answers", "command_line", "launch", "launch_file", "vary")
+_NAMES = ("Program", "answers", "command_line", "launch", "launch_file", "vary")
 _SAY = (
     "Run the first code cell of the notebook, the one with `%load_ext autograder`. It is needed again after every "
     "restart of the kernel, and so are the cells of your programs."

@@ -7,7 +7,7 @@ from rclpy.topic_endpoint_info import TopicEndpointInfo
 from autograder import diagnosis
 from autograder.checks.expect.expectations import Expectations
 from autograder.checks.misuse import Misuse
-from autograder.checks.program import Node
+from autograder.checks.program import Program
 
 
 class Looking(Expectations):
@@ -59,7 +59,7 @@ class Looking(Expectations):
         """
         return [program.name for _, program in self._running.programs]
 
-    def descriptions(self) -> list[Node]:
+    def descriptions(self) -> list[Program]:
         """What this launch was asked to start, or what its launch file starts: programs with their arguments.
 
         Example:
