@@ -13,7 +13,9 @@ import yaml
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.append(str(ROOT / "lectures" / "_ext"))
 
-import reference  # noqa: E402  (an extension of the book's)
+import check_api  # noqa: E402  (these make pages of the book)
+import kit_source  # noqa: E402
+import reason_codes  # noqa: E402
 
 from autograder.checks.codes import GROUPS  # noqa: E402
 from autograder.checks.launch import Launch  # noqa: E402
@@ -24,16 +26,16 @@ PAGES = sorted((ROOT / "lectures" / "instructors").glob("*.md"))
 
 
 def test_every_code_that_the_kit_gives_is_listed() -> None:
-    used = reference.codes_used()
+    used = kit_source.codes_used()
     assert len(used) > 100
-    assert sorted(code for code in used if not any(reference.fits(one, code) for one in LISTED)) == []
+    assert sorted(code for code in used if not any(kit_source.fits(one, code) for one in LISTED)) == []
 
 
 def test_no_code_is_listed_twice_or_without_use() -> None:
     assert len(LISTED) == len(set(LISTED))
     filled_in = {code for code in LISTED if code.endswith(("-limit", "-exception"))}  # named by what happened
-    used = reference.codes_used()
-    assert [code for code in LISTED if code not in filled_in and not any(reference.fits(code, u) for u in used)] == []
+    used = kit_source.codes_used()
+    assert [code for code in LISTED if code not in filled_in and not any(kit_source.fits(code, u) for u in used)] == []
 
 
 def test_every_code_that_grading_gave_stands_on_the_page_or_in_a_lab() -> None:
@@ -43,14 +45,19 @@ def test_every_code_that_grading_gave_stands_on_the_page_or_in_a_lab() -> None:
     for path in (ROOT / "tests" / "classes").glob("*/*/expected.yaml"):
         checks = yaml.safe_load(path.read_text(encoding="utf-8")).get("checks") or {}
         given |= {check["code"] for check in checks.values() if isinstance(check, dict) and "code" in check}
-    page = reference.reason_codes()
+    page = reason_codes.reason_codes()
     assert len(given) > 50
     assert sorted(code for code in given if f"**`{code}`**" not in page and code not in own) == []
 
 
+def test_groups_of_codes_point_to_lectures_that_are_there() -> None:
+    assert reason_codes.READ_ON.keys() <= {*re.findall(r"^## (.*)$", reason_codes.reason_codes(), re.MULTILINE)}
+    assert all((ROOT / "lectures" / f"{name}.md").is_file() for name in reason_codes.LECTURES.values())
+
+
 def test_everything_that_ros_offers_is_documented() -> None:
-    page = reference.check_api()
-    offered = [name for name, _ in reference.offered(Launch)]
+    page = check_api.check_api()
+    offered = [name for name, _ in check_api.offered(Launch)]
     assert {"expect_node", "expect_messages", "part", "score"} <= set(offered)
     assert [name for name in offered if f"\n### {name}\n" not in page] == []
 
@@ -68,5 +75,5 @@ def test_an_example_is_taken_from_what_students_may_see() -> None:
         for path in (ROOT / "labs").glob("*/*.ipynb")
         for cell in json.loads(path.read_text(encoding="utf-8"))["cells"]
     )
-    for example in reference.examples().values():
+    for example in check_api.examples().values():
         assert example.splitlines()[0].removesuffix(":") in released
