@@ -1,7 +1,7 @@
 """nbgrader's configuration of this course: the same stages as `autograder grade`, and no others.
 
 nbgrader goes on with its own stages, which run students' code, when a configuration cannot be loaded. So whatever goes
-wrong here ends the command.
+wrong here ends the command. Settings of your own stand at the end, such as the penalties for who is late.
 """
 
 import os
@@ -14,7 +14,7 @@ try:
     # nbgrader looks for modules in the working folder, which may be a student's.
     sys.path[:] = [str(_ROOT), *(folder for folder in sys.path if folder not in ("", str(Path.cwd()), str(_ROOT)))]
 
-    from autograder.gradebook.api import prepare_nbgrader
+    from autograder.gradebook.preparation import prepare_nbgrader
 
     prepare_nbgrader()
 
@@ -22,4 +22,4 @@ try:
 
     take_over(get_config(), _ROOT)  # noqa: F821  traitlets provides get_config
 except BaseException as error:
-    sys.exit(f"nbgrader_config.py: {type(error).__name__}: {error}. Nothing was executed; run `make` first.")
+    sys.exit(f"nbgrader_config.py: {type(error).__name__}: {error}. Nothing was executed.")

@@ -17,12 +17,12 @@ from typing import Any
 import kill_matrix
 import sample_class
 import yaml
-from mutation.generate import handed_in, mutants
-from mutation.source import Mutant
-from reach import reached
 from rich.progress import track
 from sample_class import ROOT
 
+from autograder.authoring.mutation.generate import handed_in, mutants
+from autograder.authoring.mutation.reach import reached
+from autograder.authoring.mutation.source import Mutant
 from autograder.core.files import write_beside
 from autograder.core.results import Isolation, SubmissionResult
 from autograder.course.lab import Lab, load_lab

@@ -14,9 +14,9 @@ from pathlib import Path
 import kill_matrix
 import pytest
 import sample_class
-from reach import reached, using
 from sample_class import ROOT
 
+from autograder.authoring.mutation.reach import reached, using
 from autograder.core.results import CheckResult, SubmissionResult
 from autograder.course.lab import Cell, Lab, load_lab
 from autograder.grading.job import Job

@@ -20,6 +20,7 @@ DEMANDED_BY_TOOLS = {
     ".github",
     ".gitignore",
     ".pre-commit-config.yaml",
+    "course.toml",  # the kit's own: every course has one
     "nbgrader_config.py",
     "pyproject.toml",
     "requirements-dev.lock",

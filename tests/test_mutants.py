@@ -6,14 +6,14 @@ import ast
 
 import mutants
 import pytest
-from mutation.generate import handed_in
-from mutation.generate import mutants as made_from
-from mutation.python_rules import changes, swaps
-from mutation.source import Source
-from mutation.text_rules import text_changes
-from reach import reached
 from sample_class import ROOT
 
+from autograder.authoring.mutation.generate import handed_in
+from autograder.authoring.mutation.generate import mutants as made_from
+from autograder.authoring.mutation.python_rules import changes, swaps
+from autograder.authoring.mutation.reach import reached
+from autograder.authoring.mutation.source import Source
+from autograder.authoring.mutation.text_rules import text_changes
 from autograder.course.lab import load_lab
 
 PROGRAM = """\

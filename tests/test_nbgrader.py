@@ -15,12 +15,13 @@ from typing import Any
 import pytest
 import toy
 
+from autograder.authoring.release import release
 from autograder.core.errors import KitError
 from autograder.course.lab import Lab, grade_id_of, load_lab
-from autograder.gradebook.api import prepare_nbgrader
 from autograder.gradebook.grades import write_grades
+from autograder.gradebook.preparation import prepare_nbgrader
 from autograder.gradebook.recorder import Recorder
-from autograder.gradebook.release import register, release
+from autograder.gradebook.release import register
 from autograder.grading import runner
 from autograder.grading.runner import Settings
 from autograder.grading.store import ResultStore

@@ -18,7 +18,7 @@ import pytest
 import toy
 
 from autograder.course.lab import load_lab
-from autograder.gradebook.api import prepare_nbgrader
+from autograder.gradebook.preparation import prepare_nbgrader
 from autograder.submission.intake import collect
 
 KIT = Path(__file__).resolve().parent.parent

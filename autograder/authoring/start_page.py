@@ -6,12 +6,13 @@ import json
 import re
 from pathlib import Path
 
-from autograder.course.lab import source_of
+from autograder.course.lab import lab_names, source_of
+from autograder.course.settings import read_settings
 
 START_PAGE = "README.md"
 
 _TOP = """\
-# The labs
+# {title}
 
 Open a lab with a click on its name, and work through it from the top: run each cell with Shift+Enter. A cell that
 begins with `%%node NAME` or `%%file NAME` writes your program or file. The check below it runs that and says at once
@@ -33,12 +34,12 @@ _BOTTOM = """
 def start_page(labs: Path) -> str:
     """Return the page for the labs in a folder, by the first heading of each and the line below it."""
     rows = []
-    for path in sorted(labs.glob("*/*.ipynb")):
-        if path.parent.name != path.stem:
+    for path in [labs / name / f"{name}.ipynb" for name in lab_names(labs.parent)]:
+        if not path.is_file():
             continue
         first = source_of(json.loads(path.read_text(encoding="utf-8"))["cells"][0])
         heading = re.search(r"^#\s+(.+?)\s*$", first, re.MULTILINE)
         below = first[heading.end() :].strip().split("\n")[0] if heading else ""
         title = heading[1] if heading else path.stem
         rows.append(f"| [{title}]({path.stem}/{path.name}) | {below} |\n")
-    return _TOP + "".join(rows) + _BOTTOM
+    return _TOP.format(title=read_settings(labs.parent).title) + "".join(rows) + _BOTTOM

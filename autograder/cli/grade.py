@@ -55,6 +55,7 @@ def grade(
 
 
 def _show(run: ClassRun, paths: CoursePaths, lab: str, as_json: bool) -> None:
+    from autograder.gradebook.settings import gradebook_place
     from autograder.report.terminal import class_view, console, plain, undecided_view
 
     left_out = [plain(sentence) for sentence in run.refused]
@@ -77,7 +78,7 @@ def _show(run: ClassRun, paths: CoursePaths, lab: str, as_json: bool) -> None:
         f"{len(run.results)} submissions in {run.seconds['all']:.0f} s ({run.seconds['recording']:.0f} s in nbgrader)"
     )
     for label, path in (
-        ("gradebook", paths.gradebook),
+        ("gradebook", gradebook_place(paths.root)),
         ("grades", run.grades),
         ("feedback", paths.feedback),
         ("results", paths.results / lab),

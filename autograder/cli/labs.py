@@ -1,4 +1,4 @@
-"""Commands for who keeps a course: `release` and `package`."""
+"""Commands for who keeps a course: `new`, `lint`, `release` and `package`."""
 
 from __future__ import annotations
 
@@ -7,20 +7,82 @@ from typing import Annotated
 
 import typer
 
-from autograder.cli.app import app
+from autograder.cli.app import IsolationOption, app
 from autograder.core.errors import KitError
+from autograder.core.results import Isolation
+
+new = typer.Typer(no_args_is_help=True)
+app.add_typer(new, name="new", help="Begin a course, or a lab of one.")
+
+
+@new.command("course")
+def new_course(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="A folder that does not exist yet, or is empty.")],
+) -> None:
+    """Write a course with its settings and one small lab."""
+    from autograder.authoring.new import FIRST_LAB
+    from autograder.authoring.new import new_course as write
+
+    for path in write(folder):
+        print(path)
+    print(f"\nNext:\n  cd {folder}\n  autograder lint {FIRST_LAB}\n  autograder release")
+
+
+@new.command("lab")
+def new_lab(
+    name: Annotated[str, typer.Argument(help="Such as lab2_talkers: small letters, digits, underscores.")],
+) -> None:
+    """Write a small lab into the course, complete with checks, to be changed into yours."""
+    from autograder.authoring.new import new_lab as write
+    from autograder.course.folder import course_root
+
+    for path in write(course_root(), name):
+        print(path)
+
+
+@app.command()
+def lint(
+    lab: Annotated[str | None, typer.Argument(help="The lab; default: all of them.")] = None,
+    static: Annotated[bool, typer.Option("--static", help="Only read it, and run nothing.")] = False,
+    isolation: IsolationOption = Isolation.FULL,
+    jobs: Annotated[int, typer.Option(min=1, help="How many runs at once.")] = 4,
+) -> None:
+    """Say what is wrong with a lab: cells, checks, what students would receive, and what running it shows."""
+    from autograder.authoring.lint.runs import run_findings
+    from autograder.authoring.lint.static import read_findings, release_findings
+    from autograder.course.folder import course_root
+    from autograder.course.lab import lab_names, load_lab
+    from autograder.gradebook.release import released_files
+    from autograder.sandbox.isolation import choose
+
+    root = course_root()
+    errors = 0
+    for name in [lab] if lab else lab_names(root):
+        found = read_findings(root, name)
+        if not any(not one.warning for one in found):
+            found += release_findings(released_files(root, name))
+        for one in found:
+            print(f"{name}: {one}")
+        bad = sum(not one.warning for one in found)
+        if not bad and not static:
+            for one in run_findings(load_lab(root, name), choose(isolation), jobs):
+                print(f"{name}: {one}")
+                bad += not one.warning
+        print(f"{name}: {f'{bad} errors' if bad else 'fine'}")
+        errors += bad
+    raise typer.Exit(1 if errors else 0)
 
 
 @app.command()
 def release(
     lab: Annotated[str | None, typer.Argument(help="The lab; default: all of them.")] = None,
 ) -> None:
-    """Generate what students receive: `labs/` from `solutions/`."""
+    """Generate what students receive: `labs/` from `solutions/`; refuses a lab in which `lint` reads an error."""
+    from autograder.authoring.release import release as generate
     from autograder.authoring.start_page import START_PAGE, start_page
     from autograder.core.files import write_beside
     from autograder.course.folder import course_root
     from autograder.course.lab import lab_names
-    from autograder.gradebook.release import release as generate
 
     root = course_root()
     for name in [lab] if lab else lab_names(root):

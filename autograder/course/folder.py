@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from autograder.core.errors import KitError
+from autograder.course.settings import SETTINGS_FILE
 
 _KIT = Path(__file__).resolve().parent.parent.parent
 
@@ -19,7 +20,8 @@ def course_root() -> Path:
         if _is_course(folder):
             return folder
     raise KitError(
-        "There is no course here: no folder with `solutions` or `labs`.", "Run it inside the course's folder."
+        "There is no course here: no folder with `solutions` or `labs`.",
+        "Run it inside the course's folder, or begin one: autograder new course DIR",
     )
 
 
@@ -36,12 +38,12 @@ def trusted_course(named: Path | None) -> Path:
     if _is_course(root):
         return root
     if named is None:
-        raise KitError(f"There is no course in {_KIT}.", "Name the folder of yours: --course FOLDER")
+        raise KitError("The kit was installed without a course of its own.", "Name yours: --course FOLDER")
     raise KitError(f"There is no course in {root}.", "It needs a folder `solutions` (or `labs`) with NAME/NAME.ipynb.")
 
 
 def _is_course(folder: Path) -> bool:
-    """Whether there is a lab in it; many folders called `labs` hold something else."""
-    return any(
+    """Whether it has a course's settings, or a lab; many folders called `labs` hold something else."""
+    return (folder / SETTINGS_FILE).is_file() or any(
         path.stem == path.parent.name for name in ("solutions", "labs") for path in (folder / name).glob("*/*.ipynb")
     )

@@ -22,6 +22,7 @@ from autograder.core.files import signature
 from autograder.core.results import encodable
 from autograder.course.cell_file import BadNameError, CellFile, parse
 from autograder.course.markers import without_hidden_tests, without_region
+from autograder.course.settings import read_settings
 
 CODE_STUB = "# YOUR CODE HERE"
 """What students find in place of a solution: a comment in Python and in YAML."""
@@ -173,11 +174,12 @@ def source_of(cell: dict[str, Any]) -> str:
 
 
 def lab_names(root: Path) -> list[str]:
-    """Return the names of the course's labs, sorted."""
+    """Return the names of the course's labs in the course's order."""
     found = {
         p.stem for folder in ("solutions", "labs") for p in (root / folder).glob("*/*.ipynb") if p.parent.name == p.stem
     }
-    return sorted(found)
+    first = [name for name in read_settings(root).labs if name in found]
+    return [*first, *sorted(found - set(first))]
 
 
 def load_lab(root: Path, name: str) -> Lab:

@@ -71,6 +71,10 @@ class CoursePaths:
         """Where the sample class of a lab is put together."""
         return self.build / "classes" / lab
 
+    def requirements(self, lab: str) -> Path:
+        """What of a lab's text is required, and which check holds it."""
+        return self.root / "tests" / "classes" / lab / "requirements.yaml"
+
     def submitted_notebook(self, student: str, lab: str) -> Path:
         """The notebook that a student handed in."""
         return self.submitted / student / lab / f"{lab}.ipynb"

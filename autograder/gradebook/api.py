@@ -2,26 +2,15 @@
 
 from __future__ import annotations
 
+import copy
 import logging
-import os
 import re
-import sys
 import warnings
 from pathlib import Path
 from typing import Any
 
 from autograder.course.paths import CoursePaths
-
-
-def prepare_nbgrader() -> None:
-    """Make nbgrader importable at a bearable price, and able to find its database tool."""
-    # Without this module jsonschema does not check one format of strings; with it, building its grammar takes 3 s.
-    sys.modules.setdefault("rfc3987_syntax", None)  # type: ignore[arg-type]
-    os.environ["TRAITLETS_APPLICATION_RAISE_CONFIG_FILE_ERROR"] = "1"
-    # nbgrader runs `alembic` by name.
-    tools = str(Path(sys.executable).parent)
-    if tools not in os.environ.get("PATH", "").split(os.pathsep):
-        os.environ["PATH"] = tools + os.pathsep + os.environ.get("PATH", "")
+from autograder.gradebook.preparation import prepare_nbgrader
 
 
 def open_api(root: Path, gradebook: bool = True, **directories: Any) -> Any:
@@ -35,12 +24,11 @@ def open_api(root: Path, gradebook: bool = True, **directories: Any) -> Any:
     prepare_nbgrader()
     from nbgrader.apps import NbGraderAPI
     from nbgrader.coursedir import CourseDirectory
-    from traitlets.config import Config
 
-    from autograder.gradebook.config import configure, leave_gradebook_alone
+    from autograder.gradebook.config import leave_gradebook_alone
+    from autograder.gradebook.settings import settings_of
 
-    config = Config()
-    configure(config, root)
+    config = copy.deepcopy(settings_of(root))
     if not gradebook:
         leave_gradebook_alone(config)
     config.NbGraderAPI.log_level = logging.ERROR

@@ -6,9 +6,9 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from autograder.course.paths import CoursePaths
 from autograder.gradebook.config import configure
 from autograder.gradebook.release import register
+from autograder.gradebook.settings import gradebook_address
 from autograder.gradebook.validate import install
 
 
@@ -28,7 +28,7 @@ def before_autograde(root: Path, assignment: str, student: str, notebooks: list[
     """nbgrader's hook: note the lab's cells when `nbgrader autograde` meets a gradebook without them."""
     from nbgrader.api import Gradebook, MissingEntry
 
-    with Gradebook(CoursePaths(root).gradebook_url) as gradebook:
+    with Gradebook(gradebook_address(root)) as gradebook:
         try:
             gradebook.find_notebook(assignment, assignment)
         except MissingEntry:

@@ -8,7 +8,8 @@ from pathlib import Path
 
 from autograder.core.files import modified, write_beside
 from autograder.course.paths import CoursePaths
-from autograder.gradebook.api import prepare_nbgrader
+from autograder.gradebook.preparation import prepare_nbgrader
+from autograder.gradebook.settings import gradebook_address, gradebook_file
 
 
 def write_grades(root: Path) -> Path:
@@ -19,13 +20,14 @@ def write_grades(root: Path) -> Path:
     """
     paths = CoursePaths(root)
     path = paths.grades
-    if modified(path) > modified(paths.gradebook):
+    file = gradebook_file(root)
+    if file is not None and modified(path) > modified(file):
         return path
     prepare_nbgrader()
     from nbgrader.api import Gradebook
 
     rows: list[tuple[str, str, str, str, int]] = []
-    with Gradebook(paths.gradebook_url) as gradebook:
+    with Gradebook(gradebook_address(root)) as gradebook:
         for assignment in gradebook.assignments:
             answers = {cell.name for notebook in assignment.notebooks for cell in notebook.solution_cells}
             for submission in assignment.submissions:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import shutil
 from pathlib import Path
@@ -12,6 +13,7 @@ from autograder.course.lab import Lab
 from autograder.course.paths import CoursePaths
 from autograder.gradebook.api import answered, last_error, open_api
 from autograder.gradebook.release import register
+from autograder.gradebook.settings import gradebook_file
 from autograder.grading.store import ResultStore
 
 
@@ -32,10 +34,12 @@ class Recorder:
         self._written: list[Path] = []
         self.failures: dict[str, str] = {}
         """Why it failed, by student; the others are recorded."""
-        if not self._paths.gradebook.exists():
+        gradebook = gradebook_file(root)
+        if gradebook is not None and not gradebook.exists():
             # What was recorded went with the gradebook.
             shutil.rmtree(self._paths.autograded, ignore_errors=True)
-        self._last_grade = modified(self._paths.gradebook)
+        # Of a gradebook on a server nobody knows when somebody graded by hand, so every page is written again.
+        self._last_grade = math.inf if gradebook is None else modified(gradebook)
 
     def __enter__(self) -> Recorder:
         """Return itself."""

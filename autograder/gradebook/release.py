@@ -6,9 +6,8 @@ import tempfile
 from pathlib import Path
 
 from autograder.core.errors import KitError
-from autograder.core.files import write_beside
-from autograder.course.paths import CoursePaths
 from autograder.gradebook.api import answered, last_error, open_api
+from autograder.gradebook.settings import gradebook_place
 
 
 def generate(root: Path, lab: str, into: Path, gradebook: bool) -> Path:
@@ -25,8 +24,8 @@ def generate(root: Path, lab: str, into: Path, gradebook: bool) -> Path:
     if not answer["success"]:
         if "there are submissions associated" in answer.get("log", "") + answer["error"]:
             raise KitError(
-                f"The graded cells of {lab} are not those that build/gradebook.db has grades for.",
-                f"Move {CoursePaths(root).gradebook} away, then grade again.",
+                f"The graded cells of {lab} are not those that the gradebook has grades for.",
+                f"Move {gradebook_place(root)} away, then grade again.",
             )
         raise KitError(f"nbgrader could not generate {lab}.", last_error(answer))
     return into / lab
@@ -50,17 +49,6 @@ def released_files(root: Path, lab: str) -> dict[Path, bytes]:
     return {
         path: content if path.suffix != ".ipynb" else content.rstrip(b"\n") + b"\n" for path, content in files.items()
     }
-
-
-def release(root: Path, lab: str) -> Path:
-    """Write `labs/<lab>` and return that folder.
-
-    Raises:
-        KitError: there is no such lab under `solutions`, or nbgrader refuses.
-    """
-    for path, content in released_files(root, lab).items():
-        write_beside(root / "labs" / lab / path, content)
-    return root / "labs" / lab
 
 
 def register(root: Path, lab: str) -> None:

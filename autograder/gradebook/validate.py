@@ -41,6 +41,16 @@ def install(root: Path) -> None:
     )
 
 
+def close() -> None:
+    """Close nbgrader's execution for this process, outside of any course."""
+    what, do = "nbgrader executes nothing outside of a course.", "Start it in the folder of your course."
+
+    def closed(notebook: Path, _: bool) -> Verdicts:
+        return {"failed": [_entry(f"{notebook.name} was not checked", [what, do])]}
+
+    replace_execution(closed, lambda: KitError(what, do))
+
+
 def verdicts(root: Path, notebook: Path, invert: bool) -> Verdicts:
     """Check a notebook in the sandbox, and return what did not pass in the form that nbgrader shows.
 

@@ -6,8 +6,8 @@ import ast
 from collections.abc import Iterator
 from itertools import pairwise
 
-from mutation.ros_rules import name_of, ros_changes, string
-from mutation.source import Change, Source
+from autograder.authoring.mutation.ros_rules import name_of, ros_changes, string
+from autograder.authoring.mutation.source import Change, Source
 
 _COMPARISONS = {
     ast.Lt: ("<=", ">"),

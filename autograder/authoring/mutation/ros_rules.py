@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 from collections.abc import Iterator
 
-from mutation.source import Change, Source
+from autograder.authoring.mutation.source import Change, Source
 
 ENTITIES = {
     "create_publisher": 1,

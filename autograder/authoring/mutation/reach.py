@@ -1,6 +1,6 @@
 """Which checks a changed answer can reach.
 
-`test_classes.py` shows that nothing else reaches them: without the files that are said not to reach a check, the
+`tests/test_classes.py` shows that nothing else reaches them: without the files that are said not to reach a check, the
 solution passes it all the same.
 """
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from autograder.authoring.mutation.python_rules import changes, swaps
+from autograder.authoring.mutation.source import Mutant, Source
+from autograder.authoring.mutation.text_rules import text_changes
 from autograder.course.cell_file import parse
 from autograder.course.lab import Answer, Lab, grade_id_of, source_of
-from mutation.python_rules import changes, swaps
-from mutation.source import Mutant, Source
-from mutation.text_rules import text_changes
 
 
 def mutants(lab: Lab) -> list[Mutant]:

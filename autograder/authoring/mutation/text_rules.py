@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import yaml
 
-from mutation.ros_rules import other_names
+from autograder.authoring.mutation.ros_rules import other_names
 
 _LEAF = re.compile(r"^(\s*(?:- )?)([\w/*~.$()'\"-]+):[ ]+(?![>|])(.+?)\s*$")
 _RULE = re.compile(r"-([rp])\s+(\S+?):=(\S*)")

@@ -1,0 +1,85 @@
+"""What running a lab shows: its solution gets all points, the blank notebook none, and a mistake takes each check."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+
+from autograder.authoring.lint.finding import Finding
+from autograder.authoring.mutation.generate import handed_in, mutants
+from autograder.authoring.mutation.reach import reached
+from autograder.authoring.mutation.source import Mutant
+from autograder.core.results import Isolation, SubmissionResult
+from autograder.course.cell_file import parse
+from autograder.course.lab import Cell, Lab
+from autograder.grading.job import Job
+from autograder.grading.supervisor import run_in_worker
+
+_TRIES = 40
+"""Mutants that are tried on a check before it counts as one that no mistake fails."""
+
+
+def run_findings(lab: Lab, isolation: Isolation, jobs: int) -> Iterator[Finding]:
+    """Run a lab's solution, its blank notebook, and mutants until each check is beaten by one.
+
+    Args:
+        lab: to run.
+        isolation: how the programs are kept apart.
+        jobs: how many run at once.
+    """
+    with ThreadPoolExecutor(jobs) as pool:
+        solved = pool.submit(_run, lab, isolation, _files(lab, blank=False), {}, list(lab.cells))
+        answers = {file.file_name: True for answer in lab.answers.values() if (file := answer.file) is not None}
+        blank = pool.submit(_run, lab, isolation, _files(lab, blank=True), answers, list(lab.cells))
+        yield from _solution(solved.result())
+        yield from _blank(blank.result())
+        every = mutants(lab)
+        yield from filter(None, pool.map(lambda check: _unbeaten(lab, isolation, check, every), lab.checks))
+
+
+def _solution(result: SubmissionResult) -> Iterator[Finding]:
+    for check in result.checks:
+        if check.points != check.max_points:
+            bad = check.first_failure
+            why = f" {bad.title}: {bad.because or bad.observed}" if bad else ""
+            points = "no verdict" if check.points is None else f"{check.points:g} of {check.max_points:g} points"
+            yield Finding(check.grade_id, f"the solution gets {points}.{why}")
+
+
+def _blank(result: SubmissionResult) -> Iterator[Finding]:
+    for check in result.checks:
+        if check.points != 0:
+            points = "no verdict" if check.points is None else f"{check.points:g} points"
+            yield Finding(check.grade_id, f"the notebook as students receive it gets {points}.")
+
+
+def _unbeaten(lab: Lab, isolation: Isolation, check: Cell, every: list[Mutant]) -> Finding | None:
+    """A finding if no mutant of the solution loses points in a check."""
+    reaching = [mutant for mutant in every if check in reached(lab, [mutant.answer])]
+    cells = [cell for cell in lab.cells if cell.points is None or cell is check]
+    tried = reaching[:: max(1, len(reaching) // _TRIES)]
+    for mutant in tried:
+        points = _run(lab, isolation, handed_in(lab, mutant), {}, cells).checks[0].points
+        if points is not None and points < (check.points or 0):
+            return None
+    return Finding(check.grade_id, f"none of {len(tried)} solutions with one mistake each loses points in it.")
+
+
+def _files(lab: Lab, blank: bool) -> dict[str, str]:
+    files = dict(lab.given)
+    for answer in lab.answers.values():
+        file = parse(answer.blank if blank else answer.solution)
+        if file is not None:
+            files[file.file_name] = file.text
+    return files
+
+
+def _run(
+    lab: Lab, isolation: Isolation, files: dict[str, str], answers: dict[str, bool], cells: list[Cell]
+) -> SubmissionResult:
+    return run_in_worker(
+        Job(
+            student="lint", lab=lab.name, digest="", isolation=isolation, seed=1, files=files, answers=answers,
+            cells=cells,
+        )
+    )  # fmt: skip

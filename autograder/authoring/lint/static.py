@@ -1,0 +1,73 @@
+"""Everything about a lab that can be found out without running it."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+from autograder.authoring import requirements
+from autograder.authoring.lint.checks import check_findings
+from autograder.authoring.lint.finding import Finding
+from autograder.authoring.lint.metadata import metadata_findings
+from autograder.core.errors import KitError
+from autograder.course.lab import Lab, load_lab
+from autograder.course.paths import CoursePaths
+
+_HIDDEN = re.compile(r"\b(?:BEGIN|END) (SOLUTION|HIDDEN TESTS|MARK SCHEME)\b")
+
+
+def read_findings(root: Path, name: str) -> list[Finding]:
+    """Read a lab's source, and say what is wrong with it.
+
+    Raises:
+        KitError: there is no such lab under `solutions`.
+    """
+    notebook = CoursePaths(root).solutions / name / f"{name}.ipynb"
+    try:
+        cells = json.loads(notebook.read_text(encoding="utf-8"))["cells"]
+    except FileNotFoundError as error:
+        raise KitError(f"There is no solutions/{name}/{name}.ipynb.", "Name a folder under `solutions`.") from error
+    except (ValueError, KeyError, TypeError) as error:
+        return [Finding("", f"{notebook.name} is no notebook: {error}.")]
+    found = list(metadata_findings(cells))
+    try:
+        lab = load_lab(root, name)
+    except KitError as error:
+        return found or [Finding("", error.what)]
+    found += check_findings(lab)
+    if not lab.checks:
+        found.append(Finding("", "it has no check, so nobody can get points."))
+    return [*found, *_requirement_findings(lab, CoursePaths(root).requirements(name))]
+
+
+def _requirement_findings(lab: Lab, path: Path) -> Iterator[Finding]:
+    if not path.is_file():
+        yield Finding("", f"there is no {path}, so nobody can say whether every requirement is checked.", warning=True)
+        return
+    told = requirements.read(path)
+    known = {check.grade_id for check in lab.checks}
+    for one in told.required:
+        if one.check not in known:
+            yield Finding("", f"{path.name} names the check `{one.check}`, which the lab does not have.", warning=True)
+    for text in told.strangers(lab):
+        yield Finding("", f"{path.name}: these words are not in the lab: {text}", warning=True)
+    for text in told.uncovered(lab):
+        yield Finding("", f"nothing says which check holds this sentence: {text}", warning=True)
+    for check in told.unheld(lab):
+        yield Finding(check, "it holds no requirement.", warning=True)
+
+
+def release_findings(files: dict[Path, bytes]) -> list[Finding]:
+    """Look for what students must not receive in the files of a release."""
+    found = []
+    for path, content in files.items():
+        if path.suffix != ".ipynb":
+            continue
+        for number, cell in enumerate(json.loads(content)["cells"], start=1):
+            name = cell["metadata"].get("nbgrader", {}).get("grade_id", str(number))
+            source = cell["source"] if isinstance(cell["source"], str) else "".join(cell["source"])
+            marks = {match[1].lower() for match in _HIDDEN.finditer(source)}
+            found += [Finding(name, f"students would receive its {mark}.") for mark in sorted(marks)]
+    return found

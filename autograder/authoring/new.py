@@ -1,0 +1,62 @@
+"""Writes a course, or a lab of one, to begin with: small, complete, and graded like any other."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+from autograder.core.errors import KitError
+from autograder.core.files import write_beside
+from autograder.course.paths import CoursePaths
+from autograder.course.settings import SETTINGS_FILE
+from autograder.gradebook.settings import CONFIG_FILE, TEMPLATE
+
+FIRST_LAB = "lab1_greeter"
+_TEMPLATES = Path(__file__).with_name("templates")
+_SETTINGS = """\
+# Heading of the page that students begin with.
+title = "The labs"
+# The labs in the course's order; those that are not listed follow by their names.
+labs = ["{lab}"]
+"""
+
+
+def new_course(root: Path) -> list[Path]:
+    """Write a course with one lab into a folder that is empty or not there yet, and return its files.
+
+    Raises:
+        KitError: there is something in the folder.
+    """
+    if root.exists() and (not root.is_dir() or any(root.iterdir())):
+        raise KitError(f"{root} is not empty, and stays as it is.", "Name a folder that does not exist yet.")
+    files = {
+        SETTINGS_FILE: _SETTINGS.format(lab=FIRST_LAB),
+        CONFIG_FILE: TEMPLATE.read_text(encoding="utf-8"),
+        ".gitignore": "build/\n",
+    }
+    for name, text in files.items():
+        write_beside(root / name, text)
+    return [*(root / name for name in files), *new_lab(root, FIRST_LAB)]
+
+
+def new_lab(root: Path, name: str) -> list[Path]:
+    """Write a lab of one program and one table into a course, and return its files.
+
+    Raises:
+        KitError: the name cannot be a lab's, or there is such a lab.
+    """
+    if not re.fullmatch(r"[a-z][a-z0-9_]{0,63}", name):
+        raise KitError(
+            f"`{name[:80]}` cannot name a lab.", "Use small letters, digits and underscores, and begin with a letter."
+        )
+    paths = CoursePaths(root)
+    notebook = paths.solutions / name / f"{name}.ipynb"
+    if notebook.exists() or (paths.labs / name).exists():
+        raise KitError(f"There is a lab `{name}` already, and it stays as it is.", "Choose another name.")
+    requirements = paths.requirements(name)
+    raw = json.loads((_TEMPLATES / "lab.ipynb").read_text(encoding="utf-8"))
+    raw["cells"][0]["source"] = raw["cells"][0]["source"].replace("LAB_TITLE", name.replace("_", " ").capitalize())
+    write_beside(notebook, json.dumps(raw, indent=1, ensure_ascii=False) + "\n")
+    write_beside(requirements, (_TEMPLATES / "requirements.yaml").read_text(encoding="utf-8"))
+    return [notebook, requirements]

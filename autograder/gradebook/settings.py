@@ -1,0 +1,68 @@
+"""nbgrader's settings of a course: the kit's, and over them what the course's own `nbgrader_config.py` says."""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from autograder.core.errors import KitError
+from autograder.course.paths import CoursePaths
+
+CONFIG_FILE = "nbgrader_config.py"
+TEMPLATE = Path(__file__).with_name("nbgrader_config.template")
+"""A course's `nbgrader_config.py` as it begins, without settings of its own."""
+
+
+@cache
+def settings_of(root: Path) -> Any:
+    """Return nbgrader's whole configuration of a course, read once per process.
+
+    Raises:
+        KitError: the course's `nbgrader_config.py` cannot be used.
+    """
+    from autograder.gradebook.preparation import prepare_nbgrader
+
+    prepare_nbgrader()
+    from traitlets.config import Config
+    from traitlets.config.loader import PyFileConfigLoader
+
+    from autograder.gradebook.config import configure
+
+    config = Config()
+    configure(config, root)
+    if _says_more(root):
+        try:
+            config.merge(PyFileConfigLoader(CONFIG_FILE, str(root)).load_config())
+        except (Exception, SystemExit) as error:
+            raise KitError(f"{root / CONFIG_FILE} cannot be used: {error}", "Repair that line of it.") from error
+    return config
+
+
+def gradebook_address(root: Path) -> str:
+    """Return the address of a course's gradebook, as SQLAlchemy wants it."""
+    # Loading nbgrader takes a second; where the course says nothing of its own, the address is known without.
+    if not _says_more(root):
+        return CoursePaths(root).gradebook_url
+    return str(settings_of(root).CourseDirectory.db_url)
+
+
+def gradebook_file(root: Path) -> Path | None:
+    """Return the file that is a course's gradebook; None where it lies on a server."""
+    scheme, _, path = gradebook_address(root).partition(":///")
+    return Path(path) if scheme == "sqlite" else None
+
+
+def gradebook_place(root: Path) -> str:
+    """Return where a course's gradebook lies, for a person to read: without a password."""
+    file = gradebook_file(root)
+    if file is not None:
+        return str(file)
+    from sqlalchemy.engine import make_url
+
+    return make_url(gradebook_address(root)).render_as_string(hide_password=True)
+
+
+def _says_more(root: Path) -> bool:
+    own = root / CONFIG_FILE
+    return own.is_file() and own.read_text(encoding="utf-8") != TEMPLATE.read_text(encoding="utf-8")

@@ -1,0 +1,191 @@
+"""A course of one's own: the kit installed from its wheel, far from any checkout, takes a course the whole way."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+KIT = Path(__file__).resolve().parent.parent
+LAB = "lab2_talkers"
+
+
+class Environment:
+    """A virtual environment with the wheel in it and nothing of the checkout."""
+
+    def __init__(self, folder: Path) -> None:
+        source = folder / "source"
+        source.mkdir(parents=True)
+        for name in ("pyproject.toml", "README.md", "LICENSE"):
+            shutil.copy(KIT / name, source)
+        shutil.copytree(KIT / "autograder", source / "autograder", ignore=shutil.ignore_patterns("__pycache__"))
+        self.folder = folder / "venv"
+        here = ("--quiet", "--python", sys.executable)
+        self.uv("build", "--wheel", "--no-build-isolation", *here, "--out-dir", folder, source)
+        self.uv("venv", *here, self.folder)
+        # The dependencies come from this environment, as hard links: no network, and no second copy on the disk. The
+        # sandbox shows an environment's own folder, so a .pth file that leads here would not do.
+        for name in ("lib", "share"):  # ROS has its libraries beside Python's packages
+            subprocess.run(["cp", "-al", f"{sys.prefix}/{name}/.", self.folder / name], check=True)
+        next(self.folder.glob("lib/python*/site-packages/autograder.pth")).unlink()
+        for program in ("alembic", "jupyter", "jupyter-nbconvert"):
+            text = Path(sys.prefix, "bin", program).read_text(encoding="utf-8")
+            script = self.folder / "bin" / program
+            script.write_text(text.replace(sys.prefix, str(self.folder)), encoding="utf-8")
+            script.chmod(0o755)
+        wheel = next(folder.glob("*.whl"))
+        self.uv("pip", "install", "--quiet", "--no-deps", "--python", self.folder / "bin" / "python", wheel)
+
+    def uv(self, *words: str | Path) -> None:
+        done = subprocess.run(["uv", *words], env=os.environ | {"UV_OFFLINE": "1"}, capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr
+
+    def run(self, cwd: Path, *words: str | Path, status: int = 0) -> str:
+        """Run a command of this environment, and return all that it printed."""
+        program, *rest = words
+        environ = {name: os.environ[name] for name in ("HOME", "LANG") if name in os.environ}
+        done = subprocess.run(
+            [self.folder / "bin" / program, *rest],
+            cwd=cwd, env=environ | {"PATH": "/usr/bin:/bin"}, capture_output=True, text=True, check=False,
+        )  # fmt: skip
+        assert done.returncode == status, done.stdout + done.stderr
+        return done.stdout + done.stderr
+
+
+@pytest.fixture(scope="module")
+def environment(tmp_path_factory: pytest.TempPathFactory) -> Environment:
+    return Environment(tmp_path_factory.mktemp("wheel"))
+
+
+@pytest.fixture(scope="module")
+def course(environment: Environment, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A course with two labs, released."""
+    root = tmp_path_factory.mktemp("own") / "my course"
+    environment.run(root.parent, "autograder", "new", "course", root)
+    environment.run(root, "autograder", "new", "lab", LAB)
+    told = environment.run(root, "autograder", "release")
+    assert f"{LAB} → {root}/labs/{LAB}" in told
+    return root
+
+
+def sources(notebook: Path) -> list[str]:
+    return [cell["source"] for cell in json.loads(notebook.read_text(encoding="utf-8"))["cells"]]
+
+
+def hand_in(course: Path, folder: Path, student: str, *, solved: bool) -> Path:
+    """Write a student's notebook: as it is given out, or with the author's solution in it."""
+    kind = "solutions" if solved else "labs"
+    path = folder / student / f"{LAB}.ipynb"
+    path.parent.mkdir(parents=True)
+    notebook = json.loads((course / kind / LAB / f"{LAB}.ipynb").read_text(encoding="utf-8"))
+    path.write_text(json.dumps(notebook), encoding="utf-8")
+    return path
+
+
+def test_nothing_of_the_checkout_is_used(environment: Environment, tmp_path: Path) -> None:
+    told = environment.run(tmp_path, "python", "-c", "import autograder, sys; print(autograder.__file__, *sys.path)")
+    assert str(KIT) not in told
+    etc = environment.folder / "etc"
+    for name in ("jupyter/nbgrader_config", "jupyter/jupyter_nbconvert_config", "ipython/ipython_kernel_config"):
+        assert list(etc.glob(f"{name}.*")), name
+
+
+def test_a_new_lab_lints_clean_and_hides_its_solution(environment: Environment, course: Path) -> None:
+    assert environment.run(course, "autograder", "lint", LAB) == f"{LAB}: fine\n"
+    released = sources(course / "labs" / LAB / f"{LAB}.ipynb")
+    assert "# YOUR CODE HERE" in released[3] and "create_publisher" not in released[3]
+    assert f"({LAB}/{LAB}.ipynb)" in (course / "labs" / "README.md").read_text(encoding="utf-8")
+
+
+def test_a_class_is_graded_and_a_notebook_checked(environment: Environment, course: Path, tmp_path: Path) -> None:
+    class_ = tmp_path / "class"
+    solved = hand_in(course, class_, "ann", solved=True)
+    hand_in(course, class_, "bob", solved=False)
+    environment.run(course, "autograder", "grade", LAB, class_)
+    table = (course / "build" / "grades.csv").read_text(encoding="utf-8").splitlines()
+    assert table[1:] == [f"ann,{LAB},5,5,0", f"bob,{LAB},0,5,0"]
+    assert (course / "build" / "feedback" / "bob" / LAB / f"{LAB}.html").is_file()
+    environment.run(tmp_path, "autograder", "check", solved, "--course", course)
+    # Never the course that a notebook happens to lie in: its checks are code.
+    assert "--course FOLDER" in environment.run(course, "autograder", "check", solved, status=2)
+
+
+def test_nbgraders_own_settings_of_a_course_hold_everywhere(environment: Environment, tmp_path: Path) -> None:
+    root = tmp_path / "course"
+    environment.run(tmp_path, "autograder", "new", "course", root)
+    config = root / "nbgrader_config.py"
+    address = f"sqlite:///{tmp_path}/elsewhere.db"
+    lines = f"\nget_config().CourseDirectory.db_url = {address!r}  # noqa: F821\n"
+    config.write_text(config.read_text(encoding="utf-8") + lines, encoding="utf-8")
+    environment.run(root, "autograder", "new", "lab", LAB)
+    hand_in(root, tmp_path / "class", "ann", solved=True)
+    told = environment.run(root, "autograder", "grade", LAB, tmp_path / "class")
+    assert f"gradebook  {tmp_path}/elsewhere.db" in told
+    assert (tmp_path / "elsewhere.db").is_file() and not (root / "build" / "gradebook.db").exists()
+    assert f"ann,{LAB},5,5,0" in (root / "build" / "grades.csv").read_text(encoding="utf-8")
+
+
+def test_outside_of_a_course_nbgrader_executes_nothing(environment: Environment, tmp_path: Path) -> None:
+    notebook = tmp_path / "toy.ipynb"
+    cell = {"cell_type": "code", "id": "a", "metadata": {}, "source": "open('executed', 'w')", "outputs": [],
+            "execution_count": None}  # fmt: skip
+    notebook.write_text(json.dumps({"cells": [cell], "metadata": {}, "nbformat": 4, "nbformat_minor": 5}))
+    told = environment.run(tmp_path, "python", "-m", "nbgrader", "validate", notebook)
+    assert "Start it in the folder of your course" in told and not (tmp_path / "executed").exists()
+
+
+@pytest.mark.parametrize(
+    ("cell", "old", "new", "said"),
+    [
+        ("check_greeter", "ros.expect_node", "ros.expect_nod", "there is no `expect_nod`; `expect_node` may be meant"),
+        ("check_greeter", "at_least=3", "at_last=3", "`expect_messages` has no argument `at_last`; `at_least` may be"),
+        ("check_greeter", "String, at_least=3", "Strnig, at_least=3", "nothing is called `Strnig`"),
+        ("check_greeter", '{"the text": 2,', '{"the text": 3,', "its score gives 4 points, and its metadata 3"),
+        ("check_greeter", '"five times a second": 1}', '"six": 1}', 'no points for the part "five times a second"'),
+        ("check_facts", "table.score(2)", "", "it has no score"),
+        ("check_facts", "table.score(2)", "table.score(2", "was never closed"),
+        ("greeter", "### END SOLUTION", "", "`BEGIN SOLUTION` stands inside of the one of line"),
+        ("greeter", "%%node greeter", "# greeter", "its first line must be `%%node NAME`"),
+        ("greeter", '"""Publish one greeting."""', "", "what students receive is no Python"),
+    ],
+)
+def test_release_refuses_a_broken_cell_and_names_it(
+    course: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, cell: str, old: str, new: str, said: str
+) -> None:
+    from autograder.authoring.release import release
+    from autograder.core.errors import KitError
+
+    shutil.copytree(course, tmp_path / "course", ignore=shutil.ignore_patterns("build", "labs"))
+    notebook = tmp_path / "course" / "solutions" / LAB / f"{LAB}.ipynb"
+    raw = json.loads(notebook.read_text(encoding="utf-8"))
+    source = next(one for one in raw["cells"] if one["metadata"].get("nbgrader", {}).get("grade_id") == cell)
+    assert old in source["source"]
+    source["source"] = source["source"].replace(old, new, 1)
+    notebook.write_text(json.dumps(raw), encoding="utf-8")
+    with pytest.raises(KitError) as refused:
+        release(tmp_path / "course", LAB)
+    assert f"cell `{cell}`: " in refused.value.what and said in refused.value.what
+    assert not (tmp_path / "course" / "labs").exists()
+
+
+def test_a_setting_that_there_is_not_is_refused(tmp_path: Path) -> None:
+    from autograder.core.errors import KitError
+    from autograder.course.settings import read_settings
+
+    (tmp_path / "course.toml").write_text('titel = "Robots"\n')
+    with pytest.raises(KitError, match=r"`titel`, which is no setting of a course[^\n]*\nSettings: title, labs"):
+        read_settings(tmp_path)
+    (tmp_path / "course.toml").write_text("labs = 3\n")
+    with pytest.raises(KitError, match="`labs` cannot be 3"):
+        read_settings(tmp_path)
+
+
+def test_this_repositorys_configuration_is_what_a_new_course_gets() -> None:
+    from autograder.gradebook.settings import TEMPLATE
+
+    assert (KIT / "nbgrader_config.py").read_text() == TEMPLATE.read_text()
