@@ -60,8 +60,9 @@ test: setup-dev ## run every test, ruff and mypy among them
 test-all: setup-dev ## the same, with every check run on every sample student
 	@$(RUN) python -m pytest -n 2 --dist loadfile --no-loadscope-reorder --complete $(ARGS)
 
-lint: setup-dev ## ruff and mypy --strict
+lint: setup-dev ## ruff, its formatting, and mypy --strict
 	@$(RUN) ruff check .
+	@$(RUN) ruff format --check .
 	@$(RUN) mypy autograder
 
 soak: setup-dev ## grade every sample student N=20 times, half of them under load: nothing may differ

@@ -20,7 +20,6 @@ from autograder.course.lab import Lab, load_lab
 PAGE = ROOT / "tests" / "classes" / "REQUIREMENTS.md"
 
 
-
 def read(lab: str) -> Requirements:
     """A lab's requirements."""
     return read_file(sample_class.class_folder(lab) / "requirements.yaml")

@@ -133,7 +133,9 @@ def test_the_issue_forms_and_the_hooks_can_be_read() -> None:
 
 
 @pytest.mark.parametrize(
-    "command", [("ruff", "check", "."), ("mypy", "--strict", "autograder")], ids=lambda command: command[0]
+    "command",
+    [("ruff", "check", "."), ("ruff", "format", "--check", "."), ("mypy", "--strict", "autograder")],
+    ids=lambda command: "-".join(command[:2]),
 )
 def test_the_code_is_clean(command: tuple[str, ...]) -> None:
     done = subprocess.run(

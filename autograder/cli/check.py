@@ -43,9 +43,7 @@ def check(
         print(f"note: {note}", file=sys.stderr)
     settings = Settings(isolation=choose(isolation), seed=seed)
     with working(f"Running the {len(found.checks)} checks of {found.name}: each waits until its evidence has come"):
-        result = run_submission(
-            notebook, notebook.parent.resolve().name, found, settings, workers=WORKERS_FOR_ONE
-        )
+        result = run_submission(notebook, notebook.parent.resolve().name, found, settings, workers=WORKERS_FOR_ONE)
     audience: Audience = "instructor" if instructor else "student"
     if junit is not None:
         from autograder.core.files import write_beside

@@ -67,9 +67,7 @@ def submission_view(result: SubmissionResult, audience: Audience = "student") ->
     return Group(*parts)
 
 
-def check_view(
-    check: CellResult, remarks: Sequence[str] = (), origin: str = "", title: str = ""
-) -> RenderableType:
+def check_view(check: CellResult, remarks: Sequence[str] = (), origin: str = "", title: str = "") -> RenderableType:
     """Return one check's report: what was found first, then what holds. Of a check that passed, a line."""
     verdict, found = words.verdict(check), words.findings(check)
     style = _VERDICT_STYLE[verdict]

@@ -89,9 +89,7 @@ def take_own_files(cells: list[dict[str, Any]], lab: Lab, submission: Submission
             check_free(file)
         except BadNameError as error:
             submission.problems.append(
-                problem(
-                    "bad-file-name", f"`%%{file.magic} {file.name}` can be a file", f"{error} The cell is ignored."
-                )
+                problem("bad-file-name", f"`%%{file.magic} {file.name}` can be a file", f"{error} The cell is ignored.")
             )
             continue
         own[file.file_name] = file.text
