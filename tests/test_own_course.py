@@ -74,7 +74,8 @@ def course(environment: Environment, tmp_path_factory: pytest.TempPathFactory) -
 
 
 def sources(notebook: Path) -> list[str]:
-    return [cell["source"] for cell in json.loads(notebook.read_text(encoding="utf-8"))["cells"]]
+    cells = json.loads(notebook.read_text(encoding="utf-8"))["cells"]
+    return ["".join(cell["source"]) for cell in cells]
 
 
 def hand_in(course: Path, folder: Path, student: str, *, solved: bool) -> Path:
@@ -100,6 +101,17 @@ def test_a_new_lab_lints_clean_and_hides_its_solution(environment: Environment, 
     released = sources(course / "labs" / LAB / f"{LAB}.ipynb")
     assert "# YOUR CODE HERE" in released[3] and "create_publisher" not in released[3]
     assert f"({LAB}/{LAB}.ipynb)" in (course / "labs" / "README.md").read_text(encoding="utf-8")
+
+
+def test_lint_runs_the_solution_and_says_which_check_it_fails(environment: Environment, tmp_path: Path) -> None:
+    root = tmp_path / "course"
+    environment.run(tmp_path, "autograder", "new", "course", root)
+    notebook = root / "solutions" / "lab1_greeter" / "lab1_greeter.ipynb"
+    text = notebook.read_text(encoding="utf-8")
+    notebook.write_text(text.replace("messages_in_two_seconds: 10", "messages_in_two_seconds: 11"), encoding="utf-8")
+    told = environment.run(root, "autograder", "lint", status=1)
+    assert "error: cell `check_facts`: the solution gets 1 of 2 points." in told
+    assert told.count("error: ") == 1
 
 
 def test_a_class_is_graded_and_a_notebook_checked(environment: Environment, course: Path, tmp_path: Path) -> None:
