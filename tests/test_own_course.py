@@ -197,6 +197,17 @@ def test_a_setting_that_there_is_not_is_refused(tmp_path: Path) -> None:
         read_settings(tmp_path)
 
 
+def test_labs_come_in_the_order_of_the_settings(course: Path, tmp_path: Path) -> None:
+    from autograder.authoring.start_page import start_page
+    from autograder.course.lab import lab_names
+
+    root = shutil.copytree(course, tmp_path / "course", ignore=shutil.ignore_patterns("build"))
+    (root / "course.toml").write_text(f'title = "Robots"\nlabs = ["{LAB}"]\n')
+    assert lab_names(root) == [LAB, "lab1_greeter"]
+    page = start_page(root / "labs")
+    assert page.startswith("# Robots\n") and page.index(f"{LAB}.ipynb") < page.index("lab1_greeter.ipynb")
+
+
 def test_this_repositorys_configuration_is_what_a_new_course_gets() -> None:
     from autograder.gradebook.settings import TEMPLATE
 

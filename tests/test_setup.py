@@ -5,6 +5,7 @@ One checkout gets the whole lock. The others get a lock of two small packages, s
 
 from __future__ import annotations
 
+import ast
 import json
 import os
 import re
@@ -233,6 +234,14 @@ def test_no_python_at_all(tmp_path: Path) -> None:
     assert done.returncode == 2
     assert "No Python was found" in done.stderr
     assert "apt-get install" in done.stderr
+
+
+def test_an_old_python_can_read_what_sets_the_kit_up() -> None:
+    kit = ROOT / "autograder"
+    above = [kit / name for name in ("__init__.py", "core/__init__.py", "core/version.py")]
+    for path in (*above, *kit.glob("setup/*.py")):
+        ast.parse(path.read_text(encoding="utf-8"), str(path), feature_version=(3, 6))
+        assert "from __future__ import annotations" not in path.read_text(encoding="utf-8"), path  # of Python 3.7
 
 
 def test_a_named_python_that_is_not_there(tmp_path: Path) -> None:
