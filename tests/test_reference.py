@@ -16,6 +16,7 @@ sys.path.append(str(ROOT / "lectures" / "_ext"))
 import check_api  # noqa: E402  (these make pages of the book)
 import kit_source  # noqa: E402
 import reason_codes  # noqa: E402
+import reference  # noqa: E402
 
 from autograder.checks.codes import GROUPS  # noqa: E402
 from autograder.checks.launch import Launch  # noqa: E402
@@ -48,6 +49,11 @@ def test_every_code_that_grading_gave_stands_on_the_page_or_in_a_lab() -> None:
     page = reason_codes.reason_codes()
     assert len(given) > 50
     assert sorted(code for code in given if f"**`{code}`**" not in page and code not in own) == []
+
+
+def test_every_folder_of_the_package_stands_among_the_layers() -> None:
+    folders = {path.parent.name for path in (ROOT / "autograder").glob("*/__init__.py")}
+    assert folders == set(re.findall(r"^\| `(\w+)` \| \S", reference.layers(), re.MULTILINE))
 
 
 def test_groups_of_codes_point_to_lectures_that_are_there() -> None:

@@ -10,6 +10,7 @@ In a page, a line `<!-- generated: NAME -->` is replaced by what the code says o
 from __future__ import annotations
 
 import ast
+import re
 import tomllib
 from collections.abc import Callable
 from pathlib import Path
@@ -28,8 +29,9 @@ def layers() -> str:
     contract = next(one for one in settings["tool"]["importlinter"]["contracts"] if one["type"] == "layers")
     lines = ["| folder | what it is for |", "|---|---|"]
     for layer in contract["layers"]:
-        about = (ast.get_docstring(parsed(KIT / layer / "__init__.py")) or "").split("\n\n")[0]
-        lines.append(f"| `{layer}` | {' '.join(about.split())} |")
+        for folder in re.findall(r"\w+", layer):  # `one | other` stand beside each other and do not use each other
+            about = (ast.get_docstring(parsed(KIT / folder / "__init__.py")) or "").split("\n\n")[0]
+            lines.append(f"| `{folder}` | {' '.join(about.split())} |")
     return "\n".join(lines)
 
 
