@@ -40,7 +40,7 @@ CELLS = [
     cell(
         "code",
         """with launch("talker") as ros:
-    ros.expect_exit("talker")
+    ros.expect_exit("talker", within=60)
     ### BEGIN HIDDEN TESTS
     secret = 0
     ros.expect_exit("talker", status=secret, hint="Mind the status.")
