@@ -42,7 +42,8 @@ def check(
         note = "This notebook is the course's own copy of the lab: its checks are run as they stand in it."
         print(f"note: {note}", file=sys.stderr)
     settings = Settings(isolation=choose(isolation), seed=seed)
-    with working(f"Running the {len(found.checks)} checks of {found.name}: each waits until its evidence has come"):
+    number = f"the {len(found.checks)} checks" if len(found.checks) > 1 else "the check"
+    with working(f"Running {number} of {found.name}: evidence is waited for"):
         result = run_submission(notebook, notebook.parent.resolve().name, found, settings, workers=WORKERS_FOR_ONE)
     audience: Audience = "instructor" if instructor else "student"
     if junit is not None:
