@@ -83,7 +83,7 @@ class CommandLine:
             raise CommandLineError(error.because, error.code, error.hint or "Write `entry: words`.") from None
         text = table.get(self.entry) if isinstance(table, dict) else None
         if text is None or text == "?":
-            near = nearest(self.entry, table) if isinstance(table, dict) and text is None else None
+            near = nearest(self.entry, map(str, table)) if isinstance(table, dict) and text is None else None
             raise CommandLineError(
                 f"`{self.entry}` in `{self.file}` has no answer yet."
                 + (f" `{near[:60]}` is there; did you mean `{self.entry}`?" if near else ""),

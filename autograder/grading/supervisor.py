@@ -39,9 +39,14 @@ def run_in_worker(job: Job, stop: threading.Event | None = None, workers: int = 
         Stopped: by `stop`.
     """
     shares = [share for share in (job.checks[number::workers] for number in range(workers)) if share]
+    given_up = stop or threading.Event()
     with ThreadPoolExecutor(max(1, len(shares)), thread_name_prefix="share") as pool:
-        futures = [pool.submit(_run_share, job, share, stop) for share in shares]
-        checks = [check for future in futures for check in future.result()]
+        futures = [pool.submit(_run_share, job, share, given_up) for share in shares]
+        try:
+            checks = [check for future in futures for check in future.result()]
+        except BaseException:  # such as Ctrl-C: nobody waits for the other shares any more
+            given_up.set()
+            raise
     result = job.result(checks)
     result.seconds["checks"] = round(sum(check.seconds for check in checks), 3)
     return validated(result, job.checks)
