@@ -128,20 +128,27 @@ def test_logs_share_the_room_there_is() -> None:
     assert worker._within(logs[:1], 10_000) == logs[:1]
 
 
-def test_an_observer_keeps_what_it_has_room_for_and_lets_the_rest_go_by() -> None:
-    flood = (
-        "import rclpy\nfrom std_msgs.msg import String\nrclpy.init()\nnode = rclpy.create_node('flood')\n"
-        "publisher = node.create_publisher(String, '/flood', 10)\n"
+def test_a_flooded_topic_takes_at_most_half_of_an_observers_room_and_silences_no_other() -> None:
+    begin = "import rclpy\nfrom std_msgs.msg import String\nrclpy.init()\n"
+    flood = begin + (
+        "node = rclpy.create_node('flood')\npublisher = node.create_publisher(String, '/flood', 10)\n"
         "while True:\n    publisher.publish(b'no message')\n    publisher.publish(String(data='x' * 60_000))\n"
+    )
+    talk = begin + (
+        "node = rclpy.create_node('talk')\npublisher = node.create_publisher(String, '/talk', 10)\n"
+        "node.create_timer(0.02, lambda: publisher.publish(String(data='talk')))\nrclpy.spin(node)\n"
     )
     check = (
         "from autograder.checks import launch\nfrom autograder.graph import observer\nfrom std_msgs.msg import String\n"
         "observer.RECORDED = 600_000\n"
-        "with launch('flood', listen=[('/flood', String)]) as ros:\n"
-        "    full = ros.wait(lambda: not ros._running.observer.room_for(0), 20)\n"
-        "    texts = [len(one.msg.data) for one in ros._running.observer.record('/flood', String).messages]\n"
-        "    outcomes.passed(f'{full} {0 < len(texts) < 11} {set(texts)}')\n"
+        "with launch('flood', 'talk', listen=[('/flood', String), ('/talk', String)]) as ros:\n"
+        "    record = ros._running.observer.record\n"
+        "    flood, talk = record('/flood', String), record('/talk', String)\n"
+        "    full = flood.wait_for(4, 20)\n"
+        "    heard = talk.wait_for(talk.count + 20, 20)\n"
+        "    texts = [len(one.msg.data) for one in flood.messages]\n"
+        "    outcomes.passed(f'{full} {heard} {len(texts) < 6} {set(texts)}')\n"
         "score(1)"
     )
-    result = run_in_worker(job(check, files={"flood.py": flood}))
-    assert result.checks[0].outcomes[0].title == "True True {60000}", result
+    result = run_in_worker(job(check, files={"flood.py": flood, "talk.py": talk}))
+    assert result.checks[0].outcomes[0].title == "True True True {60000}", result

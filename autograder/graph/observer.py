@@ -40,8 +40,6 @@ PATIENCE = 60.0
 
 RECORDED = 128 * 1024 * 1024
 """Bytes of messages that one observer keeps; what comes later is let go by."""
-_MESSAGE_OVERHEAD = 1024
-"""Bytes that a message takes besides its own, about."""
 
 OBSERVER_NAME = "grading_observer"
 
@@ -110,10 +108,15 @@ class Observer:
         self.node.destroy_node()
         self._context.try_shutdown()
 
-    def room_for(self, size: int) -> bool:
-        """Take room for one more message of `size` bytes; False if there is none left."""
-        self._room -= size + _MESSAGE_OVERHEAD
-        return self._room >= 0
+    def room_for(self, size: int, kept: int) -> bool:
+        """Take room for one more message of `size` bytes, for a recording that keeps `kept` bytes; False if none.
+
+        A recording gets no more than what is left for all others: a topic that is flooded must not silence the rest.
+        """
+        if kept + size > self._room:
+            return False
+        self._room -= size
+        return True
 
     def notify(self) -> None:
         """Wake whoever waits: something happened."""

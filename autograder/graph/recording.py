@@ -13,14 +13,17 @@ from rclpy.node import Node
 from rclpy.qos import QoSDurabilityPolicy, QoSHistoryPolicy, QoSPolicyKind, QoSProfile, QoSReliabilityPolicy
 from rclpy.serialization import deserialize_message
 
+_MESSAGE_OVERHEAD = 1024
+"""Bytes that a message takes besides its own, about."""
+
 
 class Recorder(Protocol):
     """Who records: an observer."""
 
     node: Node
 
-    def room_for(self, size: int) -> bool:
-        """Take room for one more message of `size` bytes; False if there is none left."""
+    def room_for(self, size: int, kept: int) -> bool:
+        """Take room for one more message of `size` bytes, for a recording that keeps `kept` bytes; False if none."""
 
     def notify(self) -> None:
         """Wake whoever waits: something happened."""
@@ -66,6 +69,7 @@ class Recording:
         """Publishers that count as alive; a lease in the profile is needed to see one that hangs."""
         self._observer = observer
         self._messages: list[Received] = []
+        self._kept = 0
         self._subscription = observer.node.create_subscription(
             msg_type,
             topic,
@@ -78,8 +82,10 @@ class Recording:
         )
 
     def _take(self, data: bytes, info: dict[str, int]) -> None:
-        if not self._observer.room_for(len(data)):
+        size = len(data) + _MESSAGE_OVERHEAD
+        if not self._observer.room_for(size, self._kept):
             return
+        self._kept += size
         with contextlib.suppress(Exception):  # whatever a program sends that is no such message
             msg = deserialize_message(data, self.msg_type)
             self._messages.append(
