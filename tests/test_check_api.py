@@ -30,12 +30,13 @@ LOOKING = """
     listen log messages_during nodes program programs publishers requests seen_at_once seen_runs served
     state subscriptions topics watch_transitions
 """
+PICTURES = "arrivals graph lifecycle qos runs timeline"
 SCORING = "part score"
 
 
 def test_only_what_a_check_may_use_is_shown() -> None:
     shown = {name for name in dir(Launch) if not name.startswith("_")}
-    assert shown == set(f"{EXPECTATIONS} {WAITING} {SENDING} {LOOKING} {SCORING}".split())
+    assert shown == set(f"{EXPECTATIONS} {WAITING} {SENDING} {LOOKING} {PICTURES} {SCORING}".split())
     assert not [name for name in vars(Launch([], [], [], [])) if not name.startswith("_")]
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager
@@ -9,16 +10,16 @@ from types import TracebackType
 from typing import Any
 
 from autograder.arguments import params_file, remap_rules
-from autograder.checks import contradictions, findings, outcomes, runtime
+from autograder.checks import contradictions, findings, outcomes, runtime, seen
 from autograder.checks.command_line import CommandLineError
 from autograder.checks.expect.actions import ActionExpectations
 from autograder.checks.expect.facts import Facts
-from autograder.checks.expect.lifecycle import LifecycleExpectations
 from autograder.checks.expect.looking import Looking
 from autograder.checks.expect.meanwhile import MeanwhileExpectations
 from autograder.checks.expect.messages import MessageExpectations
 from autograder.checks.expect.parameters import ParameterExpectations
 from autograder.checks.expect.periods import PeriodExpectations
+from autograder.checks.expect.pictures import Pictures
 from autograder.checks.expect.programs import ProgramExpectations
 from autograder.checks.expect.publishing import Publishing
 from autograder.checks.expect.qos import QosExpectations
@@ -33,7 +34,7 @@ from autograder.checks.waiting import NotLaunchedError, watched
 from autograder.core.front_end import Watcher
 from autograder.core.results import NodeLog
 from autograder.diagnosis import Diagnosis
-from autograder.graph.observer import Observer
+from autograder.graph.observer import ForgedGraph, Observer
 from autograder.launch_files import LaunchFileError, remove_written
 from autograder.sandbox.environment import profile_environment, remove_logs
 from autograder.sandbox.node_sandbox import ProgramGroup
@@ -49,10 +50,10 @@ class Launch(
     ServiceExpectations,
     ParameterExpectations,
     ActionExpectations,
-    LifecycleExpectations,
     ProgramExpectations,
     Facts,
     Looking,
+    Pictures,
 ):
     """A running launch: `ros` in a check cell."""
 
@@ -218,7 +219,10 @@ class Launch(
     def _end(self) -> None:
         # What still runs is ended here: how is no fact about the program.
         ended = {id(program): program.exit_status() for _, program in self._running.programs}
-        if runtime.current.front_end is None:
+        if runtime.current.front_end is not None:
+            with contextlib.suppress(ForgedGraph):
+                self._graph = seen.graph(self._observer)
+        else:
             varied = [
                 bool(node.parameters or node.params_file or node.arguments_of_its_own)
                 for node, _ in self._running.programs

@@ -14,6 +14,7 @@ from typing import NoReturn
 
 from autograder.checks import findings, runtime
 from autograder.checks.misuse import place_of
+from autograder.core.picture import Picture
 from autograder.core.results import Outcome, Status
 from autograder.course.markers import MORE_AT_GRADING, hidden_lines
 from autograder.graph.observer import ForgedGraph
@@ -60,14 +61,21 @@ def passed(title: str, *, expected: str = "", observed: str = "") -> None:
 
 
 def failed(
-    title: str, *, expected: str = "", observed: str = "", because: str = "", hint: str = "", code: str = ""
+    title: str,
+    *,
+    expected: str = "",
+    observed: str = "",
+    because: str = "",
+    hint: str = "",
+    code: str = "",
+    picture: Picture | None = None,
 ) -> NoReturn:
     """Record that an expectation does not hold, and end the block: the part, or the whole launch outside of any.
 
     Raises:
         CheckEnded: always.
     """
-    _record(_failure(title, expected, observed, because, hint, code))
+    _record(_failure(title, expected, observed, because, hint, code).model_copy(update={"picture": picture}))
     _rest_not_checked()
     if findings.current.part:
         raise CheckEnded(title)

@@ -13,6 +13,7 @@ from typing import Annotated
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 from autograder.core.files import write_beside
+from autograder.core.picture import Picture
 from autograder.core.version import VERSION
 
 SCHEMA_VERSION = 2
@@ -69,6 +70,8 @@ class Outcome(_Model):
     """A short stable word for the reason, such as `qos-reliability`; tests and statistics use it."""
     hidden: bool = False
     """It stems from a hidden test: students see that it failed and the hint, nothing else."""
+    picture: Picture | None = None
+    """What explains the reason better than words."""
     part: str = ""
     """Title of the part of the check that it belongs to; empty: it holds for all parts of its launch."""
 

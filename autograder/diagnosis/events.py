@@ -81,6 +81,14 @@ class LifecyclePublishOff(_AtLine):
     state: str
 
 
+class Ran(_Event):
+    """Runs of callbacks, and messages sent; only so many of a program are told."""
+
+    e: Literal["ran"]
+    runs: list[tuple[int, float, float, int]]
+    """Number of the thing, when it began and ended, and on which thread; a message is sent in no time."""
+
+
 class Awaits(_AtLine):
     """Where a coroutine callback waits."""
 
@@ -218,6 +226,7 @@ Event = (
     | BadReturn
     | BadMessage
     | LifecyclePublishOff
+    | Ran
     | Thing
     | Call
     | ExecutorSeen

@@ -32,6 +32,8 @@ MEMORY = 2048 * MIB
 """Bytes that the worker may take for itself: what a student wrote may unfold in it, and then fails its own check."""
 TEXT_KEPT = 8000
 """Characters of one text in an outcome."""
+PICTURE_KEPT = 150_000
+"""Characters of a picture: what is longer is left out."""
 OUTCOMES_KEPT = 400
 LOGS_KEPT = 8 * MIB
 """Characters of all programs' output together."""
@@ -92,7 +94,11 @@ def _shortened(check: CheckResult) -> CheckResult:
     outcomes = []
     for outcome in check.outcomes[:OUTCOMES_KEPT]:
         long = {name: text for name in texts if len(text := getattr(outcome, name)) > TEXT_KEPT}
-        short = {name: f"{text[: TEXT_KEPT // 2]} […] {text[-TEXT_KEPT // 2 :]}" for name, text in long.items()}
+        short: dict[str, object] = {
+            name: f"{text[: TEXT_KEPT // 2]} […] {text[-TEXT_KEPT // 2 :]}" for name, text in long.items()
+        }
+        if outcome.picture is not None and len(outcome.picture.svg) + len(outcome.picture.alt) > PICTURE_KEPT:
+            short["picture"] = None
         outcomes.append(outcome.model_copy(update=short))
     return check.model_copy(update={"outcomes": outcomes})
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from rclpy.duration import Duration
-from rclpy.qos import QoSDurabilityPolicy, QoSLivelinessPolicy, QoSProfile, QoSReliabilityPolicy
+from rclpy.qos import QoSProfile
 
 _INFINITE = 2**62
 """Nanoseconds from which a duration on the graph means "never": the middleware's own infinity is about 2**63."""
@@ -11,6 +13,9 @@ _INFINITE = 2**62
 
 POLICIES = frozenset({"reliability", "durability", "deadline", "lifespan", "liveliness", "lease"})
 """The policies that the graph shows; history and depth are not among them."""
+
+
+Policies = Mapping[str, str | float | None]
 
 
 def seconds(duration: Duration) -> float | None:
@@ -44,27 +49,23 @@ def first_mismatch(offered: QoSProfile, requested: QoSProfile) -> str | None:
     Source: the DDS rule that a request must not be stricter than the offer, for reliability, durability, deadline,
     liveliness and its lease.
     """
-    if (
-        requested.reliability == QoSReliabilityPolicy.RELIABLE
-        and offered.reliability == QoSReliabilityPolicy.BEST_EFFORT
-    ):
+    return mismatch_between(describe(offered), describe(requested))
+
+
+def mismatch_between(offered: Policies, requested: Policies) -> str | None:
+    """As `first_mismatch`, of profiles that `describe` has put into words."""
+    if requested["reliability"] == "reliable" and offered["reliability"] == "best_effort":
         return "reliability"
-    if (
-        requested.durability == QoSDurabilityPolicy.TRANSIENT_LOCAL
-        and offered.durability == QoSDurabilityPolicy.VOLATILE
-    ):
+    if requested["durability"] == "transient_local" and offered["durability"] == "volatile":
         return "durability"
-    if _longer(seconds(offered.deadline), seconds(requested.deadline)):
+    if _longer(offered["deadline"], requested["deadline"]):
         return "deadline"
-    if (
-        requested.liveliness == QoSLivelinessPolicy.MANUAL_BY_TOPIC
-        and offered.liveliness == QoSLivelinessPolicy.AUTOMATIC
-    ):
+    if requested["liveliness"] == "manual_by_topic" and offered["liveliness"] == "automatic":
         return "liveliness"
-    if _longer(seconds(offered.liveliness_lease_duration), seconds(requested.liveliness_lease_duration)):
+    if _longer(offered["lease"], requested["lease"]):
         return "liveliness lease"
     return None
 
 
-def _longer(offered: float | None, requested: float | None) -> bool:
-    return requested is not None and (offered is None or offered > requested)
+def _longer(offered: str | float | None, requested: str | float | None) -> bool:
+    return isinstance(requested, float) and (not isinstance(offered, float) or offered > requested)

@@ -61,6 +61,7 @@ def _environment() -> Environment:
         lstrip_blocks=True,
     )
     environment.filters["code"] = _code
+    environment.filters["shown"] = lambda picture: Markup(picture.html())
     environment.globals |= {"looks": _LOOK, "symbols": words.SYMBOL, "words": _VERDICT, "code_style": _CODE_STYLE}
     environment.globals |= {"ink": _INK, "faint": _FAINT, "line": _LINE}
     return environment

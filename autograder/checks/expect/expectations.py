@@ -7,9 +7,10 @@ from collections.abc import Callable
 from typing import Any, NoReturn
 
 from autograder import diagnosis
-from autograder.checks import outcomes
+from autograder.checks import outcomes, seen
 from autograder.checks.running import Running
 from autograder.diagnosis import Diagnosis, Scene
+from autograder.diagnosis.inside import Inside
 from autograder.graph.observer import Observer
 
 WITHIN = 10.0
@@ -37,6 +38,11 @@ class Expectations:
 
     def _scene(self) -> Scene:
         return self._running.scene()
+
+    def _insides(self) -> list[Inside]:
+        """The programs as their probes show them at this moment."""
+        scene = self._scene()
+        return [scene.inside(program) for program in scene.programs]
 
     def _without(self, node: str) -> Callable[[], bool]:
         """Return the question whether a node that is waited for cannot come any more."""
@@ -92,7 +98,10 @@ class Expectations:
         code = reason.code if reason else ""
         hint = reason.hint + " " * bool(reason.hint) + where_to_read(hint) if reason and reason.hint else hint
         if gone is None:
-            outcomes.failed(title, expected=expected, observed=observed, because=because, hint=hint, code=code)
+            picture = seen.explaining(code, f"{title} {because}", self._observer, self._insides())
+            outcomes.failed(
+                title, expected=expected, observed=observed, because=because, hint=hint, code=code, picture=picture
+            )
         outcomes.failed_as_a_whole(
             f"`{gone.name}` runs until it is stopped",
             expected="running",

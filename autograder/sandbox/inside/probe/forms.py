@@ -74,8 +74,23 @@ class LifecyclePublishOff(Where):
     state: str
 
 
+class Ran(TypedDict):
+    """Runs of callbacks, and messages sent: number of the thing, begin, end, thread."""
+
+    e: Literal["ran"]
+    runs: list[tuple[int, float, float, int]]
+
+
 Event = (
-    Attached | ProbeFailed | MemoryFailed | CallbackError | ThreadError | BadReturn | BadMessage | LifecyclePublishOff
+    Attached
+    | ProbeFailed
+    | MemoryFailed
+    | CallbackError
+    | ThreadError
+    | BadReturn
+    | BadMessage
+    | LifecyclePublishOff
+    | Ran
 )
 
 

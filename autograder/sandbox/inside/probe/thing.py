@@ -60,7 +60,10 @@ class Thing:
     def end(self, run: int, raised: bool) -> None:
         """Note that a run of it is over."""
         with ledger.lock:
-            self.spent += time.monotonic() - self.running.pop(run)[0]
+            now = time.monotonic()
+            began, thread = self.running.pop(run)
+            ledger.ran(self.number, began, now, thread)
+            self.spent += now - began
             self.done += 1
             self.raised += raised
         ledger.touch(self)
@@ -71,6 +74,7 @@ class Thing:
             self.runs += 1
             self.last = time.monotonic()
             self.threads.add(_thread.get_ident())
+            ledger.ran(self.number, self.last, self.last, _thread.get_ident())
         ledger.touch(self)
 
     def note(self, **changes: Any) -> None:

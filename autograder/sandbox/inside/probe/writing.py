@@ -17,6 +17,12 @@ from . import forms
 _MOST = 500
 """Events of one program; what it repeats is noted once. Records of things: no more either."""
 
+_MOST_RUNS = 2000
+"""Runs of callbacks, and messages sent, that are written down one by one: for pictures. The others are only counted."""
+
+_RUNS_OF_A_LINE = 60
+"""So many are shorter than `_WHOLE`."""
+
 PAUSE = 0.25
 """Seconds between two writings of the records that have changed."""
 
@@ -92,6 +98,8 @@ class Ledger:
         """Records that change with every callback, and are written whenever anything is."""
         self._records: list[Record] = []
         self._changed: dict[str, Record] = {}
+        self._ran: list[tuple[int, float, float, int]] = []
+        self._runs_left = _MOST_RUNS
         self._wake = _thread.allocate_lock()
         self._wake.acquire()
         self._started = False
@@ -122,6 +130,12 @@ class Ledger:
             with contextlib.suppress(RuntimeError):  # another thread was faster
                 self._wake.release()
 
+    def ran(self, number: int, began: float, ended: float, thread: int) -> None:
+        """Note one run of a thing's callback, or one message sent; the caller holds the lock."""
+        if self._runs_left > 0:
+            self._runs_left -= 1
+            self._ran.append((number, round(began, 4), round(ended, 4), thread))
+
     def _write_on(self) -> None:
         while True:
             self._wake.acquire()
@@ -132,6 +146,7 @@ class Ledger:
         """Write what has changed, in pieces that the pipe takes whole."""
         with self.lock:
             changed, self._changed = self._changed, {}
+            ran, self._ran = self._ran, []
         changed.update({record.key: record for record in self.always})
         piece = b""
         for record in changed.values():
@@ -145,6 +160,10 @@ class Ledger:
         if piece:
             with quiet():
                 os.write(_channel.descriptor, piece)
+        for first in range(0, len(ran), _RUNS_OF_A_LINE):
+            event: forms.Ran = {"e": "ran", "runs": ran[first : first + _RUNS_OF_A_LINE]}
+            with quiet():
+                os.write(_channel.descriptor, _line_of(event))
 
 
 ledger = Ledger()

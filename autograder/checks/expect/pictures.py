@@ -1,0 +1,83 @@
+"""Pictures of a launch: who ran when, who talks to whom, which state, which match, which arrival. No outcomes."""
+
+from __future__ import annotations
+
+from autograder import pictures
+from autograder.checks import seen
+from autograder.checks.expect.lifecycle import LifecycleExpectations
+from autograder.pictures import Picture, Runs
+
+
+class Pictures(LifecycleExpectations):
+    """What happened in this launch, drawn. Each picture can also be asked for after the block."""
+
+    _graph: seen.Graph | None = None
+    """The graph as it was when the launch ended."""
+
+    def runs(self) -> Runs:
+        """What the programs' callbacks did so far, run by run: when, how long, on which thread, in which group.
+
+        Seen from inside the programs, the first 2000 runs of each; a moment old.
+
+        Example:
+            `print(ros.runs().longest_pause("heartbeat"))`
+        """
+        return seen.runs(self._insides())
+
+    def timeline(self, *, seconds: float | None = None, by: str = "callback") -> Picture:
+        """A picture of when each callback ran, on which thread, in which callback group.
+
+        Args:
+            seconds: how much of it; by default all, and not more than 4 s.
+            by: `callback`, a row for each callback, or `thread`, a row for each thread.
+
+        Example:
+            `ros.timeline(seconds=2)`
+        """
+        return pictures.timeline(self.runs(), seconds=seconds, by=by)
+
+    def graph(self) -> Picture:
+        """A picture of the nodes and topics, with the quality of service of each end: now, or as it was at the end.
+
+        Example:
+            `ros.graph()`
+        """
+        found = self._graph or seen.graph(self._observer)
+        return pictures.graph(found.nodes, found.endpoints, seen.mismatch)
+
+    def qos(self, topic: str) -> Picture:
+        """A picture of which publishers and subscriptions of a topic match, and over which policy they do not.
+
+        Args:
+            topic: full name.
+
+        Example:
+            `ros.qos("/frames")`
+        """
+        found = self._graph or seen.graph(self._observer)
+        return pictures.qos(topic, [end for end in found.endpoints if end.topic == topic], seen.mismatch)
+
+    def lifecycle(self, node: str) -> Picture:
+        """A picture of the state machine, with the way that a node took through it.
+
+        Args:
+            node: full name; the launch must have watched it, as `launch(..., lifecycle=[node])` does from the start.
+
+        Example:
+            `ros.lifecycle("/camera")`
+        """
+        client = self._lifecycle_clients.get(node)
+        changes = [change.step for change in client.changes] if client else []
+        return pictures.lifecycle(node, pictures.steps(changes))
+
+    def arrivals(self, topic: str, *, seconds: float | None = None) -> Picture:
+        """A picture of when each message of a topic was published, and when each subscription's callback got one.
+
+        Args:
+            topic: full name.
+            seconds: how much of it; by default all.
+
+        Example:
+            `ros.arrivals("/frames")`
+        """
+        return pictures.arrivals(topic, seen.traffic(self._insides(), topic), seconds=seconds)

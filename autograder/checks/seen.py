@@ -1,0 +1,157 @@
+"""What a launch shows of itself, as the pictures want it, and which picture explains which reason."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+from autograder import pictures
+from autograder.diagnosis.events import Ran, Thing
+from autograder.diagnosis.inside import Inside
+from autograder.graph.names import full_name
+from autograder.graph.observer import Observer
+from autograder.graph.qos import describe, mismatch_between
+from autograder.pictures import Endpoint, Picture, Run, Runs, Traffic
+
+_OF_EVERY_NODE = ("/rosout", "/parameter_events")
+_MOST = 60
+"""Nodes, and ends of topics, of one picture."""
+
+BY_TIMELINE = frozenset(
+    {
+        *("single-threaded-executor", "few-threads", "machine-threads"),
+        *("no-callback-groups", "one-group", "exclusive-group", "timer-same-group"),
+        *("starved", "paused", "overlap", "no-overlap", "period", "too-few-runs"),
+    }
+)
+"""Codes of reasons that a timeline shows."""
+BY_QOS = frozenset({"qos-reliability", "qos-durability", "qos-deadline", "qos-liveliness", "qos-lease"})
+"""Codes of reasons that a table of pairs shows."""
+
+
+@dataclass(frozen=True)
+class Graph:
+    """Nodes and ends of topics at one moment."""
+
+    nodes: Sequence[str]
+    endpoints: Sequence[Endpoint]
+
+
+def graph(observer: Observer) -> Graph:
+    """Look at the graph; what every node has by itself is left out."""
+    ends = []
+    for topic in sorted(observer.topics()):
+        if topic in _OF_EVERY_NODE or topic.endswith("/transition_event"):
+            continue
+        for publishes, found in ((True, observer.publishers(topic)), (False, observer.subscriptions(topic))):
+            for end in found:
+                node = full_name(end.node_namespace, end.node_name)
+                ends.append(Endpoint(node, topic, publishes, describe(end.qos_profile)))
+    return Graph(observer.nodes()[:_MOST], ends[:_MOST])
+
+
+def mismatch(offer: Endpoint, request: Endpoint) -> str | None:
+    """Over which policy a publisher and a subscription do not match; None if they do."""
+    return mismatch_between(offer.policies, request.policies)
+
+
+def runs(insides: Iterable[Inside]) -> Runs:
+    """What the callbacks of these programs did."""
+    return Runs(run for inside in insides for run in _runs_of(inside))
+
+
+def _runs_of(inside: Inside) -> list[Run]:
+    names, groups = _names(inside), _groups(inside)
+    told = sorted((run for event in inside.all(Ran) for run in event.runs), key=lambda run: run[1])
+    last = inside.now if inside.program.running() else max((end for _, _, end, _ in told), default=0.0)
+    under_way = [
+        (thing.id, began, max(last, began), thread)
+        for thing in inside.things.values()
+        for began, thread in thing.running
+    ]
+    numbers: dict[int, int] = {}
+    found = []
+    for number, began, ended, thread in [*told, *under_way]:
+        thing = inside.things.get(number)
+        if thing is None or thing.kind in ("publisher", "client"):
+            continue
+        on = numbers.setdefault(thread, len(numbers) + 1)
+        over = (number, began, ended, thread) not in under_way
+        found.append(Run(names[number], began, ended, on, groups.get(thing.group_id, ""), thing.node, over))
+    return found
+
+
+def _names(inside: Inside) -> dict[int, str]:
+    """A name for each callback: its function's, or what it belongs to; those of one name are numbered."""
+    plain = {thing.id: _name(thing) for thing in inside.things.values()}
+    again = [name for name in plain.values() if list(plain.values()).count(name) > 1]
+    counts: dict[str, int] = {}
+    names = {}
+    for number, name in plain.items():
+        counts[name] = counts.get(name, 0) + 1
+        names[number] = f"{name} ({counts[name]})" if name in again else name
+    return names
+
+
+def _name(thing: Thing) -> str:
+    function = re.match(r"(?:async )?def (\w+)", thing.code)
+    if function:
+        return function[1]
+    return f"timer {thing.period:g} s" if thing.kind == "timer" else f"{thing.kind} {thing.name}".strip()
+
+
+def _groups(inside: Inside) -> dict[int, str]:
+    """A name for each callback group."""
+    found: dict[int, Thing] = {}
+    for thing in inside.things.values():
+        if thing.group_id and thing.kind != "client":
+            found.setdefault(thing.group_id, thing)
+    own: dict[str, list[int]] = {}
+    for number, thing in found.items():
+        if not thing.default_group:
+            own.setdefault("exclusive group" if thing.exclusive else "reentrant group", []).append(number)
+    names = {number: "default group (exclusive)" for number, thing in found.items() if thing.default_group}
+    for kind, numbers in own.items():
+        names |= {g: f"{kind} {n}" if len(numbers) > 1 else kind for n, g in enumerate(numbers, 1)}
+    return names
+
+
+def traffic(insides: Sequence[Inside], topic: str) -> list[Traffic]:
+    """When messages of a topic were published, and when subscriptions' callbacks got them, publishers first."""
+    rows = {"publisher": [], "subscription": []}  # type: dict[str, list[Traffic]]
+    for inside in insides:
+        began = {number: [] for number in inside.things}  # type: dict[int, list[float]]
+        for event in inside.all(Ran):
+            for number, begin, _, _ in event.runs:
+                if number in began:
+                    began[number].append(begin)
+        for thing in inside.things.values():
+            if thing.kind in rows and thing.name == topic:
+                verb = "publishes" if thing.kind == "publisher" else "takes"
+                node = inside.nodes.get(thing.node)
+                since = node.made if node and node.made else None
+                rows[thing.kind].append(Traffic(f"{thing.node} {verb}", sorted(began[thing.id]), since))
+    return rows["publisher"] + rows["subscription"]
+
+
+def explaining(code: str, text: str, observer: Observer, insides: Sequence[Inside]) -> Picture | None:
+    """The picture that shows why an expectation failed; None where none does.
+
+    Args:
+        code: of the reason.
+        text: the expectation and the reason in words; a topic's name in it is the one that is meant.
+        observer: of the launch.
+        insides: of its programs.
+    """
+    if code in BY_TIMELINE:
+        found = runs(insides)
+        return pictures.timeline(found) if found else None
+    if code in BY_QOS:
+        on_graph = graph(observer).endpoints
+        for name in re.findall(r"`(/[^`\s]*)`", text):
+            ends = [end for end in on_graph if end.topic == name]
+            pairs = [(one, other) for one in ends if one.publishes for other in ends if not other.publishes]
+            if any(mismatch(*pair) for pair in pairs):  # the other end may be the check's own, which is not shown
+                return pictures.qos(name, ends, mismatch)
+    return None

@@ -1,0 +1,156 @@
+"""The graph: which node talks to which over which topic, with the quality of service of each end."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from autograder.core.picture import Picture
+from autograder.pictures.svg import SMALL, TEXT, WIDTH, Canvas, shortened, width_of
+
+
+@dataclass(frozen=True)
+class Endpoint:
+    """A publisher or a subscription of a node."""
+
+    node: str
+    topic: str
+    publishes: bool
+    policies: Mapping[str, str | float | None] = field(default_factory=dict)
+    """What the graph shows of its quality of service: words, and seconds; None: no such limit."""
+
+    def words(self) -> str:
+        """Its policies in a few words; volatile, and limits that are none, are left out."""
+        return ", ".join(filter(None, [str(self.policies.get("reliability") or "").replace("_", " "), *self.unusual()]))
+
+    def unusual(self) -> list[str]:
+        """What its policies are besides their reliability, in a few words each."""
+        said = []
+        if self.policies.get("durability") == "transient_local":
+            said.append("transient local")
+        for name in ("deadline", "lifespan", "lease"):
+            value = self.policies.get(name)
+            if isinstance(value, float):
+                said.append(f"{name} {value:g} s")
+        if self.policies.get("liveliness") == "manual_by_topic":
+            said.append("manual liveliness")
+        return said
+
+
+_ROW = 84.0
+Mismatch = Callable[[Endpoint, Endpoint], str | None]
+
+
+def graph(
+    nodes: Iterable[str], endpoints: Iterable[Endpoint], mismatch: Mismatch = lambda offer, request: None
+) -> Picture:
+    """Draw nodes (ovals), topics (boxes), and an arrow for each publisher and each subscription.
+
+    An arrow without words is reliable and volatile, without limits; a broken line is best effort.
+
+    Args:
+        nodes: full names of all nodes, those without a topic too.
+        endpoints: publishers and subscriptions.
+        mismatch: says over which policy a publisher and a subscription of one topic do not match; None if they do.
+            A subscription that matches no publisher of its topic is crossed out.
+    """
+    everyone = list(endpoints)
+    ends = list(dict.fromkeys((end.node, end.topic, end.publishes) for end in everyone))
+    names = list(dict.fromkeys([*sorted(nodes), *(node for node, _, _ in ends)]))
+    layers = _layers(names, ends)
+    columns: dict[int, list[tuple[str, str]]] = {}
+    for thing, layer in layers.items():
+        columns.setdefault(layer, []).append(thing)
+    rows = max((len(column) for column in columns.values()), default=1)
+    height = max(rows * _ROW, _ROW) + 30
+    canvas = Canvas(height, WIDTH)
+    places = _places(columns, height)
+    for (kind, name), (x, y, width) in places.items():
+        draw = canvas.oval if kind == "node" else canvas.box
+        draw(x - width / 2, y - 21, width, 42)
+        canvas.words(x, y + 6, shortened(name, width - 14, TEXT - 2), size=TEXT - 2, anchor="middle")
+    for one in ends:
+        own = [end for end in everyone if (end.node, end.topic, end.publishes) == one]
+        _arrow(canvas, places, own, everyone, mismatch)
+    if not names:
+        canvas.words(30, height / 2, "no node is on the graph", italic=True)
+    return canvas.picture(_alt(names, everyone, mismatch))
+
+
+def _layers(nodes: Sequence[str], ends: Sequence[tuple[str, str, bool]]) -> dict[tuple[str, str], int]:
+    """A column for each thing: what is published lies right of its publisher, who hears it right of that."""
+    layers = {("node", node): 0 for node in nodes} | {("topic", topic): 1 for _, topic, _ in ends}
+    for _ in range(len(nodes)):  # a circle of nodes would go on without an end
+        before = dict(layers)
+        for node, topic, publishes in ends:
+            source, target = (("node", node), ("topic", topic)) if publishes else (("topic", topic), ("node", node))
+            layers[target] = max(layers[target], min(layers[source] + 1, 8))
+        if layers == before:
+            break
+    used = sorted(set(layers.values()))
+    return {thing: used.index(layer) for thing, layer in layers.items()}
+
+
+def _places(
+    columns: Mapping[int, Sequence[tuple[str, str]]], height: float
+) -> dict[tuple[str, str], tuple[float, float, float]]:
+    """Centre and width of each thing."""
+    places = {}
+    count = max(columns, default=0) + 1
+    room = WIDTH / count
+    for layer, things in columns.items():
+        for number, thing in enumerate(things):
+            width = min(max(width_of(thing[1], TEXT - 2) + 34, 90), room * (0.78 if count < 4 else 0.62))
+            y = height * (number + 0.5) / len(things)
+            left, right = width / 2 + 6, WIDTH - width / 2 - 6
+            x = left if layer == 0 else right if layer == count - 1 else room * (layer + 0.5)
+            places[thing] = (x if count > 1 else WIDTH / 2, y, width)
+    return places
+
+
+def _arrow(
+    canvas: Canvas,
+    places: Mapping[tuple[str, str], tuple[float, float, float]],
+    own: Sequence[Endpoint],
+    everyone: Sequence[Endpoint],
+    mismatch: Mismatch,
+) -> None:
+    end = own[0]
+    node, topic = places["node", end.node], places["topic", end.topic]
+    (x1, y1, w1), (x2, y2, w2) = (node, topic) if end.publishes else (topic, node)
+    forth = x2 > x1
+    begin = (x1 + (w1 / 2 if forth else -w1 / 2), y1)
+    goal = (x2 + (-w2 / 2 if forth else w2 / 2), y2)
+    if x1 == x2:
+        begin, goal = (x1, y1 + 21), (x2, y2 - 21)
+    broken = _refused(end, everyone, mismatch)
+    canvas.line([begin, goal], arrow=True, dashed=end.policies.get("reliability") == "best_effort")
+    x, y = (begin[0] + goal[0]) / 2, (begin[1] + goal[1]) / 2
+    pieces = [*(["best effort"] if end.policies.get("reliability") == "best_effort" else []), *end.unusual()]
+    pieces += [f"{len(own)} times"] if len(own) > 1 else []
+    for number, piece in enumerate(pieces):
+        canvas.words(x, y - 10 - SMALL * (len(pieces) - 1 - number), piece, size=SMALL - 2, anchor="middle", halo=True)
+    if broken:
+        canvas.words(x, y + 11, "✗", size=26, anchor="middle", bold=True, halo=True)
+        canvas.words(x, y + 28, broken, size=SMALL - 2, anchor="middle", halo=True)
+
+
+def _refused(end: Endpoint, everyone: Sequence[Endpoint], mismatch: Mismatch) -> str:
+    """The policy over which a subscription matches no publisher of its topic; empty if it matches one."""
+    if end.publishes:
+        return ""
+    offers = [other for other in everyone if other.publishes and other.topic == end.topic]
+    reasons = [mismatch(offer, end) for offer in offers]
+    return (reasons[0] or "") if reasons and all(reasons) else ""
+
+
+def _alt(nodes: Sequence[str], endpoints: Sequence[Endpoint], mismatch: Mismatch) -> str:
+    if not nodes:
+        return "Graph: there is no node."
+    told = [f"Graph of {len(nodes)} node{'s' * (len(nodes) != 1)}: {', '.join(nodes)}."]
+    for end in endpoints:
+        refused = _refused(end, endpoints, mismatch)
+        verb = "publishes on" if end.publishes else "subscribes to"
+        quality = f" ({end.words()})" if end.words() else ""
+        told.append(f"{end.node} {verb} {end.topic}{quality}{f', no match: {refused}' if refused else ''}.")
+    return " ".join(told)

@@ -1,0 +1,172 @@
+"""A small canvas that writes SVG: boxes, lines, arrows, words, and hatching for those who print in black and white."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from html import escape
+
+from autograder.core.picture import Picture
+
+TEXT = 18
+"""Size of words, in units of a canvas that is WIDTH wide: still 2.5 % of the height of a slide that it fills."""
+SMALL = 15
+WIDTH = 900.0
+LETTER = 0.58
+"""Width of a letter beside its height, about: an `<img>` cannot ask for the font that it gets."""
+
+FILLS = ("#9bd3f5", "#f7c873", "#8fd6bf", "#e6bfd5", "#f4ee9c", "#d9d9d9", "#f2b091")
+"""Okabe and Ito's colours, lightened so that black words can stand on them."""
+
+_HATCHES = (
+    "",
+    "M0 10L10 0",
+    "M0 0L10 10",
+    "M0 10L10 0M0 0L10 10",
+    "M5 0V10",
+    "M0 5H10",
+    "M5 0V10M0 5H10",
+)
+
+
+def width_of(text: str, size: float = TEXT) -> float:
+    """Return about how wide a text is."""
+    return len(text) * size * LETTER
+
+
+def _printable(text: str) -> str:
+    """A text as XML and JSON can hold it: names may come from a program that forges them."""
+    return "".join(letter for letter in text if letter.isprintable())
+
+
+def shortened(text: str, room: float, size: float = TEXT) -> str:
+    """Return a text that fits into `room`; what is too long loses its middle."""
+    most = max(3, int(room / (size * LETTER)))
+    if len(text) <= most:
+        return text
+    head = (most - 1) // 2
+    return f"{text[:head]}…{text[len(text) - (most - 1 - head) :]}"
+
+
+class Canvas:
+    """What is drawn comes in order, the later above the earlier."""
+
+    def __init__(self, height: float, width: float = WIDTH) -> None:
+        """Begin with an empty sheet."""
+        self.width, self.height = width, height
+        self._parts: list[str] = []
+
+    def box(
+        self,
+        x: float,
+        y: float,
+        width: float,
+        height: float,
+        *,
+        look: int | None = None,
+        fill: str = "#ffffff",
+        line: float = 1.2,
+        round: float = 0,
+        dashed: bool = False,
+    ) -> None:
+        """Draw a rectangle; `look` chooses a colour together with a hatching."""
+        if look is not None:
+            fill = FILLS[look % len(FILLS)]
+        shape = f'x="{x:.1f}" y="{y:.1f}" width="{max(width, 0.1):.1f}" height="{height:.1f}" rx="{round:g}"'
+        dashes = ' stroke-dasharray="6 4"' if dashed else ""
+        self._parts.append(f'<rect {shape} fill="{fill}" stroke="#000" stroke-width="{line:g}"{dashes}/>')
+        if look is not None and _HATCHES[look % len(_HATCHES)]:
+            self._parts.append(f'<rect {shape} fill="url(#h{look % len(_HATCHES)})" stroke="none"/>')
+
+    def band(self, x: float, y: float, width: float, height: float, fill: str = "#f1f1f1") -> None:
+        """Draw a rectangle without a border."""
+        self._parts.append(f'<rect x="{x:.1f}" y="{y:.1f}" width="{width:.1f}" height="{height:.1f}" fill="{fill}"/>')
+
+    def oval(self, x: float, y: float, width: float, height: float, line: float = 1.6) -> None:
+        """Draw an ellipse in a rectangle."""
+        shape = f'cx="{x + width / 2:.1f}" cy="{y + height / 2:.1f}" rx="{width / 2:.1f}" ry="{height / 2:.1f}"'
+        self._parts.append(f'<ellipse {shape} fill="#fff" stroke="#000" stroke-width="{line:g}"/>')
+
+    def words(
+        self,
+        x: float,
+        y: float,
+        text: str,
+        *,
+        size: float = TEXT,
+        anchor: str = "start",
+        bold: bool = False,
+        italic: bool = False,
+        fill: str = "#000000",
+        halo: bool = False,
+    ) -> None:
+        """Write a text whose baseline begins, ends or is centred at a point; `halo` keeps lines away from it."""
+        style = (' font-weight="bold"' if bold else "") + (' font-style="italic"' if italic else "")
+        style += ' paint-order="stroke" stroke="#fff" stroke-width="5" stroke-linejoin="round"' if halo else ""
+        self._parts.append(
+            f'<text x="{x:.1f}" y="{y:.1f}" font-size="{size:g}" text-anchor="{anchor}" fill="{fill}"{style}>'
+            f"{escape(_printable(text), quote=False)}</text>"
+        )
+
+    def badge(self, x: float, y: float, text: str, size: float = SMALL) -> None:
+        """Write a short text in a white disc around a point."""
+        radius = max(0.72 * size, width_of(text, size) / 2 + 3)
+        self._parts.append(f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{radius:.1f}" fill="#fff" stroke="#000"/>')
+        self.words(x, y + 0.36 * size, text, size=size, anchor="middle")
+
+    def line(
+        self,
+        points: Sequence[tuple[float, float]],
+        *,
+        line: float = 1.6,
+        dashed: bool = False,
+        arrow: bool = False,
+        grey: bool = False,
+    ) -> None:
+        """Draw a line through points, with an arrow at its end if wanted."""
+        path = "M" + "L".join(f"{x:.1f} {y:.1f}" for x, y in points)
+        self.path(path, line=line, dashed=dashed, arrow=arrow, grey=grey)
+
+    def path(
+        self, path: str, *, line: float = 1.6, dashed: bool = False, arrow: bool = False, grey: bool = False
+    ) -> None:
+        """Draw along an SVG path."""
+        more = (' stroke-dasharray="7 5"' if dashed else "") + (' marker-end="url(#arrow)"' if arrow else "")
+        colour = "#bbbbbb" if grey else "#000000"
+        self._parts.append(f'<path d="{path}" fill="none" stroke="{colour}" stroke-width="{line:g}"{more}/>')
+
+    def picture(self, alt: str) -> Picture:
+        """Return what has been drawn, with its words."""
+        body = "".join(self._parts)
+        hatches = "".join(
+            f'<pattern id="h{number}" width="10" height="10" patternUnits="userSpaceOnUse">'
+            f'<path d="{path}" stroke="#000" stroke-width="1.1" stroke-opacity="0.6"/></pattern>'
+            for number, path in enumerate(_HATCHES)
+            if f"#h{number})" in body
+        )
+        arrow = (
+            '<marker id="arrow" viewBox="0 0 10 10" refX="9" refY="5" markerWidth="9" markerHeight="9" '
+            'orient="auto-start-reverse" markerUnits="userSpaceOnUse"><path d="M0 0L10 5L0 10z"/></marker>'
+            if "#arrow" in body
+            else ""
+        )
+        svg = (
+            f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {self.width:g} {self.height:g}" '
+            f'width="{self.width:g}" height="{self.height:g}" '
+            'font-family="system-ui, Segoe UI, Roboto, Noto Sans, Liberation Sans, DejaVu Sans, sans-serif">'
+            f"<defs>{hatches}{arrow}</defs>"
+            f'<rect width="{self.width:g}" height="{self.height:g}" fill="#fff"/>{body}</svg>'
+        )
+        return Picture(svg=svg, alt=_printable(alt))
+
+
+def seconds_axis(canvas: Canvas, left: float, top: float, bottom: float, seconds: float) -> float:
+    """Draw the grid of a time axis from 0 to `seconds`, with its numbers; return the units for one second."""
+    right = canvas.width - 24
+    per_second = (right - left) / seconds
+    step = next(step for step in (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 30.0, 60.0, 600.0) if seconds / step <= 10.5)
+    for number in range(int(seconds / step + 1e-6) + 1):
+        x = left + number * step * per_second
+        canvas.line([(x, top), (x, bottom)], line=1, grey=True)
+        canvas.words(x, bottom + TEXT + 2, f"{number * step:g}", size=SMALL, anchor="middle")
+    canvas.words(right, bottom + 2 * TEXT + 2, "seconds", size=SMALL, anchor="end")
+    return per_second

@@ -1,0 +1,221 @@
+"""Timelines: which callback ran when, on which thread, in which group."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from autograder.core.picture import Picture
+from autograder.pictures.runs import Run, Runs
+from autograder.pictures.svg import SMALL, TEXT, WIDTH, Canvas, seconds_axis, shortened, width_of
+
+_LANE = 30.0
+"""Height of one row of bars."""
+_HEAD = 26.0
+"""Height of a heading above rows."""
+_MOST_LABEL = 270.0
+_MOST_LANES = 16
+"""Rows of bars for one callback: more runs at once than that are drawn above each other."""
+_MOST_RUNS = 600
+"""Bars of one picture."""
+
+
+@dataclass(frozen=True)
+class _Row:
+    """What one label stands for."""
+
+    label: str
+    below: str
+    lanes: Sequence[Sequence[Run]]
+
+
+def timeline(
+    runs: Runs | Mapping[str, Runs], *, seconds: float | None = None, by: str = "callback", start: float | None = None
+) -> Picture:
+    """Draw when callbacks ran.
+
+    Args:
+        runs: of one launch, or of several, each with a title; they get panels below each other on one axis.
+        seconds: how much to draw; by default all of it, and not more than 4 s.
+        by: `callback`, a row for each callback under its group, or `thread`, a row for each thread.
+        start: where to begin, in the time of the runs; by default each panel begins with its first run.
+
+    Raises:
+        ValueError: `by` is neither of the two.
+    """
+    if by not in ("callback", "thread"):
+        raise ValueError(f"timeline: by={by!r} is neither 'callback' nor 'thread'.")
+    panels = {"": runs} if isinstance(runs, Runs) else dict(runs)
+    begins = {title: start if start is not None else min((r.begin for r in own), default=0.0)
+              for title, own in panels.items()}  # fmt: skip
+    lasted = max((run.end - begins[title] for title, own in panels.items() for run in own), default=0.0)
+    length = seconds or min(4.0, max(lasted, 0.1))
+    shown = {
+        title: [_moved(run, begins[title]) for run in own.between(begins[title], begins[title] + length)][:_MOST_RUNS]
+        for title, own in panels.items()
+    }
+    looks = {
+        name: number for number, name in enumerate(dict.fromkeys(r.callback for own in shown.values() for r in own))
+    }
+    groups = {title: _sections(own, by) for title, own in shown.items()}
+    labels = [row for sections in groups.values() for _, rows in sections for row in rows]
+    left = 20 + min(
+        _MOST_LABEL, max((max(width_of(r.label), width_of(r.below, SMALL)) for r in labels), default=60) + 10
+    )
+    height = 12 + 2 * TEXT + 14 + sum(_height(title, sections) for title, sections in groups.items())
+    canvas = Canvas(height + (_LANE if by == "thread" else 0), WIDTH)
+    y = 8.0
+    for title, sections in groups.items():
+        if title:
+            canvas.words(8, y + TEXT, title, bold=True)
+            y += _HEAD
+        top = y
+        bottom = top + sum(_section_height(heading, rows) for heading, rows in sections)
+        last = title == list(groups)[-1]
+        per_second = (
+            seconds_axis(canvas, left, top, bottom, length) if last else _grid(canvas, left, top, bottom, length)
+        )
+        for heading, rows in sections:
+            y = _draw_section(canvas, y, heading, rows, left, per_second, length, looks, by)
+        if not sections:
+            canvas.words(left + 8, y + TEXT, "no callback ran", italic=True)
+            y += _LANE
+        y += 8
+    if by == "thread":
+        _legend(canvas, height, looks)
+    return canvas.picture(_alt(shown, length))
+
+
+def _moved(run: Run, zero: float) -> Run:
+    return Run(run.callback, run.begin - zero, run.end - zero, run.thread, run.group, run.node, run.ended)
+
+
+def _sections(runs: Sequence[Run], by: str) -> list[tuple[str, list[_Row]]]:
+    """The rows, by the heading above them."""
+    if by == "thread":
+        threads = sorted({(run.node.partition(" ")[0], run.thread) for run in runs}, key=lambda key: key[1])
+        rows = [
+            _Row(f"thread {n}", "", [[r for r in runs if r.thread == n]]) for n in dict.fromkeys(t for _, t in threads)
+        ]
+        return [("", rows)] if rows else []
+    nodes = {run.node for run in runs}
+    sections: dict[str, list[_Row]] = {}
+    for group in dict.fromkeys((run.node, run.group) for run in runs):
+        heading = ": ".join(filter(None, (group[0] if len(nodes) > 1 else "", group[1])))
+        members = [run for run in runs if (run.node, run.group) == group]
+        for name in dict.fromkeys(run.callback for run in members):
+            own = [run for run in members if run.callback == name]
+            threads_used = sorted({run.thread for run in own})
+            word = "thread" if len(threads_used) == 1 else "threads"
+            sections.setdefault(heading, []).append(_Row(name, f"{word} {_listed(threads_used)}", _lanes(own)))
+    return list(sections.items())
+
+
+def _listed(numbers: Sequence[int]) -> str:
+    if len(numbers) > 3 and numbers[-1] - numbers[0] == len(numbers) - 1:
+        return f"{numbers[0]} to {numbers[-1]}"
+    return ", ".join(map(str, numbers))
+
+
+def _lanes(runs: Sequence[Run]) -> list[list[Run]]:
+    """Runs that overlap lie below each other."""
+    lanes: list[list[Run]] = []
+    for run in runs:
+        free = next((lane for lane in lanes if lane[-1].end <= run.begin), None)
+        if free is not None:
+            free.append(run)
+        elif len(lanes) < _MOST_LANES:
+            lanes.append([run])
+        else:
+            lanes[-1].append(run)
+    return lanes
+
+
+def _row_height(row: _Row) -> float:
+    return max(len(row.lanes) * _LANE, 44.0 if row.below else 36.0) + 4
+
+
+def _section_height(heading: str, rows: Sequence[_Row]) -> float:
+    return (_HEAD if heading else 0) + sum(_row_height(row) for row in rows)
+
+
+def _height(title: str, sections: Sequence[tuple[str, Sequence[_Row]]]) -> float:
+    own = sum(_section_height(heading, rows) for heading, rows in sections) or _LANE
+    return own + (_HEAD if title else 0) + 8
+
+
+def _grid(canvas: Canvas, left: float, top: float, bottom: float, seconds: float) -> float:
+    """The grid without numbers, for panels above the last."""
+    per_second = (canvas.width - 24 - left) / seconds
+    canvas.line([(left, top), (left, bottom), (canvas.width - 24, bottom)], line=1, grey=True)
+    return per_second
+
+
+def _draw_section(
+    canvas: Canvas,
+    y: float,
+    heading: str,
+    rows: Sequence[_Row],
+    left: float,
+    per_second: float,
+    length: float,
+    looks: Mapping[str, int],
+    by: str,
+) -> float:
+    """Draw a heading and its rows from `y` down; return where the next one begins."""
+    if heading:
+        canvas.band(8, y + 2, canvas.width - 16, _HEAD - 4)
+        canvas.words(14, y + TEXT, heading, size=SMALL, italic=True)
+        y += _HEAD
+    for row in rows:
+        height = _row_height(row)
+        middle = y + height / 2
+        canvas.words(
+            left - 10, middle + (0 if row.below else 0.35 * TEXT), shortened(row.label, left - 24), anchor="end"
+        )
+        if row.below:
+            canvas.words(left - 10, middle + SMALL + 2, row.below, size=SMALL, anchor="end", fill="#444444")
+        top = middle - len(row.lanes) * _LANE / 2
+        for lane in row.lanes:
+            for run in lane:
+                _draw_run(canvas, run, left, top, per_second, length, looks[run.callback], by)
+            top += _LANE
+        y += height
+    return y
+
+
+def _draw_run(
+    canvas: Canvas, run: Run, left: float, top: float, per_second: float, length: float, look: int, by: str
+) -> None:
+    begin, end = max(run.begin, 0.0), min(run.end, length)
+    x, width = left + begin * per_second, max((end - begin) * per_second, 4.0)
+    canvas.box(x, top + 3, width, _LANE - 6, look=look, dashed=not run.ended)
+    if by == "callback" and width > 34:
+        canvas.badge(x + width / 2, top + _LANE / 2, str(run.thread), SMALL - 2)
+
+
+def _legend(canvas: Canvas, y: float, looks: Mapping[str, int]) -> None:
+    x = 14.0
+    for name, look in looks.items():
+        canvas.box(x, y - 4, 26, 20, look=look)
+        canvas.words(x + 32, y + 12, name, size=SMALL)
+        x += 50 + width_of(name, SMALL)
+
+
+def _alt(shown: Mapping[str, Sequence[Run]], length: float) -> str:
+    told = []
+    for title, runs in shown.items():
+        own = Runs(runs)
+        rows = []
+        for name in own.callbacks():
+            threads = sorted(own.threads(name))
+            rows.append(
+                f"{name} ran {own.count(name)} times, each for at most {own.longest(name):.2f} seconds, on "
+                f"{'thread' if len(threads) == 1 else 'threads'} {_listed(threads)}"
+            )
+        most = own.overlap()
+        told.append(
+            f"{title + ': ' if title else ''}{'; '.join(rows) or 'no callback ran'}"
+            + (f"; at most {most} at once." if rows else ".")
+        )
+    return f"Timeline of {length:.1f} seconds. " + " ".join(told)

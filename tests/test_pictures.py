@@ -1,0 +1,220 @@
+"""Pictures: what they show and say, that nothing in them can act, and where they stand: notebook, report, feedback."""
+
+from __future__ import annotations
+
+import base64
+import re
+import xml.etree.ElementTree as ET
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from autograder.checks import findings, launch, runtime
+from autograder.core.results import CellResult, Isolation, Outcome, Status
+from autograder.gradebook.inert import SanitizeOutputs
+from autograder.pictures import (
+    Endpoint,
+    Picture,
+    Run,
+    Runs,
+    Traffic,
+    arrivals,
+    graph,
+    lifecycle,
+    qos,
+    steps,
+    timeline,
+)  # fmt: skip
+from autograder.report.html import check_html
+
+NASTY = "<script>alert(1)</script>\x00\ud800\"'&"
+BEATS = [Run("beat", 0.1 * n, 0.1 * n + 0.005, 1, "exclusive group") for n in range(5)]
+SLOW = [Run("slow", 0.05, 0.35, 2, "default group (exclusive)"), Run("slow", 0.3, 0.5, 3, "default group (exclusive)")]
+RELIABLE = {"reliability": "reliable", "durability": "volatile", "deadline": 0.05}
+BEST_EFFORT = {"reliability": "best_effort", "durability": "volatile", "deadline": None}
+ENDS = [
+    Endpoint("/camera", "/frames", True, BEST_EFFORT),
+    Endpoint("/planner", "/frames", False, RELIABLE),
+    Endpoint("/viewer", "/frames", False, BEST_EFFORT),
+]
+CHANGES = [
+    ("unconfigured", "configuring"), ("configuring", "inactive"),
+    ("inactive", "activating"), ("activating", "errorprocessing"), ("errorprocessing", "unconfigured"),
+    ("unconfigured", "configuring"), ("configuring", "unconfigured"),
+]  # fmt: skip
+
+
+def mismatch(offer: Endpoint, request: Endpoint) -> str | None:
+    stricter = request.policies["reliability"] == "reliable" != offer.policies["reliability"]
+    return "reliability" if stricter else None
+
+
+def words(picture: Picture) -> str:
+    """The texts of a drawing, which must be well-formed and hold nothing but shapes and words."""
+    tree = ET.fromstring(picture.svg)
+    tags = {element.tag.partition("}")[2] for element in tree.iter()}
+    assert tags <= {"svg", "defs", "pattern", "marker", "path", "rect", "ellipse", "circle", "text"}
+    assert "href" not in picture.svg
+    return " | ".join(element.text or "" for element in tree.iter() if element.tag.endswith("text"))
+
+
+def test_runs_tell_what_was_under_way_when() -> None:
+    runs = Runs(BEATS + SLOW)
+    assert runs.callbacks() == ["beat", "slow"]
+    assert (runs.count("beat"), runs.count()) == (5, 7)
+    assert (runs.overlap("beat"), runs.overlap("slow"), runs.overlap()) == (1, 2, 3)
+    assert runs.longest_pause("beat") == pytest.approx(0.1) and runs.longest_pause("nobody") == float("inf")
+    assert runs.longest("slow") == pytest.approx(0.3) and runs.threads("slow") == {2, 3}
+    assert Runs([]).overlap() == 0 and repr(Runs([])) == "runs of callbacks: none"
+    # What begins when another ends does not overlap it.
+    assert Runs([Run("a", 0, 1), Run("a", 1, 2)]).overlap() == 1
+
+
+def test_a_timeline_has_rows_by_group_and_names_the_threads() -> None:
+    picture = timeline({"two threads": Runs(BEATS + SLOW), "none": Runs([])})
+    shown = words(picture)
+    for text in ("two threads", "exclusive group", "default group (exclusive)", "beat", "threads 2, 3", "no callback"):
+        assert text in shown
+    assert "slow ran 2 times, each for at most 0.30 seconds, on threads 2, 3; at most 3 at once" in picture.alt
+    assert "url(#h1)" in picture.svg  # a hatching beside the colour
+
+
+def test_a_timeline_by_thread_has_a_row_for_each_thread() -> None:
+    assert "thread 1 | thread 2 | thread 3" in words(timeline(Runs(BEATS + SLOW), by="thread"))
+    with pytest.raises(ValueError, match="by='group'"):
+        timeline(Runs(BEATS), by="group")
+
+
+def test_a_graph_and_a_table_of_pairs_cross_out_what_does_not_match() -> None:
+    drawn = graph(["/camera", "/lonely"], ENDS, mismatch)
+    assert {"✗", "/lonely", "/frames", "best effort", "deadline 0.05 s"} <= set(words(drawn).split(" | "))
+    assert "/planner subscribes to /frames (reliable, deadline 0.05 s), no match: reliability." in drawn.alt
+    pairs = qos("/frames", ENDS, mismatch)
+    assert words(pairs).count("✗") == words(pairs).count("✓") == 1
+    assert "there is no subscription" in words(qos("/frames", ENDS[:1], mismatch))
+    assert "no node is on the graph" in words(graph([], []))
+
+
+def test_nodes_in_a_circle_can_be_drawn() -> None:
+    ends = [Endpoint(node, topic, publishes, RELIABLE) for node, topic, publishes in
+            (("/a", "/x", True), ("/b", "/x", False), ("/b", "/y", True), ("/a", "/y", False))]  # fmt: skip
+    assert {"/a", "/b", "/x", "/y"} <= set(words(graph(["/a", "/b"], ends)).split(" | "))
+
+
+def test_a_way_through_the_states_is_numbered() -> None:
+    way = steps(CHANGES)
+    assert [(step.label, step.goal, step.failed) for step in way] == [
+        ("configure", "inactive", False), ("activate", "unconfigured", True), ("configure", "unconfigured", True),
+    ]  # fmt: skip
+    picture = lifecycle("/camera", way)
+    assert "2 activate: error, back in unconfigured" in " ".join(words(picture).split())
+    assert "3 configure: failure, still unconfigured" in " ".join(picture.alt.split())
+    assert "No change of /camera was heard" in lifecycle("/camera", []).alt
+
+
+def test_arrivals_count_each_row() -> None:
+    picture = arrivals(
+        "/frames", [Traffic("/camera publishes", [0.0, 0.1, 0.2], 0.0), Traffic("/viewer takes", [0.21])]
+    )
+    assert "3 messages" in words(picture) and "1 message" in words(picture)
+    assert "usually every 0.10 s" in picture.alt
+
+
+def test_a_forged_name_does_nothing() -> None:
+    ends = [Endpoint(NASTY, NASTY, True, BEST_EFFORT)]
+    drawn = [
+        timeline(Runs([Run(NASTY, 0, 1, group=NASTY, node=NASTY)])),
+        graph([NASTY], ends),
+        qos(NASTY, ends, mismatch),
+        arrivals(NASTY, [Traffic(NASTY, [1.0])]),
+        lifecycle(NASTY, []),
+    ]
+    inert = re.compile(r'<img alt="[^"<>]*" src="data:image/svg\+xml;base64,[\w+/=]*" style="[^"<>]*">')
+    for picture in drawn:
+        words(picture)
+        assert inert.fullmatch(picture.html())
+        picture.model_dump_json()
+
+
+TWO_TIMERS = """
+import time
+import rclpy
+from rclpy.node import Node
+from std_msgs.msg import String
+
+class Robot(Node):
+    def __init__(self):
+        super().__init__("robot")
+        self.activity = self.create_publisher(String, "activity", 10)
+        self.create_timer(0.1, self.beat)
+        self.create_timer(0.2, self.camera)
+
+    def beat(self):
+        self.tell("beat", 0.0)
+
+    def camera(self):
+        self.tell("camera", 0.15)
+
+    def tell(self, name, seconds):
+        self.activity.publish(String(data=f"{name} begin"))
+        time.sleep(seconds)
+        self.activity.publish(String(data=f"{name} end"))
+
+rclpy.init()
+rclpy.spin(Robot())
+"""
+
+
+@pytest.fixture
+def programs(tmp_path: Path) -> Iterator[Path]:
+    """A folder with a program; what a check finds is forgotten at the end."""
+    (tmp_path / "robot.py").write_text(TWO_TIMERS)
+    runtime.current.configure(tmp_path, Isolation.NONE, seed=1)
+    findings.current.reset()
+    yield tmp_path
+    findings.current.reset()
+    runtime.current.close()
+    runtime.current.__init__()  # type: ignore[misc]
+
+
+def test_a_launch_draws_what_its_programs_did(programs: Path) -> None:
+    with launch("robot") as ros:
+        assert ros.wait(lambda: ros.runs().count("camera") >= 2 and ros.runs().count("beat") >= 2)
+        on_graph = ros.graph()
+    runs = ros.runs()
+    assert runs.overlap() == 1 and runs.threads() == {1} and runs.longest("camera") > 0.1
+    assert {run.group for run in runs} == {"default group (exclusive)"} and {run.node for run in runs} == {"/robot"}
+    assert "/robot publishes on /activity (reliable)." in on_graph.alt
+    assert "camera ran" in ros.timeline().alt and "/robot publishes" in ros.arrivals("/activity").alt
+
+
+def test_a_failed_check_shows_the_picture_that_explains_it(programs: Path) -> None:
+    with launch("robot") as ros:
+        ros.expect_overlap("/activity", ["beat", "camera"], within=1)
+    shown = ros.score(1).result
+    failure = shown.first_failure
+    assert failure and failure.code == "single-threaded-executor" and failure.picture
+    assert "at most 1 at once" in failure.picture.alt
+    assert failure.picture.html() in check_html(shown)
+
+
+def test_feedback_keeps_a_picture_and_nothing_that_looks_like_one() -> None:
+    picture = timeline(Runs(BEATS))
+    failed = Outcome(status=Status.FAILED, title="t", picture=picture)
+    clean = SanitizeOutputs(tags=["div", "b", "span", "details", "summary", "code"], attributes=["style"])
+    page = clean.sanitize_html_tags(check_html(CellResult(max_points=1, points=0, outcomes=[failed])))
+    assert picture.html() in page and page.count("<img") == 1
+    data = base64.b64encode(b"<svg/>").decode()
+    for forged in (
+        f'<img alt="" src="data:image/svg+xml;base64,{data}" onerror="alert(1)" style="background:#ffffff">',
+        f'<img alt="" src="data:text/html;base64,{data}" style="background:#ffffff; max-width:100%; height:auto">',
+        '<img src="x" onerror="alert(1)">',
+    ):
+        assert "<img" not in clean.sanitize_html_tags(forged)
+
+
+def test_a_hidden_check_shows_a_student_no_picture() -> None:
+    failed = Outcome(status=Status.FAILED, title="t", picture=timeline(Runs(BEATS)), hidden=True)
+    result = CellResult(max_points=1, points=0, outcomes=[failed])
+    assert "<img" not in check_html(result, "student") and "<img" in check_html(result, "instructor")
