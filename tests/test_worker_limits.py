@@ -10,6 +10,7 @@ from autograder.core.results import Isolation, NodeLog
 from autograder.grading import supervisor, worker
 from autograder.grading.job import Cell, Job
 from autograder.grading.runner import run_in_worker
+from autograder.grading.validation import lacks_a_result
 
 PASS = "from autograder.checks import outcomes\nfrom autograder.checks.scoring import score\n"
 
@@ -99,6 +100,10 @@ def test_a_check_at_which_the_worker_dies_is_tried_once_more(tmp_path: Path, dea
     result = run_in_worker(job(good, dies + good, good))
     assert [check.points for check in result.checks] == [1.0, points, 1.0]
     assert seen.read_text() == "xx"
+    if points is None:  # a person has to look, and nothing new is found out by doing it all again
+        assert result.checks[1].outcomes[0].code == supervisor.DIED
+        assert result.checks[1].flags
+    assert not lacks_a_result(result)
 
 
 def test_workers_that_share_the_checks_find_what_one_finds() -> None:

@@ -120,6 +120,7 @@ GROUPS: dict[str, dict[str, str]] = {
         "grader": "the check itself broke; no points are taken, and an instructor decides",
         "forged-graph": "what is on the ROS graph cannot be read, which no program made with rclpy brings about",
         "stuck": "the grader did not come on at this check; an instructor decides",
-        "no-result": "the grader died at this check or said nothing about it; an instructor decides",
+        "died": "the grader died at this check, twice; an instructor decides",
+        "no-result": "the grader said nothing about this check; an instructor decides",
     },
 }

@@ -20,6 +20,8 @@ LOST = 2
 """Checks that a submission may lose to a worker; then the rest of them is given up, too."""
 STUCK = "stuck"
 """The reason code of a check at which the worker got stuck."""
+DIED = "died"
+"""The reason code of a check at which the worker died, and died again when it was tried once more."""
 _LINES = 6
 """Lines that are kept of the stack of a worker that got stuck."""
 _STACKS = b"\nTimeout ("
@@ -77,8 +79,7 @@ def _run_share(job: Job, share: Sequence[Cell], stop: threading.Event | None) ->
         if run.timed_out or _STACKS in b"\n" + run.stdout:
             lost.append(_stuck(left.pop(0), run, limit))
         elif died_at == left[0].grade_id:
-            because = f"The grader ended with status {run.status} and no result."
-            lost.append(undecided(left.pop(0), because, run.stderr))
+            lost.append(_died(left.pop(0), run))
         else:
             died_at = left[0].grade_id
     because = "It was not run: at other checks of this submission the grader got stuck or died."
@@ -104,6 +105,17 @@ def _said(output: bytes) -> list[CheckResult]:
 def unknown(job: Job, because: str, said: str = "") -> SubmissionResult:
     """Return a result in which no check is decided, for an instructor to look at."""
     return job.result([undecided(cell, because, said) for cell in job.checks])
+
+
+def _died(cell: Cell, run: OuterRun) -> CheckResult:
+    because = f"The grader ended twice at this check, at last with status {run.status}, without a result."
+    check = undecided(cell, because, run.stderr, DIED)
+    check.flags.append(
+        "The grader itself died while the programs of a check ran, and again when the check was tried once more. Packets "
+        "that a program makes up itself, past ROS, can bring that about, and so can a machine without free memory. Read "
+        "the programs, and run them once more with --force, before you decide about the points."
+    )
+    return check
 
 
 def _stuck(cell: Cell, run: OuterRun, limit: float) -> CheckResult:

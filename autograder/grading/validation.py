@@ -12,7 +12,7 @@ from autograder.core.results import CheckResult, Outcome, Status, SubmissionResu
 from autograder.course.lab import Cell
 
 NO_RESULT = "no-result"
-"""The reason code of a check at which the worker died, or about which it said nothing."""
+"""The reason code of a check about which the grading process said nothing."""
 _LINES, _CHARACTERS = 7, 1000
 """As much of what the worker printed last is kept."""
 
@@ -58,5 +58,9 @@ def all_for_one_reason(cell: Cell, outcome: Outcome, points: float | None) -> Ch
 
 
 def lacks_a_result(result: SubmissionResult) -> bool:
-    """Whether a worker died and kept back a result. What was decided, and a check that gets stuck, stands."""
+    """Whether the grading process failed and kept back a result, which says nothing about the submission.
+
+    What was decided stands, and so does a check at which the worker got stuck or died twice: the same programs would
+    bring it about again, and a person has to look.
+    """
     return any(outcome.code == NO_RESULT for check in result.checks for outcome in check.outcomes)
