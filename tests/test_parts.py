@@ -70,6 +70,66 @@ def test_a_program_that_ends_takes_every_part_of_its_launch_and_none_of_another(
     ]
 
 
+FRAGILE = """
+import rclpy
+from rclpy.node import Node
+from std_msgs.msg import String
+
+class Fragile(Node):
+    def __init__(self):
+        super().__init__("fragile")
+        self.talk = self.create_publisher(String, "talk", 10)
+        self.create_timer(0.05, self.tick)
+        self.create_subscription(String, "hear", self.hear, 10)
+        self.heard = ""
+
+    def tick(self):
+        self.talk.publish(String(data="well"))
+        {in_the_timer}
+
+    def hear(self, msg):
+        self.heard = msg.data
+        {at_once}
+
+rclpy.init()
+rclpy.spin(Fragile())
+"""
+ENDS = "if self.heard == 'bad': raise ValueError('bad')"
+
+
+@pytest.mark.parametrize(
+    ("program", "points"),
+    [
+        (FRAGILE.format(in_the_timer="", at_once=ENDS), {"talks": 1.0, "hears": 0.0, "talks on": 0.0}),
+        (FRAGILE.format(in_the_timer=ENDS, at_once=""), {"talks": 0.0, "hears": 0.0, "talks on": 0.0}),
+        (FRAGILE.format(in_the_timer="", at_once=""), {"talks": 1.0, "hears": 0.5, "talks on": 0.5}),
+    ],
+    ids=["in the callback for the message", "in a timer, at a moment of its own", "not at all"],
+)
+def test_what_was_found_out_before_the_check_sent_what_ended_the_program_stands(
+    grade: Grade,  # noqa: F811
+    program: str,
+    points: dict[str, float],
+) -> None:
+    check = """\
+        with launch("fragile") as ros:
+            with ros.part("talks"):
+                ros.expect_messages("/talk", String, at_least=3)
+                ros.publish("/hear", String(data="good"))
+            with ros.part("hears"):
+                ros.publish("/hear", String(data="bad"))
+                heard = ros.listen("/talk", String).count
+                ros.expect_messages("/talk", String, at_least=heard + 10)
+            with ros.part("talks on"):
+                ros.expect_messages("/talk", String, at_least=heard + 12)
+        ros.score({"talks": 1, "hears": 0.5, "talks on": 0.5})
+        """
+    result = grade(check, fragile__py=program)
+    assert earned(result) == points
+    failed = [outcome for outcome in result.outcomes if outcome.status is Status.FAILED]
+    assert [outcome.code for outcome in failed] == (["callback-exception"] if result.points != 2 else [])
+
+
 def test_what_fails_outside_the_parts_takes_those_of_its_launch(grade: Grade) -> None:  # noqa: F811
     check = """\
         with launch("talker") as ros:

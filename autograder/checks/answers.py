@@ -39,7 +39,7 @@ class Answers:
         self._questions: dict[str, None] = {}
 
     def __enter__(self) -> Answers:
-        findings.current.block_began = len(findings.current.outcomes)
+        findings.current.begin_block()
         return self
 
     def __exit__(self, kind: object, error: BaseException | None, trace: object) -> bool:

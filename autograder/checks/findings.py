@@ -7,9 +7,22 @@ there is one current collection, and it is started afresh for each cell.
 from __future__ import annotations
 
 import time
+from dataclasses import dataclass
 
 from autograder.core.results import NodeLog, Outcome
 from autograder.graph.observer import PATIENCE
+
+
+@dataclass(frozen=True)
+class Asked:
+    """Something that the check sent to the programs."""
+
+    when: float
+    """Seconds on the monotonic clock, just before it was sent."""
+    what: str
+    """The full name of a topic or service, or "parameter"."""
+    parts: frozenset[str]
+    """Titles of the parts that this launch had finished with before."""
 
 
 class Findings:
@@ -28,6 +41,10 @@ class Findings:
         """Parts of launches that failed as a whole, or outside of any part."""
         self.block_began = 0
         """Number of the first outcome of the current launch or table."""
+        self.asked: list[Asked] = []
+        """What the current launch has been sent."""
+        self.finished: set[str] = set()
+        """Titles of the parts that the current launch has finished with."""
         self.used: set[str] = set()
         """Names of the student's files that the check uses."""
         self.flags: list[str] = []
@@ -36,6 +53,11 @@ class Findings:
         self.patience = PATIENCE
         """Seconds that the waits of this check may still take longer on a busy machine."""
         self._began = time.monotonic()
+
+    def begin_block(self) -> None:
+        """A launch or a table begins."""
+        self.block_began = len(self.outcomes)
+        self.asked, self.finished = [], set()
 
     @property
     def seconds(self) -> float:

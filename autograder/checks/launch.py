@@ -90,7 +90,7 @@ class Launch(
         runtime.current.launched = self._entered = True
         if here is not None:
             self._watch = here.watch(self._observer, lambda: [program for _, program in self._running.programs])
-        findings.current.block_began = len(findings.current.outcomes)
+        findings.current.begin_block()
         try:
             self._begin()
             trouble = self._running.trouble

@@ -7,7 +7,7 @@ import contextlib
 import linecache
 import re
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from pathlib import Path
 from types import FrameType
 from typing import NoReturn
@@ -83,26 +83,35 @@ def failed(
     raise LaunchEnded(title)
 
 
-def _void_parts() -> None:
-    """Take the points of every part that the current launch or table has looked at, or would have."""
+def _void_parts(standing: Collection[str] = ()) -> None:
+    """Take the points of every part that the current launch or table has looked at, or would have; others stand."""
     found = findings.current.outcomes[findings.current.block_began :]
-    findings.current.lost_parts |= {outcome.part for outcome in found if outcome.part}
+    findings.current.lost_parts |= {outcome.part for outcome in found if outcome.part} - set(standing)
 
 
 def failed_as_a_whole(
-    title: str, *, expected: str = "", observed: str = "", because: str = "", hint: str = "", code: str = ""
+    title: str,
+    *,
+    expected: str = "",
+    observed: str = "",
+    because: str = "",
+    hint: str = "",
+    code: str = "",
+    standing: Collection[str] = (),
 ) -> NoReturn:
-    """As `failed`, in place of all that the launch has found out: it is worth nothing any more.
+    """As `failed`, in place of all that the launch has found out but for the parts in `standing`: the rest is void.
 
     Raises:
         LaunchEnded: always.
     """
-    _void_parts()
-    del findings.current.outcomes[findings.current.block_began :]
-    findings.current.part = ""
+    _void_parts(standing)
+    current = findings.current
+    found = current.outcomes[current.block_began :]
+    current.outcomes[current.block_began :] = [outcome for outcome in found if outcome.part in standing]
+    current.part = ""
     _record(_failure(title, expected, observed, because, hint, code))
-    _rest_not_checked(whole=True)
-    _void_parts()
+    _rest_not_checked(whole=True, standing=standing)
+    _void_parts(standing)
     raise LaunchEnded(title)
 
 
@@ -208,14 +217,14 @@ def _part_title(block: ast.With) -> str:
     return title.value if isinstance(title, ast.Constant) and isinstance(title.value, str) else ""
 
 
-def _rest_not_checked(whole: bool = False) -> None:
+def _rest_not_checked(whole: bool = False, standing: Collection[str] = ()) -> None:
     """Record what the source still wanted to check in the same block, or all that it wanted in the launch."""
     frame, block = _block_of("" if whole else findings.current.part)
     if frame is None or block is None:
         return
     hidden = hidden_lines(_lines(frame))
     for node, part in _expectations(block, findings.current.part):
-        if whole or node.lineno > frame.f_lineno:
+        if (whole and part not in standing) or (not whole and node.lineno > frame.f_lineno):
             text = " ".join(ast.unparse(node).split(".", 1)[-1].split())
             findings.current.outcomes.append(
                 Outcome(

@@ -7,13 +7,17 @@
             ros.expect_messages("/numbers", Int64, at_least=5)
     ros.score({"the name": 1, "the numbers": 2})
 
-What fails inside a part ends that part only. What fails outside takes every part of its launch, and so does a program
-that ends although it had to go on.
+What fails inside a part ends that part only. What fails outside takes every part of its launch.
+
+So does a program that ends although it had to go on: when it ended is a matter of luck, and so is what was seen before.
+It is not where the callback that failed had been called by the check itself, which sent a message or a request, or set
+a parameter. Then what the parts before that came to stands.
 """
 
 from __future__ import annotations
 
 import contextlib
+import time
 from collections.abc import Iterator
 
 from autograder.checks import findings, outcomes
@@ -37,3 +41,16 @@ def part(title: str) -> Iterator[None]:
         pass
     finally:
         findings.current.part = ""
+    findings.current.finished.add(title)
+
+
+def asked(what: str) -> None:
+    """Note that the check is about to send something: on this topic, to this service, or a "parameter"."""
+    current = findings.current
+    current.asked.append(findings.Asked(time.monotonic(), what, frozenset(current.finished)))
+
+
+def before(what: str, when: float) -> frozenset[str]:
+    """Titles of the parts that were finished before the check sent what led to a callback for `what` at this moment."""
+    sent = [one for one in findings.current.asked if one.when < when and one.what == what]
+    return sent[-1].parts if sent else frozenset()

@@ -7,10 +7,11 @@ A link speaks only if what its docstring demands has been seen; a reason is esta
 speaks, the report says what was observed, and so ruled out, without advice.
 
 What the graph shows is evidence. What the student's process says about itself (its output, its probe's events, its
-threads' stacks) is used here for the *reason* only; points never depend on it.
+threads' stacks) is used here for the *reason* only; points never depend on it, but for one thing: of a program that
+has ended, what was seen before stands where its probe tells that the check's own message or request ended it.
 """
 
-from autograder.diagnosis.callbacks import failed_in_a_callback
+from autograder.diagnosis.callbacks import called_from_outside, failed_in_a_callback
 from autograder.diagnosis.chain import inside_reason
 from autograder.diagnosis.matching import why_not_matched
 from autograder.diagnosis.names import why_doubled, why_no_endpoint, why_no_node, why_no_service, why_topic_present
@@ -27,6 +28,7 @@ __all__ = [
     "Diagnosis",
     "Scene",
     "account",
+    "called_from_outside",
     "failed_in_a_callback",
     "inside_reason",
     "layout",

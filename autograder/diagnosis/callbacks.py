@@ -52,6 +52,18 @@ def failed_in_a_callback(scene: Scene) -> DiagnosedProgram | None:
     return None
 
 
+def called_from_outside(program: DiagnosedProgram) -> tuple[str, float] | None:
+    """What the first callback with an error answered, a topic, a service or a "parameter", and when it failed.
+
+    Must have seen: that such a callback was the first thing that went wrong. A timer's fails at a moment of its own.
+    """
+    errors = [event for event in read(program.events()) if isinstance(event, CallbackError | BadReturn)]
+    first = errors[0] if errors else None
+    if not isinstance(first, CallbackError) or first.kind not in ("subscription", "service", "parameter"):
+        return None
+    return (first.kind if first.kind == "parameter" else first.name), first.when
+
+
 def _of(inside: Inside, event: Event) -> Diagnosis | None:
     if isinstance(event, BadMessage):
         return _bad_message(inside.name, event)

@@ -40,6 +40,9 @@ class CallbackError(_AtLine):
 
     e: Literal["callback_error"]
     kind: str = ""
+    name: str = ""
+    """Full name of the topic or service, if it has one."""
+    when: float = 0.0
     type: str
     text: str = ""
 

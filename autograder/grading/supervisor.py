@@ -111,9 +111,9 @@ def _died(cell: Cell, run: OuterRun) -> CheckResult:
     because = f"The grader ended twice at this check, at last with status {run.status}, without a result."
     check = undecided(cell, because, run.stderr, DIED)
     check.flags.append(
-        "The grader itself died while the programs of a check ran, and again when the check was tried once more. Packets "
-        "that a program makes up itself, past ROS, can bring that about, and so can a machine without free memory. Read "
-        "the programs, and run them once more with --force, before you decide about the points."
+        "The grader itself died while the programs of a check ran, and again when the check was tried once more. "
+        "Packets that a program makes up itself, past ROS, can bring that about, and so can a machine without free "
+        "memory. Read the programs, and run them once more with --force, before you decide about the points."
     )
     return check
 

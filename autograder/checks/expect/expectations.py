@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import Any, NoReturn
 
 from autograder import diagnosis
-from autograder.checks import outcomes, seen
+from autograder.checks import outcomes, parts, seen
 from autograder.checks.running import Running
 from autograder.diagnosis import Diagnosis, Scene
 from autograder.diagnosis.inside import Inside
@@ -82,8 +82,8 @@ class Expectations:
     ) -> NoReturn:
         """Record a failure with the first broken link as its reason, and end the block.
 
-        Where a program has ended that had to go on, or is bound to, the whole launch has failed: how much of it was
-        seen before is a matter of luck, and a verdict must not depend on that.
+        Where a program has ended that had to go on, or is bound to, the whole launch has failed, but for the parts
+        before that with which the check itself brought it about; see `autograder.checks.parts`.
         """
         self._running.settle_programs()
         gone = self._running.gone_program() or diagnosis.failed_in_a_callback(self._scene())
@@ -102,6 +102,7 @@ class Expectations:
             outcomes.failed(
                 title, expected=expected, observed=observed, because=because, hint=hint, code=code, picture=picture
             )
+        led_to = diagnosis.called_from_outside(gone)
         outcomes.failed_as_a_whole(
             f"`{gone.name}` runs until it is stopped",
             expected="running",
@@ -110,6 +111,7 @@ class Expectations:
             because=because,
             hint=hint,
             code=code,
+            standing=parts.before(*led_to) if led_to else (),
         )
 
     def _expect_that(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -15,11 +16,15 @@ from autograder.checks.expect.expectations import WITHIN
 from autograder.checks.expect.sources import SourceExpectations
 from autograder.checks.message_text import in_words, shorten
 from autograder.checks.misuse import Misuse
+from autograder.core.cpu_use import cpu_uses, kept_waiting
 from autograder.diagnosis import Diagnosis
 from autograder.graph.recording import Received, Recording, quiet_profile
 
 _RATE_DECIDED = 4
 """A rate is judged after so many times the messages that were asked for, if it is not right before."""
+
+_HELD_UP = 0.1
+"""The share of a time for which others kept the programs from a CPU, from which on a slow rate may be their fault."""
 
 _UNDER_WAY = 0.15
 """Seconds that a message which has been sent may take to arrive."""
@@ -184,18 +189,23 @@ class MessageExpectations(SourceExpectations):
             )
 
     def _at_rate(self, wanted: _Wanted, rate: float, tolerance: float, within: float) -> None:
-        need = wanted.need
+        need, every = wanted.need, wanted.where is None
         # What a busy machine held up for a moment comes at its rate again; what has another rate never does.
         enough = need if wanted.most is not None else _RATE_DECIDED * need
 
-        def decided() -> bool:
-            received = wanted.counted()
-            return rates.at_rate(received[-need:], rate, tolerance) or len(received) >= enough
+        def right() -> bool:
+            return rates.at_rate(wanted.counted()[-need:], rate, tolerance, every)
 
-        self.wait(decided, within)
+        self.wait(lambda: right() or len(wanted.counted()) >= enough, within)
+        until = time.monotonic() + within
+        while not right() and rates.too_slow(wanted.counted()[-need:], rate, every) and time.monotonic() < until:
+            known, began, before = wanted.recording.count, time.monotonic(), cpu_uses()
+            self.wait(lambda: right() or wanted.recording.count >= known + need, within)  # noqa: B023
+            if kept_waiting(before, cpu_uses()) < _HELD_UP * (time.monotonic() - began):
+                break  # nobody else slowed it down
         last = wanted.counted()[-need:]
-        if not rates.at_rate(last, rate, tolerance):
-            measured = rates.in_words(last)
+        if not right():
+            measured = rates.in_words(last, every)
             self._fail(
                 wanted.title,
                 Diagnosis(

@@ -12,6 +12,7 @@ from autograder import diagnosis
 from autograder.arguments import params_file, remap_rules
 from autograder.checks import runtime
 from autograder.checks.expect.expectations import WITHIN, Expectations
+from autograder.checks.parts import asked
 from autograder.diagnosis import Diagnosis
 from autograder.graph import parameters
 from autograder.graph.services import ServiceMissing
@@ -94,6 +95,7 @@ class ParameterExpectations(Expectations):
             `no-answer`, `no-service`, and those of `expect_node`.
         """
         try:
+            asked("parameter")
             return parameters.set_parameter(self._observer, node, name, value, within, self._without(node))
         except (ServiceMissing, parameters.NoAnswer) as error:
             self._no_parameters(f"`{node}` answers when `{name}` is set to {value!r}", node, error, "")
@@ -175,6 +177,7 @@ class ParameterExpectations(Expectations):
         title = f"`{node}` refuses `{name}` = {value!r} with a reason and lives on"
         before = self.get_parameters(node, [name], within=within)
         try:
+            asked("parameter")
             reply = parameters.set_parameter(self._observer, node, name, value, within, self._without(node))
         except (ServiceMissing, parameters.NoAnswer) as error:
             self._no_parameters(title, node, error, hint)

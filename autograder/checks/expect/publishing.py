@@ -11,6 +11,7 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from autograder import diagnosis
 from autograder.checks.expect.endpoints import EndExpectations
 from autograder.checks.expect.expectations import WITHIN
+from autograder.checks.parts import asked
 from autograder.graph.names import full_name
 from autograder.graph.stream import Stream
 
@@ -88,6 +89,7 @@ class Publishing(EndExpectations):
             if any(end.qos_profile.reliability == ReliabilityPolicy.BEST_EFFORT for end in ends):
                 self._make_known(topic)
         self._observer.wait(self._observer.hears_all, MATCHES_WITHIN)
+        asked(topic)
         for message in messages:
             publisher.publish(message)
 

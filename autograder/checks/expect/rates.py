@@ -8,26 +8,49 @@ from collections.abc import Sequence
 
 from autograder.graph.recording import Received
 
-
-def median_gap(received: Sequence[Received]) -> float:
-    """Seconds between two messages as they were published; 0 if there are fewer than two."""
-    gaps = [later.stamp - earlier.stamp for earlier, later in itertools.pairwise(received)]
-    return statistics.median(gaps) if gaps else 0.0
+_SHORT = 0.5
+"""The share of a period below which a gap is short: a timer that was held up makes one, two timers make many."""
 
 
-def at_rate(received: Sequence[Received], rate: float, tolerance: float) -> bool:
+def _gaps(received: Sequence[Received], every: bool) -> list[float]:
+    """Seconds from one message to the next as they were published.
+
+    Where these are to be `every` message of the topic, what was lost on the way, which the publisher's count tells, is
+    no pause of the publisher's.
+    """
+    pairs = list(itertools.pairwise(received))
+    return [(b.stamp - a.stamp) / (max(1, b.sequence - a.sequence) if every else 1) for a, b in pairs]
+
+
+def at_rate(received: Sequence[Received], rate: float, tolerance: float, every: bool = True) -> bool:
     """Whether messages come at this rate.
 
     Args:
         received: at least two messages.
         rate: hertz.
         tolerance: allowed deviation of the period, as a share.
+        every: whether these are all messages of their topic, but for what was lost on the way.
     """
-    median = median_gap(received)
-    return median > 0 and abs(median - 1 / rate) <= tolerance / rate
+    gaps = _gaps(received, every)
+    near = bool(gaps) and abs(statistics.median(gaps) - 1 / rate) <= tolerance / rate
+    return near and not _in_bursts(gaps, 1 / rate)
 
 
-def in_words(received: Sequence[Received]) -> str:
+def _in_bursts(gaps: Sequence[float], period: float) -> bool:
+    return sum(gap < _SHORT * period for gap in gaps) > len(gaps) // 3
+
+
+def too_slow(received: Sequence[Received], rate: float, every: bool = True) -> bool:
+    """Whether messages come less often than at this rate: what a busy machine makes of the right one, too."""
+    gaps = _gaps(received, every)
+    return not gaps or statistics.median(gaps) > 1 / rate
+
+
+def in_words(received: Sequence[Received], every: bool = True) -> str:
     """The rate at which messages came."""
-    median = median_gap(received)
-    return f"{1 / median:.1f} Hz" if median > 0 else "all at once"
+    gaps = _gaps(received, every)
+    if not gaps or sum(gaps) <= 0 or statistics.median(gaps) <= 0:
+        return "all at once"
+    if _in_bursts(gaps, sum(gaps) / len(gaps)):
+        return f"{len(gaps) / sum(gaps):.1f} Hz on the average, and several close together,"
+    return f"{1 / statistics.median(gaps):.1f} Hz"

@@ -8,6 +8,7 @@ from typing import Any
 from autograder import diagnosis
 from autograder.checks import outcomes
 from autograder.checks.expect.expectations import WITHIN, Expectations
+from autograder.checks.parts import asked
 from autograder.graph.names import type_name
 from autograder.graph.services import Answer, ServiceMissing, call_all
 
@@ -66,6 +67,7 @@ class ServiceExpectations(Expectations):
         """
         title = f"The service `{name}` answers"
         gone = self._running.hopeless_without(lambda: name in self._observer.services())
+        asked("parameter" if "/set_parameters" in name else name)
         try:
             answers = call_all(self._observer, name, srv_type, requests, within, gone)
         except ServiceMissing:

@@ -47,6 +47,8 @@ class _OnThread:
                 event: forms.CallbackError = {
                     "e": "callback_error",
                     "kind": self.thing.about.get("kind", ""),
+                    "name": self.thing.about.get("name", ""),
+                    "when": time.monotonic(),
                     "type": type(error).__name__,
                     "text": str(error),
                     **error_line(error),

@@ -34,6 +34,8 @@ class CallbackError(Where):
 
     e: Literal["callback_error"]
     kind: str
+    name: str
+    when: float
     type: str
     text: str
 

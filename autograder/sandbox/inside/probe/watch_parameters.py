@@ -75,11 +75,13 @@ def watch_parameters(rclpy: Any) -> None:
     wrap(node_class, "declare_parameter", after=declared)
     wrap(node_class, "get_parameter", after=got)
     wrap(node_class, rclpy_names.SET_PARAMETERS, after=was_set)
-    _wrap_callbacks(node_class)
+    _wrap_callbacks(node_class, "on_set")
+    _wrap_callbacks(node_class, "post_set")
 
 
-def _wrap_callbacks(node_class: Any) -> None:
-    add, remove = node_class.add_on_set_parameters_callback, node_class.remove_on_set_parameters_callback
+def _wrap_callbacks(node_class: Any, moment: str) -> None:
+    add_name, remove_name = (f"{what}_{moment}_parameters_callback" for what in ("add", "remove"))
+    add, remove = getattr(node_class, add_name), getattr(node_class, remove_name)
     wrapped: dict[Any, Any] = {}
 
     @functools.wraps(add)
@@ -88,7 +90,8 @@ def _wrap_callbacks(node_class: Any) -> None:
             from rcl_interfaces.msg import SetParametersResult
 
             if not here.building and callable(callback):
-                with_notes = noted("parameter", callback, node_name(self), SetParametersResult)
+                expected = SetParametersResult if moment == "on_set" else None
+                with_notes = noted("parameter", callback, node_name(self), expected)
                 wrapped[(id(self), callback)] = with_notes
                 callback = with_notes
         add(self, callback)
@@ -99,5 +102,5 @@ def _wrap_callbacks(node_class: Any) -> None:
             callback = wrapped.pop((id(self), callback), callback)
         remove(self, callback)
 
-    node_class.add_on_set_parameters_callback = add_noted
-    node_class.remove_on_set_parameters_callback = remove_noted
+    setattr(node_class, add_name, add_noted)
+    setattr(node_class, remove_name, remove_noted)
