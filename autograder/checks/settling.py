@@ -57,21 +57,22 @@ class Settling:
             self._seen, self._since = seen, now
         self._pause = QUIET + max((thing.period for events in told for thing in _things(events)), default=0.0)
         self._complete = bool(told) and all(
-            program.running() and _spins(events) and self._shows(events, nodes)
+            program.running() and _spins(events) and shows_all(self._observer, events)
             for program, events in zip(self._programs, told, strict=True)
         )
 
-    def _shows(self, events: Sequence[Event], nodes: Sequence[str]) -> bool:
-        """Whether all that a program made is on the graph as the observer sees it."""
-        for event in events:
-            if isinstance(event, NodeSeen) and not event.destroyed and event.name not in nodes:
-                return False
-        look = {"publisher": self._observer.publishers, "subscription": self._observer.subscriptions}
-        return all(
-            any(full_name(end.node_namespace, end.node_name) == thing.node for end in look[thing.kind](thing.name))
-            for thing in _things(events)
-            if thing.kind in look and not thing.destroyed
-        )
+
+def shows_all(observer: Observer, events: Sequence[Event]) -> bool:
+    """Whether all that a program has said it made is on the graph as the observer sees it."""
+    nodes = observer.nodes()
+    if any(isinstance(event, NodeSeen) and not event.destroyed and event.name not in nodes for event in events):
+        return False
+    look = {"publisher": observer.publishers, "subscription": observer.subscriptions}
+    return all(
+        any(full_name(end.node_namespace, end.node_name) == thing.node for end in look[thing.kind](thing.name))
+        for thing in _things(events)
+        if thing.kind in look and not thing.destroyed
+    )
 
 
 def _things(events: Sequence[Event]) -> list[Thing]:

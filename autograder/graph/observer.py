@@ -224,6 +224,11 @@ class Observer:
             self._recordings[key] = Recording(self, topic, msg_type, profile)
         return self._recordings[key]
 
+    @property
+    def recorded(self) -> int:
+        """Number of recordings."""
+        return len(self._recordings)
+
     def hears_all(self) -> bool:
         """Whether every recording that accepts any QoS has matched all publishers that are on its topic by now."""
         everything = str(quiet_profile())

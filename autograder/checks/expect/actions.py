@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 from autograder import diagnosis
 from autograder.checks import outcomes
-from autograder.checks.expect.expectations import WITHIN, Expectations
+from autograder.checks.expect.expectations import WITHIN
+from autograder.checks.expect.meeting import Meeting
 from autograder.diagnosis import Diagnosis
 from autograder.graph.services import ServiceMissing
 
@@ -14,7 +15,7 @@ if TYPE_CHECKING:
     from autograder.graph.actions import Goal
 
 
-class ActionExpectations(Expectations):
+class ActionExpectations(Meeting):
     """What decides about goals."""
 
     def send_goal(self, name: str, action_type: type, goal: Any, *, within: float = WITHIN, hint: str = "") -> Goal:
@@ -40,6 +41,7 @@ class ActionExpectations(Expectations):
         from autograder.graph import actions
 
         title = f"The action `{name}` decides about a goal"
+        self._meet(lambda: f"{name}/_action/send_goal" in self._observer.services(), within)
         try:
             sent = actions.send_goal(self._observer, name, action_type, goal, within, self._running.all_ended)
         except ServiceMissing:

@@ -2,24 +2,21 @@
 
 from __future__ import annotations
 
-import contextlib
 from functools import cached_property
-
-from rcl_interfaces.srv import ListParameters
 
 from autograder import diagnosis
 from autograder.checks import outcomes
-from autograder.checks.expect.expectations import WITHIN, Expectations
+from autograder.checks.expect.expectations import WITHIN
+from autograder.checks.expect.meeting import Meeting
 from autograder.checks.running import SETTLE
 from autograder.diagnosis import Diagnosis
 from autograder.graph.names import type_name
-from autograder.graph.services import ServiceMissing, call_all
 
 GONE_WITHIN = 2.0
 """Seconds that an absence may take to show, for example after a node was stopped."""
 
 
-class GraphExpectations(Expectations):
+class GraphExpectations(Meeting):
     """What must be on the graph, and what must not."""
 
     @cached_property
@@ -71,23 +68,6 @@ class GraphExpectations(Expectations):
                 hint=hint,
             )
         outcomes.passed(title, observed=name)
-
-    def _settle(self, name: str) -> None:
-        """Wait for proof that a node which was just made also lives on: an answer from it.
-
-        A program that fails a few lines after it made its node shows the node for a moment. Whether the observer sees
-        that moment is chance, and a verdict must not depend on it. A node that nobody spins cannot answer; for it a
-        while without an end of the program has to do.
-        """
-        with contextlib.suppress(ServiceMissing):
-            call_all(
-                self._observer,
-                f"{name}/list_parameters",
-                ListParameters,
-                [ListParameters.Request()],
-                SETTLE / 2,
-                lambda: self._running.gone_program() is not None,
-            )
 
     def expect_no_node(self, name: str, *, within: float = GONE_WITHIN, hint: str = "") -> None:
         """No node has this full name; use it after a positive expectation, which proves that the graph is known.

@@ -9,7 +9,8 @@ from typing import NoReturn
 
 from autograder import diagnosis
 from autograder.checks import outcomes
-from autograder.checks.expect.expectations import WITHIN, Expectations
+from autograder.checks.expect.expectations import WITHIN
+from autograder.checks.expect.meeting import Meeting
 from autograder.diagnosis import Diagnosis
 from autograder.graph.lifecycle import Change, LifecycleClient, Requested, in_order
 from autograder.graph.parameters import NoAnswer
@@ -39,7 +40,7 @@ def _other_way(seen: Sequence[tuple[str, str]], wanted: Sequence[tuple[str, str]
     return f"`{callback}` returned SUCCESS." if callback else ""
 
 
-class LifecycleExpectations(Expectations):
+class LifecycleExpectations(Meeting):
     """What state a node must be in, and how it got there."""
 
     @cached_property
@@ -178,6 +179,7 @@ class LifecycleExpectations(Expectations):
             `state`, `transition-failed`, `transition-succeeded`, `no-answer`, `not-lifecycle`, and errors in callbacks.
         """
         title = f"`{node}`: {label}" + {"success": " succeeds", "failure": " does not succeed", None: ""}[expect]
+        self._meet(lambda: node in self._observer.nodes(), within)
         try:
             done = self.watch_transitions(node).transition(label, within, self._without(node))
         except (ServiceMissing, NoAnswer) as error:

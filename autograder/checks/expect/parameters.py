@@ -11,7 +11,8 @@ from rcl_interfaces.srv import GetParameters
 from autograder import diagnosis
 from autograder.arguments import params_file, remap_rules
 from autograder.checks import runtime
-from autograder.checks.expect.expectations import WITHIN, Expectations
+from autograder.checks.expect.expectations import WITHIN
+from autograder.checks.expect.meeting import Meeting
 from autograder.checks.parts import asked
 from autograder.diagnosis import Diagnosis
 from autograder.graph import parameters
@@ -26,7 +27,7 @@ _EVERY_NODE = ("use_sim_time", "start_type_description_service")
 _KINDS = {bool: "a bool", int: "an integer", float: "a double", str: "a text", type(None): "without a value"}
 
 
-class ParameterExpectations(Expectations):
+class ParameterExpectations(Meeting):
     """What values the parameters of a node have."""
 
     def _no_parameters(self, title: str, node: str, error: Exception, hint: str) -> NoReturn:
@@ -94,6 +95,7 @@ class ParameterExpectations(Expectations):
         Codes:
             `no-answer`, `no-service`, and those of `expect_node`.
         """
+        self._meet(lambda: node in self._observer.nodes(), within)
         try:
             asked("parameter")
             return parameters.set_parameter(self._observer, node, name, value, within, self._without(node))

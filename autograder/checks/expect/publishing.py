@@ -18,9 +18,6 @@ from autograder.graph.stream import Stream
 RELIABLE_DEEP = 1000
 """Depth of the check's own publishers, so that a burst of its own is never cut."""
 
-MATCHES_WITHIN = 1.0
-"""Seconds to wait for the check's recordings before it sends something that may be answered at once."""
-
 
 class Publishing(EndExpectations):
     """What the check sends."""
@@ -88,7 +85,7 @@ class Publishing(EndExpectations):
             ends = self._observer.subscriptions(topic)
             if any(end.qos_profile.reliability == ReliabilityPolicy.BEST_EFFORT for end in ends):
                 self._make_known(topic)
-        self._observer.wait(self._observer.hears_all, MATCHES_WITHIN)
+        self._meet(publisher.get_subscription_count, within)
         asked(topic)
         for message in messages:
             publisher.publish(message)

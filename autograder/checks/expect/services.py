@@ -7,7 +7,8 @@ from typing import Any
 
 from autograder import diagnosis
 from autograder.checks import outcomes
-from autograder.checks.expect.expectations import WITHIN, Expectations
+from autograder.checks.expect.expectations import WITHIN
+from autograder.checks.expect.meeting import Meeting
 from autograder.checks.parts import asked
 from autograder.graph.names import type_name
 from autograder.graph.services import Answer, ServiceMissing, call_all
@@ -16,7 +17,7 @@ ANSWER_WITHIN = 5.0
 """Seconds that an answer may take: a local round trip takes 1 to 4 ms, a stuck node does not answer."""
 
 
-class ServiceExpectations(Expectations):
+class ServiceExpectations(Meeting):
     """What must answer."""
 
     def expect_service(self, name: str, srv_type: type, *, within: float = WITHIN, hint: str = "") -> None:
@@ -66,6 +67,7 @@ class ServiceExpectations(Expectations):
             those of `expect_service`, `no-answer`, and what blocks a callback.
         """
         title = f"The service `{name}` answers"
+        self._meet(lambda: name in self._observer.services(), within)
         gone = self._running.hopeless_without(lambda: name in self._observer.services())
         asked("parameter" if "/set_parameters" in name else name)
         try:

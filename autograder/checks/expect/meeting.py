@@ -1,0 +1,84 @@
+"""When the observer and the nodes know each other's ends: what is sent then arrives, and what it sets off is heard."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable
+from functools import cached_property
+
+from rcl_interfaces.srv import ListParameters
+
+from autograder.checks.expect.expectations import Expectations
+from autograder.checks.running import SETTLE
+from autograder.checks.settling import shows_all
+from autograder.diagnosis.events import read
+from autograder.graph.services import ServiceMissing, call_all
+
+MATCHES_WITHIN = 1.0
+"""Seconds to wait for the check's recordings before it sends something that may be answered at once."""
+
+_ASKED = 16
+"""So many nodes are asked at the most: a program may make any number of them."""
+
+
+class Meeting(Expectations):
+    """Nodes and the observer get to know each other."""
+
+    _introduced = (0, 0)
+    """How many recordings and programs there were when all that the programs had made was found."""
+
+    @cached_property
+    def _met(self) -> dict[str, int]:
+        """Nodes that have answered, or had their time to, and how many recordings there were when they were asked."""
+        return {}
+
+    def _settle(self, name: str) -> None:
+        """Wait for proof that a node which was just made also lives on: an answer from it.
+
+        A program that fails a few lines after it made its node shows the node for a moment. Whether the observer sees
+        that moment is chance, and a verdict must not depend on it. A node that nobody spins cannot answer; for it a
+        while without an end of the program has to do.
+
+        The answer also says that the node knows all ends that the observer had when it asked: a program learns of
+        them in the order in which they were made, and the question's own end is the last.
+        """
+        self._met[name] = self._observer.recorded
+        with contextlib.suppress(ServiceMissing):
+            call_all(
+                self._observer,
+                f"{name}/list_parameters",
+                ListParameters,
+                [ListParameters.Request()],
+                SETTLE / 2,
+                lambda: self._running.gone_program() is not None,
+            )
+
+    def _meet(self, ready: Callable[[], object], within: float) -> None:
+        """Wait until everything is heard that is set off by what the check sends next.
+
+        Each end is discovered by itself, and by each side by itself: an observer that has found a subscription may
+        not have found the same node's publisher yet, and a publisher that is found may not have found the observer.
+        Then the first message is lost. That the node knows the observer only the node can say, so it is asked; its
+        answer also says that it has come to spinning, and has made what it makes before that.
+
+        Args:
+            ready: whether that is on the graph which is sent to.
+            within: seconds until it must be there; what is missing is left to whoever sends.
+        """
+        recorded, started = self._observer.recorded, len(self._running.programs)
+        if not recorded or not self.wait_for_graph(ready, within):
+            return
+        if self._introduced == (recorded, started):
+            self._observer.wait(self._observer.hears_all, MATCHES_WITHIN)
+            return
+        self._introduced = (recorded, started)
+        for _ in range(2):  # an answer may come from a program that has made more nodes before it
+            self._observer.wait(self._hears_programs, MATCHES_WITHIN)
+            strangers = [name for name in sorted(set(self._observer.nodes())) if self._met.get(name, 0) < recorded]
+            for name in strangers[:_ASKED]:
+                self._settle(name)
+
+    def _hears_programs(self) -> bool:
+        """Whether the observer has found all that the programs have said they made, and hears it."""
+        running = [program for _, program in self._running.programs if program.running()]
+        return self._observer.hears_all() and all(shows_all(self._observer, read(one.events())) for one in running)
