@@ -6,7 +6,7 @@ __version__ = VERSION
 
 
 def load_ipython_extension(shell: object) -> None:
-    """Make `%load_ext autograder` register the `%%node` and `%%file` cell magics."""
+    """Make `%load_ext autograder` register the magics `%%node`, `%%file` and `%ros2`."""
     from autograder.notebook.extension import register
 
     register(shell)

@@ -28,6 +28,7 @@ from autograder.checks.launched_file import LaunchedFile
 from autograder.checks.misuse import Misuse
 from autograder.checks.parts import part
 from autograder.checks.program import Program
+from autograder.checks.robot import Robot
 from autograder.checks.scoring import Score, score
 from autograder.checks.try_out import Log, log_of, try_out
 from autograder.checks.waiting import NotLaunchedError, watched
@@ -37,7 +38,7 @@ from autograder.diagnosis import Diagnosis
 from autograder.graph.observer import ForgedGraph, Observer
 from autograder.launch_files import LaunchFileError, remove_written
 from autograder.sandbox.environment import profile_environment, remove_logs
-from autograder.sandbox.node_sandbox import ProgramGroup
+from autograder.sandbox.node_sandbox import Limits, ProgramGroup
 
 
 @watched
@@ -54,6 +55,7 @@ class Launch(
     Facts,
     Looking,
     Pictures,
+    Robot,
 ):
     """A running launch: `ros` in a check cell."""
 
@@ -72,11 +74,17 @@ class Launch(
         self._listen, self._serve, self._lifecycle = list(listen), list(serve), list(lifecycle)
         self._group: ProgramGroup | None = None
         self._watch: Watcher | None = None
-        self._entered = False
+        self._entered = self._over = False
 
     def __enter__(self) -> Launch:
-        if runtime.current.launched:
+        if runtime.current.block is not None:
             raise Misuse("A launch begins inside another one; let the first block end before.")
+        self._enter(None)
+        runtime.current.block = self
+        return self
+
+    def _enter(self, limits: Limits | None) -> None:
+        """Begin to watch, and start the programs."""
         if self._entered:
             raise Misuse("This launch has run already; call launch(…) again for another one.")
         here = runtime.current.front_end
@@ -87,23 +95,22 @@ class Launch(
         os.environ.update(profile_environment())
         os.environ.pop("ROS_AUTOMATIC_DISCOVERY_RANGE", None)
         self._running.observer = Observer(self._domain_id, findings.current.patience)
-        runtime.current.launched = self._entered = True
+        self._entered = True
         if here is not None:
             self._watch = here.watch(self._observer, lambda: [program for _, program in self._running.programs])
         findings.current.begin_block()
         try:
-            self._begin()
+            self._begin(limits)
             trouble = self._running.trouble
             if here is not None and trouble and not here.scored:  # what only listens would never say so
                 raise NotLaunchedError(trouble[0])
         except BaseException:
             self._end()
             raise
-        return self
 
-    def _begin(self) -> None:
+    def _begin(self, limits: Limits | None) -> None:
         """Listen, and then start the programs."""
-        self._group = runtime.current.sandbox.group()
+        self._group = runtime.current.sandbox.group(limits)
         for topic, msg_type in self._listen:
             self._observer.record(topic, msg_type)
         for offer in self._serve:
@@ -116,10 +123,12 @@ class Launch(
             except LaunchFileError as error:  # which every expectation then tells
                 self._running.trouble.append(Diagnosis(str(error), "launch-file", error.hint))
         for launched in self._running.described:
-            self.start(launched)
+            self._start(launched)
 
-    def start(self, node: Program | str) -> None:
-        """Start one more program.
+    def start(self, node: Program | str | None = None) -> Launch:
+        """Start one more program. Without one, begin a launch that goes on from cell to cell, until `stop()`.
+
+        The latter is for looking around in a notebook; one such launch runs at a time.
 
         Args:
             node: a program's name, or a `Program` with arguments.
@@ -127,6 +136,15 @@ class Launch(
         Example:
             `ros.start(Program("listener", name="late"))`
         """
+        if node is None:
+            self._go_on()
+        elif self._group is None:
+            raise Misuse("This launch does not run yet: name all its programs in launch(…), then .start() begins it.")
+        else:
+            self._start(node)
+        return self
+
+    def _start(self, node: Program | str) -> None:
         launched = Program(node) if isinstance(node, str) else node
         runtime.current.use(f"{launched.program}.py")
         if launched.params_file:
@@ -177,13 +195,19 @@ class Launch(
         return log_of([one for _, one in self._running.programs], program)
 
     def __repr__(self) -> str:
+        if runtime.current.robot is self:
+            return self.status()
+        if self._over:
+            return "This launch has ended; .log() says what its programs printed."
         names = ", ".join(f'"{node.program}"' for node in self._running.described) or "…"
         return f"launch({names}): begin a block with it, `with launch({names}) as ros:`"
 
     def _ipython_display_(self) -> None:
         """As the last line of a cell: run for a moment and show what happens."""
-        if self._entered or runtime.current.front_end is None:
-            print(self)
+        here = runtime.current.front_end
+        if self._entered or here is None:
+            if here is None or here.number != self.told_in:
+                print(self)
             return
         try:
             with self:
@@ -217,6 +241,9 @@ class Launch(
         return score(points)
 
     def _end(self) -> None:
+        if self._over:
+            return
+        self._over = True
         # What still runs is ended here: how is no fact about the program.
         ended = {id(program): program.exit_status() for _, program in self._running.programs}
         if runtime.current.front_end is not None:
@@ -234,7 +261,10 @@ class Launch(
             if self._watch is not None:
                 self._watch.close()
         finally:
-            runtime.current.launched = False
+            if runtime.current.block is self:
+                runtime.current.block = None
+            if runtime.current.robot is self:
+                runtime.current.robot = None
             findings.current.patience = self._observer.patience
             self._observer.close()
             remove_written(runtime.current.folder)

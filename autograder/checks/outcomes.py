@@ -29,7 +29,11 @@ _FORGED = "A program has announced a node or a topic whose name is no text, belo
 
 
 class CheckEnded(Exception):
-    """A failed outcome was recorded; the rest of the `with` block is not checked. Never leaves the block."""
+    """A failed outcome was recorded; the rest of the `with` block, or of a cell without one, is not checked."""
+
+    def _render_traceback_(self) -> list[str]:
+        """What IPython shows where there is no block: the report below the cell says all."""
+        return []
 
 
 class LaunchEnded(CheckEnded):

@@ -10,13 +10,29 @@ import atexit
 import random
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Protocol
 
 from autograder.checks import findings
 from autograder.core import front_end
 from autograder.core.front_end import FrontEnd
 from autograder.core.results import Isolation
 from autograder.graph.domains import free_domains
+from autograder.graph.observer import Observer
 from autograder.sandbox.node_sandbox import NodeSandbox
+
+
+class Running(Protocol):
+    """A launch whose programs run."""
+
+    @property
+    def observer(self) -> Observer:
+        """Who watches its graph."""
+
+    def ended_programs(self) -> list[str]:
+        """What became of programs that have ended by themselves, a sentence each."""
+
+    def stop(self) -> None:
+        """End it."""
 
 
 class Runtime:
@@ -30,8 +46,10 @@ class Runtime:
         self.random = random.Random()
         self._sandbox: NodeSandbox | None = None
         self._domains = free_domains()
-        self.launched = False
-        """Whether a launch runs: one at a time."""
+        self.block: Running | None = None
+        """The launch whose block runs: one at a time."""
+        self.robot: Running | None = None
+        """The launch that goes on from cell to cell: one at a time."""
 
     def configure(
         self, folder: Path, isolation: Isolation, seed: int, answers: Mapping[str, bool] | None = None
@@ -88,8 +106,15 @@ class Runtime:
             self._sandbox = NodeSandbox(self.folder.resolve(), self.isolation)
         return self._sandbox
 
+    @property
+    def running(self) -> Running | None:
+        """The launch that runs now: that of the block, or else the one that goes on from cell to cell."""
+        return self.block or self.robot
+
     def close(self) -> None:
         """End every program and the sandbox."""
+        if self.robot is not None:
+            self.robot.stop()
         if self._sandbox is not None:
             self._sandbox.close()
             self._sandbox = None

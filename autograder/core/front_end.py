@@ -31,6 +31,10 @@ class FrontEnd(Protocol):
         """The folder in which the programs and files of the cells lie."""
 
     @property
+    def number(self) -> int:
+        """The number in the brackets beside the cell that runs."""
+
+    @property
     def scored(self) -> bool:
         """Whether the cell that runs asks for a score."""
 

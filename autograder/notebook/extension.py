@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from autograder.core import front_end
 from autograder.course.cell_file import CELL_BYTES, BadNameError, CellFile, check_free, check_name, parse
+from autograder.notebook import ros2_magic
 from autograder.notebook.kernel import Kernel, now
 from autograder.notebook.program_folder import Written, shown
 
@@ -40,7 +41,7 @@ After a change run the cell again, and then its check.
 
 
 def register(shell: Any) -> None:
-    """Give an IPython shell the `%%node` and `%%file` magics, and start each cell's findings afresh.
+    """Give an IPython shell the `%%node`, `%%file` and `%ros2` magics, and start each cell's findings afresh.
 
     Programs of an earlier kernel do not count: one whose cell has been renamed or deleted since would still pass here,
     and be missing when the notebook is graded. Those of this kernel stay, also when the extension is loaded again.
@@ -49,6 +50,7 @@ def register(shell: Any) -> None:
     kernel = known if isinstance(known, Kernel) and known.shell is shell else Kernel(shell)
     for magic, text in (("node", _NODE_HELP), ("file", _FILE_HELP)):
         shell.register_magic_function(_writer(kernel, magic, text), magic_kind="cell", magic_name=magic)
+    shell.register_magic_function(ros2_magic.magic(kernel), magic_kind="line", magic_name="ros2")
     if kernel is known:
         return
     front_end.active = kernel

@@ -40,6 +40,7 @@ class Kernel:
         notebook = notebook_of(shell.user_ns, dict(os.environ))
         self.folder = ProgramFolder(notebook, notebook.parent if notebook else Path.cwd())
         self.cell, self.cell_id = "", ""
+        self._watch: Watch | None = None
         self._warmed = threading.Thread(target=_warm_up, name="warm-up")
 
     def start(self) -> None:
@@ -57,6 +58,8 @@ class Kernel:
         """Note the cell that begins, and forget what the last one found."""
         self.cell = str(info.raw_cell or "")
         self.cell_id = str(getattr(info, "cell_id", "") or "")
+        if self._watch is not None:
+            self._watch.new_cell()
         findings = _findings()
         if findings is not None:
             findings.reset()
@@ -87,7 +90,8 @@ class Kernel:
         """Begin to show what goes on in a launch; what programs print is shown where no check is made of it."""
         from autograder.notebook.watch import Watch
 
-        return Watch(observer, programs, streams=not self.scored, updates=self.updates_outputs)
+        self._watch = Watch(observer, programs, streams=not self.scored, updates=self.updates_outputs)
+        return self._watch
 
     @property
     def number(self) -> int:

@@ -56,6 +56,12 @@ class Watch:
         if self._line is not None:
             self._line.update({"text/plain": ""}, raw=True)
 
+    def new_cell(self) -> None:
+        """A new cell has begun: it says what is waited for, and shows what is printed from now on."""
+        self._line, self._said = None, ""
+        self._shown = {number: len(program.output()) for number, program in enumerate(self._programs())}
+        self._lines.clear()
+
     def close(self) -> None:
         """The programs have ended: show the rest of what they printed."""
         if self._streams:

@@ -42,11 +42,15 @@ class ProgramExpectations(Expectations):
                 return program
         self._fail(f"The program `{name}` is there", diagnosis.program_trouble(self._scene()))
 
-    def stop(self, name: str, *, kill: bool = False) -> None:
+    def _end(self) -> None:
+        """End the launch."""
+        raise NotImplementedError
+
+    def stop(self, name: str = "", *, kill: bool = False) -> None:
         """End one of several programs: politely (SIGTERM), or without a chance to clean up.
 
         Args:
-            name: of the program.
+            name: of the program; without one, a launch that `start` began ends as a whole.
             kill: end it without a chance to clean up.
 
         Example:
@@ -55,6 +59,9 @@ class ProgramExpectations(Expectations):
         Codes:
             those of `program`.
         """
+        if not name:
+            self._end()
+            return
         program = self.program(name)
         self._running.may_end.append(program)
         self._running.stopped.append(program)

@@ -1,0 +1,98 @@
+"""One command of the real tool's, from its words to its exit status."""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import signal
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from autograder.ros2.failure import Failure, TimeIsUp
+
+if TYPE_CHECKING:
+    from autograder.graph.observer import Observer
+
+PROFILE = Path(__file__).resolve().parent / "fastdds.xml"
+"""How a command in a terminal finds other programs; `FASTRTPS_DEFAULT_PROFILES_FILE` tells the middleware."""
+
+COMMANDS = {
+    "action": "Various action related sub-commands",
+    "interface": "Show information about ROS interfaces",
+    "lifecycle": "Various lifecycle related sub-commands",
+    "node": "Various node related sub-commands",
+    "param": "Various param related sub-commands",
+    "service": "Various service related sub-commands",
+    "topic": "Various topic related sub-commands",
+}
+ELSEWHERE = {
+    "run": 'A program is started by `python nodes/NOTEBOOK/NAME.py --ros-args …`, or in a notebook by launch("NAME").',
+    "launch": 'A launch file is started in a notebook by launch_file("NAME.launch.yaml", package=…), and after '
+    "`autograder package` by an installed Jazzy.",
+    "doctor": "What this machine offers says `autograder doctor`.",
+    "daemon": "There is no daemon: each command joins the graph itself.",
+    "bag": "Recording needs rosbag2, which only an installed Jazzy has.",
+    "pkg": "Packages are made by `autograder package`; their interfaces are shown by `ros2 interface packages`.",
+}
+"""What the real tool has besides, and what there is here."""
+
+
+def run(
+    words: Sequence[str],
+    domain_id: int | None = None,
+    observer: Observer | None = None,
+    seconds: float | None = None,
+) -> int:
+    """Run `ros2 WORDS`, printing what it says, and return its exit status.
+
+    Args:
+        words: the command, its verb and their arguments.
+        domain_id: ROS_DOMAIN_ID, or None for that of the environment.
+        observer: has been on this graph for long: the verb need not wait for the graph to settle.
+        seconds: after which a verb that would go on is ended.
+
+    Raises:
+        TimeIsUp: it was.
+    """
+    if words and words[0] in ELSEWHERE:
+        print(f"`ros2 {words[0]}` is no part of this kit. {ELSEWHERE[words[0]]}", file=sys.stderr)
+        return 1
+    try:
+        options = _parser(words).parse_args(list(words))
+    except SystemExit as end:
+        return int(end.code or 0)
+    from autograder.ros2.session import Session
+
+    session = Session(domain_id, observer, seconds)
+    session.options = options
+    try:
+        options.run(session, options)
+    except Failure as failure:
+        sys.stdout.flush()
+        if str(failure):
+            print(failure, file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        return int(signal.SIGINT)
+    finally:
+        session.close()
+        sys.stdout.flush()
+    return 0
+
+
+def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
+    """The parser of these words: of the other commands it knows the names."""
+    parser = argparse.ArgumentParser(prog="ros2", description="ros2 is an extensible command-line tool for ROS 2.")
+    commands = parser.add_subparsers(title="Commands", metavar="<command>", required=True)
+    wanted = next((word for word in words if not word.startswith("-")), "")
+    for name, text in COMMANDS.items():
+        command = commands.add_parser(name, help=text, description=text)
+        if name == wanted:
+            verbs = command.add_subparsers(title="Verbs", metavar="<verb>", required=True)
+            importlib.import_module(f"autograder.ros2.{name}").add_verbs(verbs)
+    return parser
+
+
+__all__ = ["TimeIsUp", "run"]

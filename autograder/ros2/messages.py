@@ -1,0 +1,155 @@
+"""Messages as YAML and as comma-separated values, and messages filled from YAML."""
+
+from __future__ import annotations
+
+import array
+import sys
+from collections.abc import Mapping
+from typing import Any
+
+import numpy
+import yaml
+from rosidl_parser.definition import (
+    AbstractNestedType,
+    AbstractString,
+    Array,
+    BasicType,
+    BoundedSequence,
+    NamedType,
+    NamespacedType,
+)
+
+_SEQUENCES = (list, tuple, array.array, numpy.ndarray)
+
+
+class Shape:
+    """How much of a message is written.
+
+    Args:
+        longest: elements and characters of one value after which it is cut, or None.
+        arrays: whether arrays are written out, or only what they are.
+        strings: whether strings are.
+    """
+
+    def __init__(self, longest: int | None = None, arrays: bool = True, strings: bool = True) -> None:
+        """Keep them."""
+        self.longest, self.arrays, self.strings = longest, arrays, strings
+
+
+class _Dumper(yaml.SafeDumper):
+    """YAML's own, which repeats what occurs twice and names nothing."""
+
+    def ignore_aliases(self, data: object) -> bool:
+        return True
+
+
+def is_message(value: object) -> bool:
+    """Whether it is a message, and no plain value."""
+    return hasattr(value, "get_fields_and_field_types")
+
+
+def to_yaml(message: Any, shape: Shape | None = None, flow: bool = False) -> str:
+    """A message as a YAML mapping, its fields in the order of their definition."""
+    plain = _plain(message, None, shape or Shape())
+    # Python's float knows inf and nan, and so does YAML.
+    return yaml.dump(plain, Dumper=_Dumper, sort_keys=False, width=sys.maxsize, default_flow_style=flow)
+
+
+def to_csv(value: Any, shape: Shape) -> str:
+    """All plain values of a message, separated by commas."""
+    if is_message(value):
+        return ",".join(to_csv(getattr(value, name), shape) for name in value.get_fields_and_field_types())
+    if isinstance(value, _SEQUENCES):
+        if not shape.arrays:
+            return "..."
+        written = [to_csv(one, shape) for one in value[: shape.longest]]
+        return ",".join(written + ["..."] * (shape.longest is not None and len(value) > shape.longest))
+    if isinstance(value, (bytes, str)) and shape.longest is not None and len(value) > shape.longest:
+        cut = value[: shape.longest]
+        value = cut + b"..." if isinstance(cut, bytes) else cut + "..."
+    return str(value)
+
+
+def _plain(value: Any, kind: Any, shape: Shape) -> Any:
+    """What YAML can write of a value, cut to the shape."""
+    if is_message(value):
+        kinds = dict(zip(value.get_fields_and_field_types(), value.SLOT_TYPES, strict=False))
+        return {name: _plain(getattr(value, name), kind, shape) for name, kind in kinds.items()}
+    if isinstance(value, _SEQUENCES):
+        if not shape.arrays and kind is not None:
+            return _what_it_is(kind, len(value))
+        elements = value.tolist() if isinstance(value, (array.array, numpy.ndarray)) else list(value)
+        cut = [_plain(one, None, shape) for one in elements[: shape.longest]]
+        return cut + ["..."] * (shape.longest is not None and len(elements) > shape.longest)
+    if isinstance(value, bytes):
+        value = value.decode("latin-1")
+    if isinstance(value, str):
+        if not shape.strings:
+            return f"<string length: <{len(value)}>>"
+        if shape.longest is not None and len(value) > shape.longest:
+            return value[: shape.longest] + "..."
+    return value
+
+
+def _what_it_is(kind: AbstractNestedType, length: int) -> str:
+    element = kind.value_type
+    if isinstance(element, BasicType):
+        name = element.typename
+    elif isinstance(element, AbstractString):
+        name = "string"
+    elif isinstance(element, NamespacedType):
+        name = "/".join(element.namespaced_name())
+    else:
+        name = element.name if isinstance(element, NamedType) else str(element)
+    if isinstance(kind, Array):
+        return f"<array type: {name}[{kind.size}]>"
+    if isinstance(kind, BoundedSequence):
+        return f"<bounded sequence type: {name}[{kind.maximum_size}], length: {length}>"
+    return f"<sequence type: {name}, length: {length}>"
+
+
+def fill(message: Any, values: Any, stamps: list[Any] | None = None) -> None:
+    """Set the fields that a YAML mapping names.
+
+    Args:
+        message: to fill.
+        values: by field name; nested as the message is.
+        stamps: takes the time stamps that are to be set anew before each sending: `header: auto`, `stamp: now`.
+
+    Raises:
+        Exception: of the kind that Python gives, where a field is missing or a value does not fit.
+    """
+    if not isinstance(values, Mapping):
+        raise TypeError(f"Value '{values}' is expected to be a dictionary but is a {type(values).__name__}")
+    kinds = dict(zip(message.get_fields_and_field_types(), message.SLOT_TYPES, strict=False))
+    for name, given in values.items():
+        now = getattr(message, name)
+        if stamps is not None and _is_stamp(now, given):
+            stamps.append(now.stamp if given == "auto" else now)
+            continue
+        setattr(message, name, _made(now, given, kinds[name], stamps))
+
+
+def _is_stamp(field: Any, given: Any) -> bool:
+    name = type(field).__name__
+    return is_message(field) and (name, given) in (("Header", "auto"), ("Time", "now"))
+
+
+def _made(now: Any, given: Any, kind: Any, stamps: list[Any] | None) -> Any:
+    """The value of a field, of the type that it has now."""
+    if isinstance(now, array.array):
+        return array.array(now.typecode, given)
+    if isinstance(now, numpy.ndarray):
+        return numpy.array(given, dtype=now.dtype)
+    if is_message(now):
+        fill(now, given, stamps)
+        return now
+    if isinstance(kind, AbstractNestedType) and isinstance(kind.value_type, NamespacedType):
+        element = kind.value_type
+        made = []
+        for one in given:
+            module = __import__(".".join(element.namespaces), fromlist=[element.name])
+            made.append(getattr(module, element.name)())
+            fill(made[-1], one, stamps)
+        return made
+    return given if type(given) is type(now) else type(now)(given)

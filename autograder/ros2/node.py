@@ -1,0 +1,85 @@
+"""`ros2 node`."""
+
+from __future__ import annotations
+
+import sys
+from typing import Any
+
+from rclpy.action import get_action_client_names_and_types_by_node, get_action_server_names_and_types_by_node
+from rclpy.node import Node
+
+from autograder.graph.names import full_name
+from autograder.ros2.failure import Failure
+from autograder.ros2.options import joins
+from autograder.ros2.session import Session, is_hidden
+
+
+def absolute(name: str) -> str:
+    """A node's name as the graph has it: a leading slash may be left out."""
+    return name if name.startswith("/") else f"/{name}"
+
+
+def find_node(session: Session, name: str, hidden: bool, otherwise: str) -> tuple[str, str]:
+    """Namespace and name of a node.
+
+    Raises:
+        Failure: there is none; says `otherwise`.
+    """
+    found = session.look_for(
+        lambda: next((one for one in session.nodes(hidden) if full_name(*one) == absolute(name)), None)
+    )
+    if found is None:
+        raise Failure(otherwise)
+    return found
+
+
+def add_verbs(verbs: Any) -> None:
+    """Add them to the parser."""
+    parser = joins(verbs.add_parser("list", help="Output a list of available nodes"))
+    parser.add_argument("-a", "--all", action="store_true", help="Display all nodes even hidden ones")
+    parser.add_argument("-c", "--count-nodes", action="store_true", help="Only display the number of nodes discovered")
+    parser.set_defaults(run=_list)
+    parser = joins(verbs.add_parser("info", help="Output information about a node"))
+    parser.add_argument("node_name", help="Node name to request information")
+    parser.add_argument("--include-hidden", action="store_true", help="Display hidden topics, services, and actions")
+    parser.set_defaults(run=_info)
+
+
+def _list(session: Session, options: Any) -> None:
+    names = session.node_names(options.all)
+    if options.count_nodes:
+        print(len(names))
+        return
+    if len(set(names)) < len(names):
+        print(
+            "WARNING: Be aware that there are nodes in the graph that share an exact name, "
+            "which can have unintended side effects.",
+            file=sys.stderr,
+        )
+    if names:
+        print(*names, sep="\n")
+
+
+def _info(session: Session, options: Any) -> None:
+    wanted = absolute(options.node_name)
+    space, name = find_node(session, wanted, True, f"Unable to find node '{options.node_name}'")
+    count = session.node_names(True).count(wanted)
+    if count > 1:
+        print(
+            f"There are {count} nodes in the graph with the exact name '{wanted}'. "
+            "You are seeing information about only one of them."
+        )
+    print(wanted)
+    graph = session.graph
+    for heading, ask in (
+        ("Subscribers", Node.get_subscriber_names_and_types_by_node),
+        ("Publishers", Node.get_publisher_names_and_types_by_node),
+        ("Service Servers", Node.get_service_names_and_types_by_node),
+        ("Service Clients", Node.get_client_names_and_types_by_node),
+        ("Action Servers", get_action_server_names_and_types_by_node),
+        ("Action Clients", get_action_client_names_and_types_by_node),
+    ):
+        found = sorted(ask(graph, name, space))
+        print(f"  {heading}:")
+        shown = [(one, types) for one, types in found if options.include_hidden or not is_hidden(one)]
+        print(*[f"    {one}: {', '.join(types)}" for one, types in shown], sep="\n")

@@ -1,0 +1,124 @@
+"""Options that several verbs have, and the QoS that they ask for."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+from rclpy.duration import Duration
+from rclpy.qos import (
+    QoSDurabilityPolicy,
+    QoSHistoryPolicy,
+    QoSLivelinessPolicy,
+    QoSPresetProfiles,
+    QoSProfile,
+    QoSReliabilityPolicy,
+)
+from rclpy.topic_endpoint_info import TopicEndpointInfo
+
+Parser = argparse.ArgumentParser
+
+
+def joins(parser: Parser) -> Parser:
+    """Add what every verb has that looks at the graph."""
+    parser.add_argument("--spin-time", type=float, help="seconds to listen before the graph is believed")
+    parser.add_argument("-s", "--use-sim-time", action="store_true", help="take the time from /clock")
+    parser.add_argument("--no-daemon", action="store_true", help="there is none: nothing changes")
+    return parser
+
+
+def positive(text: str) -> int:
+    """A number that is at least 1.
+
+    Raises:
+        argparse.ArgumentTypeError: it is not.
+    """
+    number = unsigned(text)
+    if number == 0:
+        raise argparse.ArgumentTypeError("value must be a positive integer")
+    return number
+
+
+def unsigned(text: str) -> int:
+    """A number that is not negative.
+
+    Raises:
+        argparse.ArgumentTypeError: it is.
+    """
+    if not text.isdecimal():
+        raise argparse.ArgumentTypeError("value must be non-negative integer")
+    return int(text)
+
+
+def above_zero(text: str) -> float:
+    """A number greater than 0.
+
+    Raises:
+        ValueError: it is not.
+    """
+    if (number := float(text)) <= 0:
+        raise ValueError(text)
+    return number
+
+
+def qos(parser: Parser, default: str) -> None:
+    """Add the options for each policy."""
+    presets = [preset.lower() for preset in QoSPresetProfiles.__members__]
+    parser.add_argument("--qos-profile", choices=presets, help=f"preset (default: {default})")
+    parser.add_argument("--qos-depth", type=int, metavar="N", help="queue size, with keep_last")
+    parser.add_argument("--qos-history", choices=_words(QoSHistoryPolicy))
+    parser.add_argument("--qos-reliability", choices=_words(QoSReliabilityPolicy))
+    parser.add_argument("--qos-durability", choices=_words(QoSDurabilityPolicy))
+    parser.add_argument("--qos-liveliness", choices=_words(QoSLivelinessPolicy))
+    parser.add_argument("--qos-liveliness-lease-duration-seconds", type=float, metavar="S")
+
+
+def _words(policy: Any) -> list[str]:
+    return [word for word in policy.short_keys() if word != "unknown"]
+
+
+def profile(options: Any, default: QoSProfile) -> QoSProfile:
+    """The profile that the options describe, on top of a default one."""
+    start = default
+    if options.qos_profile:
+        start = QoSPresetProfiles.get_from_short_key(options.qos_profile)
+    made = QoSProfile(
+        history=start.history,
+        depth=start.depth,
+        reliability=start.reliability,
+        durability=start.durability,
+        liveliness=start.liveliness,
+        liveliness_lease_duration=start.liveliness_lease_duration,
+        deadline=start.deadline,
+        lifespan=start.lifespan,
+    )
+    if options.qos_durability:
+        made.durability = QoSDurabilityPolicy.get_from_short_key(options.qos_durability)
+        if made.durability == QoSDurabilityPolicy.TRANSIENT_LOCAL and options.qos_depth is None:
+            made.depth = max(made.depth, 1)
+    if options.qos_reliability:
+        made.reliability = QoSReliabilityPolicy.get_from_short_key(options.qos_reliability)
+    if options.qos_history:
+        made.history = QoSHistoryPolicy.get_from_short_key(options.qos_history)
+    if options.qos_depth is not None:
+        made.depth = options.qos_depth
+    if options.qos_liveliness:
+        made.liveliness = QoSLivelinessPolicy.get_from_short_key(options.qos_liveliness)
+    if options.qos_liveliness_lease_duration_seconds is not None:
+        made.liveliness_lease_duration = Duration(seconds=options.qos_liveliness_lease_duration_seconds)
+    return made
+
+
+def to_match(publishers: list[TopicEndpointInfo]) -> QoSProfile:
+    """What hears all of these publishers: reliable, or transient local, where every one of them is.
+
+    The real tool does the same if no option says otherwise.
+    """
+    offered = [end.qos_profile for end in publishers]
+    made = QoSProfile(depth=10)
+    reliable = [one.reliability == QoSReliabilityPolicy.RELIABLE for one in offered]
+    if offered and not all(reliable):
+        made.reliability = QoSReliabilityPolicy.BEST_EFFORT
+    if offered and all(one.durability == QoSDurabilityPolicy.TRANSIENT_LOCAL for one in offered):
+        made.durability = QoSDurabilityPolicy.TRANSIENT_LOCAL
+    return made
