@@ -20,6 +20,9 @@ from .kernel import (
 )
 from .requests import Launch, answer, hand_over
 
+_EXITING = 4
+"""The kernel's flag of a process that is about to be gone (`PF_EXITING`)."""
+
 _PARENT = os.getppid()
 """Who started the launcher; this module is loaded before anything that takes time."""
 
@@ -82,9 +85,21 @@ def _end_everything(scratch: str) -> None:
         for pid in family - {me}:
             with contextlib.suppress(ProcessLookupError, PermissionError):
                 os.kill(pid, signal.SIGKILL)
-    if scratch and os.getppid() != _PARENT:  # whoever lives looks after its own folder
+    if scratch and not _parent_lives():  # whoever lives looks after its own folder
         shutil.rmtree(scratch, ignore_errors=True)
     os._exit(0)
+
+
+def _parent_lives() -> bool:
+    """Whether who started the launcher goes on. Its socket is closed a moment before its children are given away."""
+    if os.getppid() != _PARENT:
+        return False
+    try:
+        with open(f"/proc/{_PARENT}/stat") as stat:
+            fields = stat.read().rpartition(")")[2].split()
+    except OSError:
+        return False
+    return fields[0] not in "ZX" and not int(fields[6]) & _EXITING
 
 
 def _parents() -> dict[int, int]:

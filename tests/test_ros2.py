@@ -1,0 +1,211 @@
+"""The kit's `ros2`: it prints what the real tool was measured to print, and a notebook can look at what it started."""
+
+from __future__ import annotations
+
+import os
+import re
+import shlex
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import redirect_stderr, redirect_stdout
+from io import StringIO
+from pathlib import Path
+
+import pytest
+from test_notebook import SET_UP, TALKER, Notebook
+
+from autograder.graph.domains import free_domains
+from autograder.graph.observer import Observer
+from autograder.ros2.main import PROFILE, TimeIsUp, run
+from autograder.sandbox.environment import profile_environment
+
+ROBOT = Path(__file__).parent / "ros2_robot"
+MEASURED = [
+    tuple(re.fullmatch(r"([^\n]*)\n(.*?)exit (\d)", block.strip(), re.DOTALL).groups())  # type: ignore[union-attr]
+    for block in re.split(r"^\$ ", (ROBOT / "measured.txt").read_text(encoding="utf-8"), flags=re.MULTILINE)[1:]
+]
+NODES = ["/demo", "/vehicle/camera_driver", "/vehicle/right_demo"]
+WITHIN = 30
+"""Far beyond what a start takes on a busy machine, in seconds."""
+
+
+class Robot:
+    """The three nodes, running; and an observer, such as a notebook has."""
+
+    def __init__(self, environment: dict[str, str]) -> None:
+        self.domain = next(free_domains())
+        self.environment = {**os.environ, **environment, "ROS_DOMAIN_ID": str(self.domain)}
+        self.process = subprocess.Popen([sys.executable, ROBOT / "robot.py"], env=self.environment)
+        os.environ.update(profile_environment())
+        self.observer = Observer(self.domain)
+        assert self.observer.wait(lambda: self.observer.nodes() == NODES, WITHIN)
+
+    def close(self) -> None:
+        self.observer.close()
+        self.process.terminate()
+        self.process.wait(WITHIN)
+
+
+@pytest.fixture(scope="module")
+def robot() -> Iterator[Robot]:
+    made = Robot(profile_environment())
+    yield made
+    made.close()
+
+
+def say(robot: Robot, command: str, seconds: float = WITHIN) -> tuple[str, int]:
+    """What a command prints, and its exit status; one that has to be ended ends with that of Ctrl-C."""
+    said = StringIO()
+    with redirect_stdout(said), redirect_stderr(said):
+        try:
+            status = run(shlex.split(command), robot.domain, robot.observer, seconds)
+        except TimeIsUp:
+            status = 2
+    return said.getvalue(), status
+
+
+def alike(text: str) -> str:
+    """The text without what differs from run to run: counters, ids, times."""
+    text = re.sub(r"hello \d+", "hello N", text)
+    text = re.sub(r"GID: ([0-9a-f]{2}\.){15}[0-9a-f]{2}", "GID: …", text)
+    text = re.sub(r"ID: [0-9a-f]{32}", "ID: …", text)
+    return text.replace("waiting for service to become available...\n", "").strip("\n")
+
+
+def lines_alike(text: str) -> list[str]:
+    """The shape of each line: numbers with as many decimals as they have."""
+    return [re.sub(r"\d+(\.\d+)?", lambda one: "N." + "N" * len(one[1] or "."), line) for line in text.splitlines()]
+
+
+@pytest.mark.parametrize(("command", "said", "status"), MEASURED, ids=[one[0] for one in MEASURED])
+def test_it_prints_what_the_real_tool_prints(
+    robot: Robot, command: str, said: str, status: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    if command.endswith("d.yaml"):
+        Path("d.yaml").write_text(say(robot, "param dump /demo")[0])
+    if status == "2":  # goes on until it is ended
+        found, ended = say(robot, command, seconds=3.5)
+        expected = [line for line in lines_alike(said) if line != "…"]
+        assert (lines_alike(found)[: len(expected)], ended) == (expected, 2)
+        return
+    found, ended = say(robot, command)
+    if "…\n" in said:
+        said = said.partition("…\n")[0]
+        assert found.startswith(said)
+    elif "Goal accepted" in said:  # which may come after the first feedback
+        assert sorted(alike(found).split("\n\n")) == sorted(alike(said).split("\n\n"))
+    elif command.startswith("interface package"):  # in which the real tool keeps no order
+        assert sorted(found.splitlines()) == sorted(said.splitlines())
+    else:
+        assert alike(found) == alike(said)
+    assert ended == int(status)
+
+
+def terminal(robot: Robot, *words: str) -> subprocess.Popen[str]:
+    environment = {name: value for name, value in robot.environment.items() if not name.startswith("FASTRTPS")}
+    return subprocess.Popen(
+        [Path(sys.executable).with_name("autograder"), "ros2", *words],
+        env=environment,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+@pytest.mark.parametrize("settings", [profile_environment(), {"FASTRTPS_DEFAULT_PROFILES_FILE": str(PROFILE)}])
+def test_a_terminal_sees_programs_of_a_notebook_and_of_another_terminal(settings: dict[str, str]) -> None:
+    made = Robot(settings)
+    try:
+        listed = terminal(made, "node", "list")
+        assert (*listed.communicate(timeout=WITHIN), listed.returncode) == ("\n".join([*NODES, ""]), "", 0)
+        unknown = terminal(made, "node", "info", "/nope")
+        assert (*unknown.communicate(timeout=WITHIN), unknown.returncode) == ("", "Unable to find node '/nope'\n", 1)
+        wrong = terminal(made, "node", "nonsense")
+        assert wrong.communicate(timeout=WITHIN)[1].startswith("usage: ros2 node") and wrong.returncode == 2
+        heard = terminal(made, "topic", "echo", "/chatter")
+        assert heard.stdout is not None and heard.stdout.readline().startswith("data: hello")
+        heard.send_signal(signal.SIGINT)
+        assert (heard.communicate(timeout=WITHIN)[1], heard.returncode) == ("", 2)
+    finally:
+        made.close()
+
+
+def test_a_goal_that_is_interrupted_is_cancelled(robot: Robot) -> None:
+    sent = terminal(robot, "action", "send_goal", "/fibonacci", "test_msgs/action/Fibonacci", "{order: 90}")
+    assert sent.stdout is not None
+    while "accepted" not in sent.stdout.readline():
+        pass
+    sent.send_signal(signal.SIGINT)
+    said, _ = sent.communicate(timeout=WITHIN)
+    assert "Canceling goal..." in said and sent.returncode in (1, 2)
+
+
+# In a notebook.
+
+
+@pytest.fixture(scope="module")
+def notebook(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Notebook]:
+    made = Notebook(tmp_path_factory.mktemp("notebook"))
+    made.run(SET_UP)
+    made.run(TALKER, "talker")
+    yield made
+    made.close()
+
+
+def test_a_robot_goes_on_from_cell_to_cell(notebook: Notebook) -> None:
+    assert "No program runs" in notebook.run("%ros2 node list").text
+    assert "running: talker (nodes: /talker)" in notebook.run('robot = launch("talker").start()').text
+    assert notebook.run("%ros2 node list").text == "/talker\n"
+    assert notebook.run("%ros2 topic echo /chatter -n 2").text == "data: hello\n---\n" * 2
+    shown = notebook.run("%ros2 topic info /nope\n_exit_code").text
+    assert shown == "Unknown topic '/nope'\n1\n"
+    assert "running: talker" in notebook.run("robot").text
+    assert "✓ passed" in notebook.run('robot.expect_node("/talker")').text
+    shown = notebook.run('robot.expect_node("/nope", within=0)')
+    assert "✗ failed" in shown.text and "Traceback" not in shown.error
+    # A check has programs and a domain of its own, and the robot goes on.
+    inside = notebook.run('with launch("talker", name="other") as ros:\n    ros.wait_for_graph(lambda: ros.nodes())\n'
+                          "    %ros2 node list")  # fmt: skip
+    assert inside.text.startswith("/other\n")
+    assert notebook.run("%ros2 node list").text == "/talker\n"
+    assert notebook.run("robot.stop()\n%ros2 node list").text.endswith('robot = launch("NAME").start()\n')
+
+
+def test_a_second_robot_ends_the_first(notebook: Notebook) -> None:
+    notebook.run('first = launch("talker").start()')
+    assert "has been stopped" in notebook.run('second = launch("talker", name="second").start()').text
+    assert notebook.run("%ros2 node list").text == "/second\n"
+    assert "has ended" in notebook.run("first").text
+    notebook.run("second.stop()")
+
+
+def test_a_program_that_ends_by_itself_is_told(notebook: Notebook) -> None:
+    notebook.run("%%node broken\nimport rclpy\nraise SystemExit(3)", "broken")
+    shown = notebook.run('robot = launch("talker", "broken").start()').text
+    assert "broken has ended, with exit status 3" in shown and "running: talker" in shown
+    assert notebook.run("%ros2 node list").text.endswith("says what it printed.\n/talker\n")
+    notebook.run("robot.stop()")
+
+
+def test_what_goes_on_ends_with_the_cell(notebook: Notebook) -> None:
+    notebook.run('robot = launch("talker").start()')
+    shown = notebook.run("%ros2 topic hz /chatter")
+    assert "average rate: " in shown.text and "(stopped after 10 s" in shown.text
+    notebook.run("robot.stop()")
+
+
+def test_nothing_is_left_running_when_the_kernel_ends(tmp_path: Path) -> None:
+    made = Notebook(tmp_path)
+    made.run(SET_UP)
+    made.run(TALKER, "talker")
+    pid = made.run('robot = launch("talker").start()\nrobot.program("talker").pid').text.split()[-1]
+    assert Path(f"/proc/{pid}").exists()
+    made.close()
+    deadline = time.monotonic() + WITHIN
+    while Path(f"/proc/{pid}").exists() and time.monotonic() < deadline:
+        time.sleep(0.05)
+    assert not Path(f"/proc/{pid}").exists()
