@@ -11,6 +11,7 @@ import itertools
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 from autograder.graph.recording import Received
 
@@ -38,6 +39,8 @@ class Concurrency:
 
     def __init__(self, received: Sequence[Received]) -> None:
         """Put the messages in the order in which they were published."""
+        self.messages = len(received)
+        """How many messages it was made of."""
         self._stretches: list[tuple[Counter[str], list[_Event]]] = []
         last = None
         for item in sorted(received, key=lambda item: item.sequence):
@@ -96,6 +99,10 @@ class Concurrency:
 
     def spans(self) -> list[Span]:
         """All complete runs."""
+        return list(self._spans)
+
+    @cached_property
+    def _spans(self) -> list[Span]:
         done = []
         for under_way, events in self._stretches:
             unpaired = Counter(under_way)

@@ -6,9 +6,8 @@ import contextlib
 import os
 import time
 from dataclasses import dataclass
-from pathlib import Path
 
-from autograder.core.processes import cpu_time, descendants
+from autograder.core.processes import cpu_time, descendants, read_text, stat_fields
 
 _NOT_KEPT_FROM_ANYTHING = 3.0
 """Seconds of CPU in one wait after which a process was not kept from anything; a node starts in a third of one."""
@@ -54,7 +53,7 @@ def cpu_uses() -> dict[int, CpuUse]:
     uses: dict[int, CpuUse] = {}
     for pid in (os.getpid(), *descendants(os.getpid())):
         with contextlib.suppress(OSError, IndexError, ValueError):
-            fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+            fields = stat_fields(f"/proc/{pid}")
             began = int(fields[19]) / os.sysconf("SC_CLK_TCK")
             threads = _cpu_waits(pid)
             if threads:
@@ -66,9 +65,9 @@ def _cpu_waits(pid: int) -> dict[int, CpuWait]:
     waits: dict[int, CpuWait] = {}
     for task in os.listdir(f"/proc/{pid}/task"):
         with contextlib.suppress(OSError, IndexError, ValueError):
-            folder = Path(f"/proc/{pid}/task/{task}")
-            _, waited, turns = map(int, (folder / "schedstat").read_text().split())
-            state = (folder / "stat").read_text().rpartition(")")[2].split()[0]
+            folder = f"/proc/{pid}/task/{task}"
+            _, waited, turns = map(int, read_text(f"{folder}/schedstat").split())
+            state = stat_fields(folder)[0]
             waits[int(task)] = CpuWait(time.monotonic(), waited / 1e9, turns, state == "R")
     return waits
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import os
 from dataclasses import dataclass
-from pathlib import Path
 
 
 @dataclass(frozen=True)
@@ -18,6 +17,31 @@ class Process:
     threads: int
 
 
+def read_text(path: str) -> str:
+    """Return a file of /proc. A launch is looked at ten times a second, so without what `pathlib` and `open` add.
+
+    Raises:
+        OSError: it cannot be read, such as after the end of the process.
+    """
+    file = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
+    try:
+        pieces = []
+        while piece := os.read(file, 1 << 16):
+            pieces.append(piece)
+    finally:
+        os.close(file)
+    return b"".join(pieces).decode("utf-8", "replace")
+
+
+def stat_fields(folder: str) -> list[str]:
+    """Return the fields of proc(5)'s `stat` from the third on, the state, of a process or a thread.
+
+    Raises:
+        OSError: it has ended.
+    """
+    return read_text(f"{folder}/stat").rpartition(")")[2].split()
+
+
 def descendants(root: int) -> dict[int, Process]:
     """Return the living processes below `root`, without itself. What cannot be read has just ended."""
     everyone: dict[int, list[str]] = {}
@@ -26,7 +50,7 @@ def descendants(root: int) -> dict[int, Process]:
         if not entry.isdigit():
             continue
         with contextlib.suppress(OSError):
-            fields = Path(f"/proc/{entry}/stat").read_text().rpartition(")")[2].split()
+            fields = stat_fields(f"/proc/{entry}")
             if fields[0] in "ZX":
                 continue
             everyone[int(entry)] = fields
@@ -48,9 +72,11 @@ def memory(pid: int) -> int:
     """
     total = 0
     with contextlib.suppress(OSError):
-        for line in Path(f"/proc/{pid}/status").read_text().splitlines():
-            if line.startswith(("RssAnon:", "RssShmem:", "VmSwap:")):
-                total += int(line.split()[1]) * 1024
+        status = read_text(f"/proc/{pid}/status")
+        for name in ("\nRssAnon:", "\nRssShmem:", "\nVmSwap:"):
+            amount = status.partition(name)[2]
+            if amount:
+                total += int(amount.split(maxsplit=1)[0]) * 1024
     return total
 
 
@@ -58,7 +84,7 @@ def proportional_memory(pid: int) -> int:
     """Return the bytes of memory that are this process's own; a shared page counts in parts. 0 if it is gone."""
     total = 0
     with contextlib.suppress(OSError):
-        for line in Path(f"/proc/{pid}/smaps_rollup").read_text().splitlines():
+        for line in read_text(f"/proc/{pid}/smaps_rollup").splitlines():
             if line.startswith(("Pss:", "SwapPss:")):
                 total += int(line.split()[1]) * 1024
     return total
@@ -67,14 +93,14 @@ def proportional_memory(pid: int) -> int:
 def cpu_time(pid: int) -> float:
     """Return the seconds of CPU that a process has had, with those of its children that have ended; 0 if it is gone."""
     with contextlib.suppress(OSError):
-        fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+        fields = stat_fields(f"/proc/{pid}")
         return sum(map(int, fields[11:15])) / os.sysconf("SC_CLK_TCK")
     return 0.0
 
 
 def pid_of(handle: int) -> int:
     """Return the process id, as this process sees it, behind a pidfd; -1 if it has been reaped."""
-    for line in Path(f"/proc/self/fdinfo/{handle}").read_text().splitlines():
+    for line in read_text(f"/proc/self/fdinfo/{handle}").splitlines():
         if line.startswith("Pid:"):
             return int(line.split()[1])
     return -1

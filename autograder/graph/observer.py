@@ -80,6 +80,8 @@ class Observer:
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self.node)
         self._recordings: dict[tuple[str, str], Recording] = {}
+        self._quiet = quiet_profile()
+        self._quiet_text = str(self._quiet)
         self._room = RECORDED
         self.meanwhile: Callable[[], None] | None = None
         """Called now and then in the thread of whoever waits."""
@@ -218,8 +220,9 @@ class Observer:
             qos: the subscription's profile; by default best effort and volatile with a deep queue, which hears
                 every publisher whatever it offers.
         """
-        profile = qos or quiet_profile()
-        key = (topic, str(profile))  # its repr would tell objects apart, not policies
+        profile = qos or self._quiet
+        # Its repr would tell objects apart, not policies; and it takes long, while some ask again all the time.
+        key = (topic, self._quiet_text if qos is None else str(profile))
         if key not in self._recordings:
             self._recordings[key] = Recording(self, topic, msg_type, profile)
         return self._recordings[key]
@@ -231,11 +234,10 @@ class Observer:
 
     def hears_all(self) -> bool:
         """Whether every recording that accepts any QoS has matched all publishers that are on its topic by now."""
-        everything = str(quiet_profile())
         return all(
             recording.matched >= len(self.publishers(topic))
             for (topic, profile), recording in list(self._recordings.items())
-            if profile == everything
+            if profile == self._quiet_text
         )
 
     def publisher(self, topic: str, msg_type: type, qos: QoSProfile) -> Any:

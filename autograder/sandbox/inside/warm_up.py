@@ -3,6 +3,7 @@
 import contextlib
 import gc
 import importlib
+import sys
 
 from .kernel import PR_SET_CHILD_SUBREAPER, PR_SET_DUMPABLE, libc, prctl
 from .probe import attach
@@ -24,6 +25,7 @@ _MODULES = (
     "std_msgs.msg",
     "std_srvs.srv",
 )
+_GENERATOR = "rosidl_generator_py.generate_py_impl"
 _TYPES = ("std_msgs.msg:String", "std_msgs.msg:Int32", "std_srvs.srv:Trigger", "std_srvs.srv:SetBool")
 
 
@@ -34,6 +36,9 @@ def warm_up() -> None:
     # has not got them, and crashes at its very end. Handlers run last in first out: this one, from before anything
     # was loaded, runs after every destructor of C++ objects and before the libraries' own finish.
     libc.on_exit(libc._exit, None)
+    # The message packages look for their own generator, and go on without: with the parser of interface files behind
+    # it, it takes as long to load as numpy.
+    sys.modules[_GENERATOR] = None  # type: ignore[assignment]
     for name in _MODULES:
         with contextlib.suppress(ImportError):
             importlib.import_module(name)
@@ -45,6 +50,7 @@ def warm_up() -> None:
             module, kind = name.split(":")
             # Private to the message packages' generator; without it the first message loads it, in every program.
             getattr(importlib.import_module(module), kind).__class__.__import_type_support__()
+    del sys.modules[_GENERATOR]
     with contextlib.suppress(Exception):
         attach.prepare()
     gc.collect()
