@@ -25,6 +25,7 @@ from autograder.checks.scoring import Score
 from autograder.core.results import CellResult, CheckResult, NodeLog, Outcome, Status
 from autograder.course.lab import Cell
 from autograder.grading.job import CELL_SECONDS, STUCK_SECONDS, Job
+from autograder.sandbox.inside.warm_up import load_ros
 from autograder.sandbox.limits import MIB
 from autograder.sandbox.scratch import Scratch
 
@@ -145,6 +146,11 @@ def _run_cell(cell: Cell, number: int, namespace: dict[str, Any]) -> tuple[str, 
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0.0)
     return "", value
+
+
+def prepare() -> None:
+    """Load what every job needs; a process that did so once can be forked for each of them."""
+    load_ros()
 
 
 def main() -> int:

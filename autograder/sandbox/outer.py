@@ -15,6 +15,7 @@ from dataclasses import dataclass
 
 from autograder.core.results import Isolation
 from autograder.sandbox.environment import python_environment
+from autograder.sandbox.forks import Fork, ForkServer
 from autograder.sandbox.limits import MIB
 from autograder.sandbox.walls import bubblewrap
 
@@ -80,7 +81,23 @@ def run_in_sandbox(
     """
     if stop is not None and stop.is_set():
         raise Stopped
-    process = start_in_sandbox(module_args, isolation)
+    _compile_package()
+    if isolation is not Isolation.FULL:
+        return _run(_start_child(module_args), stdin, time_limit, stop)
+    fork = _forks.fork(module_args)
+    run = _run(fork, stdin, time_limit, stop)
+    if fork.lost and not fork.begun:  # the server was killed before it heard of it
+        _forks.gone()
+        fork = _forks.fork(module_args)
+        run = _run(fork, stdin, time_limit, stop)
+    if fork.lost:
+        run.stderr += _forks.gone()
+    return run
+
+
+def _run(
+    process: subprocess.Popen[bytes] | Fork, stdin: bytes, time_limit: float, stop: threading.Event | None
+) -> OuterRun:
     try:
         return _exchange(process, stdin, time_limit, stop or threading.Event())
     finally:
@@ -93,30 +110,45 @@ def run_in_sandbox(
                     stream.close()
 
 
-def start_in_sandbox(module_args: list[str], isolation: Isolation) -> subprocess.Popen[bytes]:
-    """Start what `run_in_sandbox` waits for; it ends with the thread that calls this."""
-    _compile_package()
-    variables = {
+def _environment() -> dict[str, str]:
+    return {
         **python_environment(),
         "PYTHONPATH": str(bubblewrap.PACKAGE.parent),
         "PYTHONSAFEPATH": "1",
         "HOME": "/tmp",
     }
-    command = [sys.executable, "-m", *module_args]
+
+
+def _start_child(module_args: list[str]) -> subprocess.Popen[bytes]:
+    """Without full isolation: a child that ends with the thread that calls this."""
+    command = [sys.executable, "-c", _RUN_AND_END_WITH_PARENT, str(os.getpid()), *module_args]
     pipe = subprocess.PIPE
-    if isolation is not Isolation.FULL:
-        command = [sys.executable, "-c", _RUN_AND_END_WITH_PARENT, str(os.getpid()), *module_args]
-        return subprocess.Popen(
-            command, env=variables, start_new_session=True, stdin=pipe, stdout=pipe, stderr=pipe, cwd="/"
-        )
+    return subprocess.Popen(
+        command, env=_environment(), start_new_session=True, stdin=pipe, stdout=pipe, stderr=pipe, cwd="/"
+    )
+
+
+def start_fork_server(channel: int, stderr: int, idle: float = 60.0) -> subprocess.Popen[bytes]:
+    """Start what forks the processes of the grading sandbox; it is in one itself, and ends with the calling thread.
+
+    Args:
+        channel: its end of the socket pair on which it is asked for forks.
+        stderr: where its standard error goes.
+        idle: seconds without a request or a fork after which it ends, to give the memory back.
+    """
+    command = [sys.executable, "-m", "autograder.sandbox.fork_server", str(channel), str(idle)]
     around = None
     if os.getuid() == 0:
         # Namespaces nest only for an ordinary user, and only root may read below /root: give up root inside a mount
         # tree of our own, in which this Python lies under folders that everyone may enter.
         around = (bubblewrap.options_for_root(), [sys.executable, "-I", "-S", "-c", _GIVE_UP_ROOT])
     return bubblewrap.start_bwrap(
-        bubblewrap.outer_options(variables), command, around=around, stdin=pipe, stdout=pipe, stderr=pipe
+        bubblewrap.outer_options(_environment()), command, (channel,), stderr=stderr, around=around
     )
+
+
+_forks = ForkServer(start_fork_server)
+"""Of this process; it starts with the first run in full isolation."""
 
 
 def _compile_package() -> None:
@@ -133,7 +165,9 @@ def _compile_package_once() -> None:
     compileall.compile_dir(bubblewrap.PACKAGE, quiet=2)  # where it may not write either, it goes on
 
 
-def _exchange(process: subprocess.Popen[bytes], stdin: bytes, time_limit: float, stop: threading.Event) -> OuterRun:
+def _exchange(
+    process: subprocess.Popen[bytes] | Fork, stdin: bytes, time_limit: float, stop: threading.Event
+) -> OuterRun:
     assert process.stdin is not None and process.stdout is not None and process.stderr is not None
     deadline = time.monotonic() + time_limit
     taken: dict[str, bytearray] = {"stdout": bytearray(), "stderr": bytearray()}

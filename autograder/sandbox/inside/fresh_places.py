@@ -1,4 +1,4 @@
-"""A /tmp, a /dev/shm and a /proc of a launch's own, in a mount namespace of its own."""
+"""A /tmp, a /dev/shm and a /proc of a process tree's own, in a mount namespace of its own."""
 
 import os
 import re
@@ -18,7 +18,11 @@ from .kernel import (
 
 
 def make(disk: int, inodes: int) -> None:
-    """An empty /tmp and /dev/shm of limited size and number of files, and a /proc that shows this launch alone.
+    """Mount an empty /tmp and /dev/shm, and a /proc that shows this PID namespace alone.
+
+    Args:
+        disk: bytes that each of the first two may hold.
+        inodes: files and folders that each of them may hold; 0 for any number.
 
     Raises:
         OSError: the kernel refuses.
@@ -30,7 +34,16 @@ def make(disk: int, inodes: int) -> None:
         checked(libc.mount(b"tmpfs", place, b"tmpfs", MS_NOSUID | MS_NODEV, options))
     _put_back(*python)
     checked(libc.mount(b"proc", b"/proc", b"proc", MS_NOSUID | MS_NODEV | MS_NOEXEC, None))
-    # Settings of the namespaces, some of which would be the programs' own.
+
+
+def close_settings() -> None:
+    """Make the kernel's settings read-only: some belong to the namespaces, and would be the programs' own.
+
+    Below such a /proc, no further namespace can have one.
+
+    Raises:
+        OSError: the kernel refuses.
+    """
     checked(libc.mount(b"/proc/sys", b"/proc/sys", None, MS_BIND, None))
     read_only = MS_BIND | MS_REMOUNT | MS_RDONLY | MS_NOSUID | MS_NODEV | MS_NOEXEC
     checked(libc.mount(None, b"/proc/sys", None, read_only, None))

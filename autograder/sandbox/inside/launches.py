@@ -61,6 +61,7 @@ def _fork_first_process(launch: Launch) -> None:
         prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
         if launch.namespaces:
             fresh_places.make(launch.disk, launch.inodes)
+            fresh_places.close_settings()
             give_up_privileges()
         for name, value in launch.limits.items():
             if name != "RLIMIT_CPU":

@@ -36,6 +36,16 @@ def warm_up() -> None:
     # has not got them, and crashes at its very end. Handlers run last in first out: this one, from before anything
     # was loaded, runs after every destructor of C++ objects and before the libraries' own finish.
     libc.on_exit(libc._exit, None)
+    load_ros()
+    with contextlib.suppress(Exception):
+        attach.prepare()
+    keep_shared()
+    # After the imports: no program can trace a process of these, or open their memory or descriptors, from here on.
+    prctl(PR_SET_DUMPABLE, 0)
+
+
+def load_ros() -> None:
+    """Load rclpy, the usual messages, and the middleware."""
     # The message packages look for their own generator, and go on without: with the parser of interface files behind
     # it, it takes as long to load as numpy.
     sys.modules[_GENERATOR] = None  # type: ignore[assignment]
@@ -51,9 +61,9 @@ def warm_up() -> None:
             # Private to the message packages' generator; without it the first message loads it, in every program.
             getattr(importlib.import_module(module), kind).__class__.__import_type_support__()
     del sys.modules[_GENERATOR]
-    with contextlib.suppress(Exception):
-        attach.prepare()
+
+
+def keep_shared() -> None:
+    """Keep what is loaded by now in memory that forks share."""
     gc.collect()
     gc.freeze()  # the collector would write to every object, and so unshare every page
-    # After the imports: no program can trace a process of these, or open their memory or descriptors, from here on.
-    prctl(PR_SET_DUMPABLE, 0)

@@ -87,7 +87,8 @@ def outer_options(variables: Mapping[str, str]) -> list[str]:
     return [
         *_NAMESPACES, "--unshare-net", *_LIFE, "--uid", "1000", "--gid", "1000",
         "--perms", "1777", "--tmpfs", "/tmp", *system_options(), *_python(), *_read_only([PACKAGE]),
-        "--proc", "/proc", "--dev", "/dev", "--chdir", "/tmp", *_environment(variables),
+        "--proc", "/proc", "--dev", "/dev", "--remount-ro", "/dev", "--remount-ro", "/", "--chdir", "/tmp",
+        *_environment(variables),
     ]  # fmt: skip
 
 
