@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import contextlib
 import fcntl
+import gc
 import importlib
 import json
 import os
@@ -37,6 +38,7 @@ from autograder.sandbox.inside.kernel import (
     CLONE_NEWPID,
     CLONE_NEWUSER,
     CLONE_NEWUTS,
+    PR_SET_NAME,
     PR_SET_PDEATHSIG,
     checked,
     give_up_privileges,
@@ -69,6 +71,7 @@ def main() -> int:
 def _run(module: str, arguments: list[str]) -> int:
     """Run a module as `python -m` does; return the exit status."""
     sys.argv = [module, *arguments]
+    prctl(PR_SET_NAME, module.rpartition(".")[2].encode())  # its command line is still that of the server
     try:
         if module in sys.modules:
             return int(sys.modules[module].main())
@@ -120,6 +123,7 @@ def _load(module: str) -> None:
     """Load a module of the kit before the fork, and what it says that it needs, once."""
     if module in sys.modules or not module.startswith("autograder."):
         return
+    gc.disable()  # of what is loaded here nothing is garbage
     with contextlib.suppress(Exception):  # the fork will say it
         prepare = getattr(importlib.import_module(module), "prepare", None)
         if prepare is not None:

@@ -36,6 +36,7 @@ def warm_up() -> None:
     # has not got them, and crashes at its very end. Handlers run last in first out: this one, from before anything
     # was loaded, runs after every destructor of C++ objects and before the libraries' own finish.
     libc.on_exit(libc._exit, None)
+    gc.disable()  # of what is loaded here nothing is garbage
     load_ros()
     with contextlib.suppress(Exception):
         attach.prepare()
@@ -65,5 +66,5 @@ def load_ros() -> None:
 
 def keep_shared() -> None:
     """Keep what is loaded by now in memory that forks share."""
-    gc.collect()
     gc.freeze()  # the collector would write to every object, and so unshare every page
+    gc.enable()
