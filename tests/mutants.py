@@ -27,7 +27,7 @@ from autograder.core.files import write_beside
 from autograder.core.results import Isolation, SubmissionResult
 from autograder.course.lab import Lab, load_lab
 from autograder.grading.job import Job
-from autograder.grading.runner import run_in_worker
+from autograder.grading.supervisor import run_in_worker
 
 VERDICTS = ("missing", "not asked", "same")
 """A requirement that nothing checks yet; something that the text leaves open; a program that behaves the same."""

@@ -14,7 +14,7 @@ import pytest
 from autograder.core.results import Isolation, Status
 from autograder.grading import supervisor
 from autograder.grading.job import Cell, Job
-from autograder.grading.runner import run_in_worker
+from autograder.grading.supervisor import run_in_worker
 from autograder.sandbox.isolation import preflight
 
 FOLDER = Path(__file__).parent / "attacks" / "graded"

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
 
 from autograder.core.results import Isolation, NodeLog
 from autograder.grading import supervisor, worker
-from autograder.grading.job import Cell, Job
-from autograder.grading.runner import run_in_worker
+from autograder.grading.job import CELL_SECONDS, Cell, Job
+from autograder.grading.supervisor import run_in_worker, run_in_workers
 from autograder.grading.validation import lacks_a_result
 
 PASS = "from autograder.checks import outcomes\nfrom autograder.checks.scoring import score\n"
@@ -109,11 +111,29 @@ def test_a_check_at_which_the_worker_dies_is_tried_once_more(tmp_path: Path, dea
 def test_workers_that_share_the_checks_find_what_one_finds() -> None:
     drawn = "from autograder.checks import vary\noutcomes.passed(vary.token(12))\nscore(1)"
     given = job(drawn, drawn, "outcomes.passed('x') or score(0.5)", drawn, drawn)
-    alone, together = run_in_worker(given), run_in_worker(given, workers=3)
+    alone, together = run_in_worker(given), run_in_workers(given, 3)
     assert [check.grade_id for check in together.checks] == [f"check{number}" for number in range(5)]
     assert [check.points for check in together.checks] == [1.0, 1.0, None, 1.0, 1.0]
     titles = [[check.outcomes[0].title for check in result.checks] for result in (alone, together)]
     assert titles[0] == titles[1] and len(set(titles[0])) == 5
+
+
+def test_an_interrupt_that_comes_while_workers_are_begun_ends_those_that_run(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The pool itself stands in for Ctrl-C, because when a signal comes is chance."""
+    submit, begun = ThreadPoolExecutor.submit, []
+
+    def interrupted(pool: ThreadPoolExecutor, *call: object) -> object:
+        if begun:
+            raise KeyboardInterrupt
+        begun.append(call)
+        return submit(pool, *call)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(ThreadPoolExecutor, "submit", interrupted)
+    stuck = "import time\ntime.sleep(1000)\nscore(1)"
+    asked = time.monotonic()
+    with pytest.raises(KeyboardInterrupt):
+        run_in_workers(job(stuck, stuck), 2)
+    assert time.monotonic() - asked < CELL_SECONDS  # after which a stuck worker is ended anyway
 
 
 def test_logs_share_the_room_there_is() -> None:

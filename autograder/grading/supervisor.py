@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 
@@ -28,29 +29,43 @@ _STACKS = b"\nTimeout ("
 """How the stacks begin that the worker writes when it is stuck; no text in a line of JSON holds the end of a line."""
 
 
-def run_in_worker(job: Job, stop: threading.Event | None = None, workers: int = 1) -> SubmissionResult:
+def run_in_worker(job: Job, stop: threading.Event | None = None) -> SubmissionResult:
     """Run a job's checks in the sandbox. What each one comes to is kept as soon as it is known.
 
     Args:
         job: the submission and its checks.
         stop: when it is set, the run is ended.
-        workers: that share the checks and run at once. Checks know nothing of each other: who waits for one submission
-            waits less with several; a class, of which many run at once anyway, is cheaper with one each.
 
     Raises:
         Stopped: by `stop`.
     """
+    began = time.monotonic()
+    return _result(job, _run_share(job, job.checks, stop), began)
+
+
+def run_in_workers(job: Job, workers: int) -> SubmissionResult:
+    """As `run_in_worker`, with the checks shared by several workers that run at once.
+
+    Checks know nothing of each other: who waits for one submission waits less with several workers; a class, of which
+    many run at once anyway, is cheaper with one each.
+    """
+    began = time.monotonic()
     shares = [share for share in (job.checks[number::workers] for number in range(workers)) if share]
-    given_up = stop or threading.Event()
+    given_up = threading.Event()
     with ThreadPoolExecutor(max(1, len(shares)), thread_name_prefix="share") as pool:
-        futures = [pool.submit(_run_share, job, share, given_up) for share in shares]
-        try:
+        try:  # from the first share on: Ctrl-C may come before the last of them is begun
+            futures = [pool.submit(_run_share, job, share, given_up) for share in shares]
             checks = [check for future in futures for check in future.result()]
-        except BaseException:  # such as Ctrl-C: nobody waits for the other shares any more
+        except BaseException:  # nobody waits for the shares any more
             given_up.set()
             raise
+    return _result(job, checks, began)
+
+
+def _result(job: Job, checks: list[CheckResult], began: float) -> SubmissionResult:
     result = job.result(checks)
     result.seconds["checks"] = round(sum(check.seconds for check in checks), 3)
+    result.seconds["total"] = round(time.monotonic() - began, 3)
     return validated(result, job.checks)
 
 
