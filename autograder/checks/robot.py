@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import sys
+from pathlib import Path
+
 from autograder.checks import runtime
 from autograder.checks.expect.expectations import Expectations
 from autograder.checks.misuse import Misuse
@@ -17,6 +20,12 @@ _THERE_WITHIN = 5.0
 
 class Robot(Expectations):
     """What a launch can do besides, in a notebook."""
+
+    def __init__(self) -> None:
+        """Nothing runs yet."""
+        super().__init__()
+        self._begun_with: dict[str, int] = {}
+        """Programs, and when the file of each was written that it was started from."""
 
     told_in = 0
     """The number of the cell that has said already what runs."""
@@ -41,6 +50,7 @@ class Robot(Expectations):
             before.stop()
             print("What was started before has been stopped: one launch at a time goes on from cell to cell.")
         self._enter(LIMITS)
+        self._begun_with = {node.program: _written(node.program) for node in self._running.described}
         runtime.current.robot = self
 
         def there() -> bool:
@@ -55,18 +65,24 @@ class Robot(Expectations):
         """End a program, or all."""
         raise NotImplementedError
 
-    def ended_programs(self) -> list[str]:
-        """What became of programs that have ended by themselves, a sentence each."""
-        return [
+    def news(self) -> list[str]:
+        """What has become of the programs since they were started, a sentence each."""
+        ended = [
             f"{program.name} has ended, with exit status {program.exit_status()}; .log() says what it printed."
             for _, program in self._running.programs
             if not program.running() and program not in self._running.stopped
         ]
+        changed = [
+            f"The cell of {name} has been run again since: what runs is as it was before. Call .start() once more."
+            for name, written in self._begun_with.items()
+            if _written(name) != written
+        ]
+        return ended + changed
 
     def status(self) -> str:
         """What runs, where it can be looked at, and how it is ended."""
         running = [program.name for _, program in self._running.programs if program.running()]
-        lines = self.ended_programs()
+        lines = self.news()
         if not running:
             return "\n".join([*lines, "Nothing runs any more."])
         nodes = ", ".join(self._observer.nodes()) or "none yet"
@@ -76,6 +92,12 @@ class Robot(Expectations):
                 *lines,
                 f"running: {', '.join(running)} (nodes: {nodes})",
                 "  look at it with %ros2, as in `%ros2 node list`; end it with .stop()",
-                f"  in a terminal: ROS_DOMAIN_ID={domain} autograder ros2 node list",
+                f"  in a terminal: ROS_DOMAIN_ID={domain} {Path(sys.prefix) / 'bin' / 'ros2'} node list",
             ]
         )
+
+
+def _written(program: str) -> int:
+    """When a program's file was written, in nanoseconds; 0 if there is none."""
+    path = runtime.current.folder / f"{program}.py"
+    return path.stat().st_mtime_ns if path.is_file() else 0

@@ -28,8 +28,8 @@ class Running(Protocol):
     def observer(self) -> Observer:
         """Who watches its graph."""
 
-    def ended_programs(self) -> list[str]:
-        """What became of programs that have ended by themselves, a sentence each."""
+    def news(self) -> list[str]:
+        """What has become of its programs since they were started, a sentence each."""
 
     def stop(self) -> None:
         """End it."""

@@ -1,8 +1,23 @@
-"""The command `autograder`."""
+"""The commands `autograder` and `ros2`."""
+
+import sys
 
 
 def main() -> None:
-    """Run the command; what it needs is loaded then."""
+    """Run `autograder`; what it needs is loaded then."""
+    if sys.argv[1:2] == ["ros2"]:  # its words are none of Typer's, and it is to start at once
+        _ros2(sys.argv[2:])
     from autograder.cli.main import main as run
 
     run()
+
+
+def ros2() -> None:
+    """Run `ros2`: that of an installed ROS, if there is one, or else the kit's."""
+    _ros2(sys.argv[1:])
+
+
+def _ros2(words: list[str]) -> None:
+    from autograder.cli.ros2 import ros2 as run
+
+    sys.exit(run(words))

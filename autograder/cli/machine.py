@@ -1,6 +1,8 @@
-"""`autograder doctor`: what this machine offers."""
+"""`autograder doctor`, what this machine offers, and `autograder ros2`, what runs on it."""
 
 from __future__ import annotations
+
+from typing import Annotated
 
 import typer
 
@@ -13,3 +15,13 @@ def doctor(as_json: JsonOption = False) -> None:
     from autograder.cli.doctor import run
 
     raise typer.Exit(run(as_json))
+
+
+@app.command("ros2", add_help_option=False, context_settings={"ignore_unknown_options": True})
+def ros2_command(
+    words: Annotated[list[str] | None, typer.Argument(metavar="COMMAND VERB ...", help="As for `ros2`.")] = None,
+) -> None:
+    """Look at a running system as `ros2 node|topic|service|param|action|lifecycle|interface` does."""
+    from autograder.cli.ros2 import ros2
+
+    raise typer.Exit(ros2(words or []))

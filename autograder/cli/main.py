@@ -9,7 +9,7 @@ import os
 import sys
 from pathlib import Path
 
-from autograder.cli import check, grade, labs, machine, results, ros2  # noqa: F401  each registers its commands
+from autograder.cli import check, grade, labs, machine, results  # noqa: F401  each registers its commands
 from autograder.cli.app import app
 from autograder.core.errors import KitError
 from autograder.setup.refusals import SetUpError, refuse_foreign_ros
@@ -23,8 +23,6 @@ def main() -> None:
     try:
         if sys.argv[1:2] != ["doctor"]:  # which reports it among other things
             refuse_foreign_ros(os.environ)
-        if sys.argv[1:2] == ["ros2"]:  # its words are none of Typer's
-            sys.exit(ros2.ros2(sys.argv[2:] or ["--help"]))
         app()
     except (KitError, SetUpError) as error:
         from autograder.report.terminal import plain  # a student may have named the file that it is about

@@ -1,24 +1,14 @@
-"""`autograder ros2`: what the real tool's command line says about a running system."""
+"""`ros2` in a terminal: what the real tool's command line says about a running system."""
 
 from __future__ import annotations
 
 import os
+import signal
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
 
-import typer
-
-from autograder.cli.app import app
-
-
-@app.command("ros2", add_help_option=False, context_settings={"ignore_unknown_options": True})
-def ros2_command(
-    words: Annotated[list[str] | None, typer.Argument(metavar="COMMAND VERB ...", help="As for `ros2`.")] = None,
-) -> None:
-    """Look at a running system as `ros2 node|topic|service|param|action|lifecycle|interface` does."""
-    raise typer.Exit(ros2(words or ["--help"]))
+from autograder.setup.refusals import SetUpError, refuse_foreign_ros
 
 
 def real_ros2() -> str | None:
@@ -40,16 +30,26 @@ def ros2(words: Sequence[str]) -> int:
     installed = real_ros2()
     if installed is not None:
         os.execv(installed, [installed, *words])
+    try:
+        refuse_foreign_ros(os.environ)
+        return _run(words)
+    except SetUpError as error:
+        print(f"error: {error.what}\n  {error.do}", file=sys.stderr)
+        return 2
+    except BrokenPipeError:  # a reader such as `head` has seen enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    except KeyboardInterrupt:
+        return int(signal.SIGINT)
+
+
+def _run(words: Sequence[str]) -> int:
     from autograder.ros2.main import PROFILE, run
     from autograder.sandbox.environment import profile_environment, remove_logs
 
     os.environ.setdefault("FASTRTPS_DEFAULT_PROFILES_FILE", str(PROFILE))
     os.environ.setdefault("ROS_LOG_DIR", profile_environment()["ROS_LOG_DIR"])
-
     try:
         return run(words)
-    except BrokenPipeError:  # a reader such as `head` has seen enough
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 0
     finally:
         remove_logs()

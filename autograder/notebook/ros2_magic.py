@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import shlex
+import sys
+from contextlib import redirect_stderr
 from typing import TYPE_CHECKING, Any
 
 from IPython.core.magic import no_var_expand
 
+from autograder.graph.names import nearest
+
 if TYPE_CHECKING:
+    from autograder.graph.observer import Observer
     from autograder.notebook.kernel import Kernel
 
 HELP = """Look at the running programs, and speak to them, as with `ros2` in a terminal.
@@ -27,6 +32,9 @@ _ENDLESS = 10.0
 """Seconds after which a verb is ended that goes on until Ctrl-C: a cell has to end."""
 _LONGEST = 60.0
 """Seconds that any other verb may take, such as a call that is not answered."""
+
+_ACTION = "/_action/send_goal"
+"""How the name of a service ends that takes an action's goals."""
 
 _COUNTED = ("--once", "-n", "-t", "--times", "--timeout")
 
@@ -58,19 +66,33 @@ def _run(kernel: Kernel, line: str) -> int:
         if looks:
             print('No program runs that could be looked at. Start one: robot = launch("NAME").start()')
             return 1
-        return run(words or ["--help"])
-    for sentence in running.ended_programs() if looks else ():
+        with redirect_stderr(sys.stdout):
+            return run(words)
+    for sentence in running.news() if looks else ():
         print(sentence)
     seconds = _ENDLESS if _is_endless(words) else _LONGEST
     try:
-        return run(words or ["--help"], running.observer.domain_id, running.observer, seconds)
+        with redirect_stderr(sys.stdout):  # what cannot be done is no alarm, and keeps its place
+            status = run(words, running.observer.domain_id, running.observer, seconds)
     except TimeIsUp:
-        print(
-            f"(stopped after {seconds:g} s, since a cell has to end; in a terminal it goes on until Ctrl-C)"
-            if seconds == _ENDLESS
-            else f"(stopped after {seconds:g} s without an answer)"
-        )
-        return 2
+        status = 2
+        because = "since a cell has to end; in a terminal it goes on until Ctrl-C"
+        print(f"(stopped after {seconds:g} s, {because if seconds == _ENDLESS else 'for no answer came'})")
+    if status and looks:
+        _help_on(words[2:], running.observer)
+    return status
+
+
+def _help_on(words: list[str], observer: Observer) -> None:
+    """Say which name was probably meant, and whether anybody publishes: the real tool says neither."""
+    topics, services = observer.topics(), observer.services()
+    actions = [name.removesuffix(_ACTION) for name in services if name.endswith(_ACTION)]
+    names = [*observer.nodes(), *topics, *services, *actions]
+    for word in words:
+        if word in topics and not observer.publishers(word):
+            print(f"({word} has no publisher)")
+        elif word.startswith("/") and word not in names and (likely := nearest(word, names)):
+            print(f"(there is no {word}; the nearest name is {likely})")
 
 
 def _is_endless(words: list[str]) -> bool:

@@ -85,12 +85,14 @@ def run(
 def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
     """The parser of these words: of the other commands it knows the names."""
     parser = argparse.ArgumentParser(prog="ros2", description="ros2 is an extensible command-line tool for ROS 2.")
-    commands = parser.add_subparsers(title="Commands", metavar="<command>", required=True)
+    commands = parser.add_subparsers(title="Commands", metavar="<command>", required=False)
+    parser.set_defaults(run=lambda *_: parser.print_help())
     wanted = next((word for word in words if not word.startswith("-")), "")
     for name, text in COMMANDS.items():
         command = commands.add_parser(name, help=text, description=text)
         if name == wanted:
-            verbs = command.add_subparsers(title="Verbs", metavar="<verb>", required=True)
+            verbs = command.add_subparsers(title="Verbs", metavar="<verb>")
+            command.set_defaults(run=lambda *_, command=command: command.print_help())
             importlib.import_module(f"autograder.ros2.{name}").add_verbs(verbs)
     return parser
 

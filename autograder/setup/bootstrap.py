@@ -14,6 +14,7 @@ import fcntl
 import os
 import time
 
+from autograder.setup.commands import write_commands
 from autograder.setup.environment import create, digest, discard, finish, read_marker
 from autograder.setup.interpreter import find_python
 from autograder.setup.jupyter import lead_jupyter
@@ -36,6 +37,7 @@ def make_ready(dev: bool, wanted: str) -> None:
     # What tests and lectures need is a superset, so that one environment serves both, and stays so once it is.
     locks = [STUDENT_LOCK, DEV_LOCK] if dev or DEV_LOCK in known else [STUDENT_LOCK]
     if all(known.get(lock) == digest(lock) for lock in locks):
+        write_commands()
         lead_jupyter()
         return
     refuse_other_machines()

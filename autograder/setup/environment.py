@@ -10,6 +10,7 @@ import shutil
 from pathlib import Path
 from typing import Any, Dict, List, Tuple
 
+from autograder.setup.commands import write_commands
 from autograder.setup.interpreter import Interpreter, output_of
 from autograder.setup.jupyter import lead_jupyter
 from autograder.setup.places import MARKER, PYTHON, ROOT, VENV
@@ -57,15 +58,7 @@ def finish(locks: "List[str]", version: "Tuple[int, ...]") -> None:
     if status:
         raise SetUpError("The new Python does not run:\n%s" % tail(text), "rm -rf .venv, then try again.")
     Path(text.strip(), "autograder.pth").write_text("%s\n" % ROOT, encoding="utf-8")
-    command = PYTHON.with_name("autograder")
-    command.write_text(
-        # A #! line can hold no space and is cut at 127 bytes: /bin/sh starts the Python that lies beside this file.
-        '#!/bin/sh\n\'\'\'exec\' "$(dirname "$(readlink -f "$0")")/python" "$0" "$@"\n\' \'\'\'\n'
-        # Guarded, since processes of a pool import the main script once more.
-        "import sys\n\nfrom autograder.cli import main\n\nif __name__ == '__main__':\n    sys.exit(main())\n",
-        encoding="utf-8",
-    )
-    command.chmod(0o755)
+    write_commands()
     lead_jupyter()
     write_marker(locks, version)
 

@@ -4,7 +4,8 @@ import time
 
 import rclpy
 from rcl_interfaces.msg import IntegerRange, ParameterDescriptor, SetParametersResult
-from rclpy.action import ActionServer, GoalResponse
+from rclpy.action import ActionServer, CancelResponse, GoalResponse
+from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.executors import ExternalShutdownException, MultiThreadedExecutor
 from rclpy.lifecycle import LifecycleNode, TransitionCallbackReturn
 from rclpy.node import Node
@@ -12,6 +13,10 @@ from sensor_msgs.msg import Image
 from std_msgs.msg import Bool, String
 from std_srvs.srv import SetBool, Trigger
 from test_msgs.action import Fibonacci
+
+
+def agree(handle):
+    return CancelResponse.ACCEPT
 
 
 class Demo(Node):
@@ -35,7 +40,10 @@ class Demo(Node):
         self.declare_parameter("on", True)
         self.declare_parameter("ro", "fixed", ParameterDescriptor(read_only=True))
         self.add_on_set_parameters_callback(self.look_at)
-        self.server = ActionServer(self, Fibonacci, "fibonacci", self.compute, goal_callback=self.decide)
+        self.server = ActionServer(
+            self, Fibonacci, "fibonacci", self.compute, goal_callback=self.decide, cancel_callback=agree,
+            callback_group=ReentrantCallbackGroup(),
+        )  # fmt: skip
 
     def tick(self):
         self.count += 1
@@ -59,6 +67,9 @@ class Demo(Node):
         feedback = Fibonacci.Feedback(sequence=[0, 1])
         for _ in range(handle.request.order - 1):
             time.sleep(0.1)
+            if handle.is_cancel_requested:
+                handle.canceled()
+                return Fibonacci.Result()
             feedback.sequence = [*feedback.sequence, feedback.sequence[-1] + feedback.sequence[-2]]
             handle.publish_feedback(feedback)
         handle.succeed()
