@@ -7,7 +7,7 @@ import os
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from types import TracebackType
-from typing import Any
+from typing import Any, Self
 
 from autograder.arguments import params_file, remap_rules
 from autograder.checks import contradictions, findings, outcomes, runtime, seen
@@ -28,7 +28,7 @@ from autograder.checks.launched_file import LaunchedFile
 from autograder.checks.misuse import Misuse
 from autograder.checks.parts import part
 from autograder.checks.program import Program
-from autograder.checks.robot import Robot
+from autograder.checks.robot import LIMITS, Robot, make_room
 from autograder.checks.scoring import Score, score
 from autograder.checks.try_out import Log, log_of, try_out
 from autograder.checks.waiting import NotLaunchedError, watched
@@ -55,7 +55,6 @@ class Launch(
     Facts,
     Looking,
     Pictures,
-    Robot,
 ):
     """A running launch: `ros` in a check cell."""
 
@@ -74,16 +73,16 @@ class Launch(
         self._listen, self._serve, self._lifecycle = list(listen), list(serve), list(lifecycle)
         self._group: ProgramGroup | None = None
         self._watch: Watcher | None = None
+        self._robot: Robot | None = None
         self._entered = self._over = False
 
     def __enter__(self) -> Launch:
         if runtime.current.block is not None:
             raise Misuse("A launch begins inside another one; let the first block end before.")
-        self._enter(None)
-        runtime.current.block = self
+        runtime.current.block = self._enter(None)
         return self
 
-    def _enter(self, limits: Limits | None) -> None:
+    def _enter(self, limits: Limits | None) -> Robot:
         """Begin to watch, and start the programs."""
         if self._entered:
             raise Misuse("This launch has run already; call launch(…) again for another one.")
@@ -107,6 +106,8 @@ class Launch(
         except BaseException:
             self._end()
             raise
+        self._robot = Robot(self._running, self._end)
+        return self._robot
 
     def _begin(self, limits: Limits | None) -> None:
         """Listen, and then start the programs."""
@@ -125,7 +126,7 @@ class Launch(
         for launched in self._running.described:
             self._start(launched)
 
-    def start(self, node: Program | str | None = None) -> Launch:
+    def start(self, node: Program | str | None = None) -> Self:
         """Start one more program. Without one, begin a launch that goes on from cell to cell, until `stop()`.
 
         The latter is for looking around in a notebook; one such launch runs at a time.
@@ -137,7 +138,10 @@ class Launch(
             `ros.start(Program("listener", name="late"))`
         """
         if node is None:
-            self._go_on()
+            make_room()
+            runtime.current.robot = robot = self._enter(LIMITS)
+            robot.wait_for_nodes()
+            print(robot)
         elif self._group is None:
             raise Misuse("This launch does not run yet: name all its programs in launch(…), then .start() begins it.")
         else:
@@ -195,8 +199,8 @@ class Launch(
         return log_of([one for _, one in self._running.programs], program)
 
     def __repr__(self) -> str:
-        if runtime.current.robot is self:
-            return self.status()
+        if self._robot is not None and runtime.current.robot is self._robot:
+            return str(self._robot)
         if self._over:
             return "This launch has ended; .log() says what its programs printed."
         names = ", ".join(f'"{node.program}"' for node in self._running.described) or "…"
@@ -206,7 +210,7 @@ class Launch(
         """As the last line of a cell: run for a moment and show what happens."""
         here = runtime.current.front_end
         if self._entered or here is None:
-            if here is None or here.number != self.told_in:
+            if here is None or self._robot is None or here.number != self._robot.cell:
                 print(self)
             return
         try:
@@ -261,9 +265,9 @@ class Launch(
             if self._watch is not None:
                 self._watch.close()
         finally:
-            if runtime.current.block is self:
+            if runtime.current.block is self._robot:
                 runtime.current.block = None
-            if runtime.current.robot is self:
+            if runtime.current.robot is self._robot:
                 runtime.current.robot = None
             findings.current.patience = self._observer.patience
             self._observer.close()

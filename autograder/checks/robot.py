@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 from autograder.checks import runtime
-from autograder.checks.expect.expectations import Expectations
 from autograder.checks.misuse import Misuse
+from autograder.checks.running import Running
 from autograder.graph.observer import Observer
 from autograder.sandbox.limits import MIB, Limits
 
@@ -18,52 +19,36 @@ _THERE_WITHIN = 5.0
 """Seconds that its nodes may take to be on the graph, before the cell goes on without them."""
 
 
-class Robot(Expectations):
-    """What a launch can do besides, in a notebook."""
+class Robot:
+    """What runs: of a block, or from cell to cell.
 
-    def __init__(self) -> None:
-        """Nothing runs yet."""
-        super().__init__()
-        self._begun_with: dict[str, int] = {}
-        """Programs, and when the file of each was written that it was started from."""
+    Args:
+        running: its programs, which have been started.
+        stop: ends it.
+    """
 
-    told_in = 0
-    """The number of the cell that has said already what runs."""
+    def __init__(self, running: Running, stop: Callable[[], None]) -> None:
+        """Note what the programs were started from."""
+        self._running = running
+        self._begun_with = {node.program: _written(node.program) for node in running.described}
+        self.stop = stop
+        here = runtime.current.front_end
+        self.cell = here.number if here is not None else 0
+        """The number in the brackets beside the cell that began it."""
 
     @property
     def observer(self) -> Observer:
         """Who watches its graph."""
-        return self._observer
+        return self._running.observer
 
-    def _enter(self, limits: Limits | None) -> None:
-        """Begin."""
-        raise NotImplementedError
-
-    def _go_on(self) -> None:
-        """Begin, without a block that ends it."""
-        if runtime.current.front_end is None or runtime.current.front_end.scored:
-            raise Misuse("start() is for looking around in a notebook; a check is a block: with launch(…) as ros:")
-        if runtime.current.block is not None:
-            raise Misuse("A launch is started inside of another one's block; let that end before.")
-        before = runtime.current.robot
-        if before is not None:
-            before.stop()
-            print("What was started before has been stopped: one launch at a time goes on from cell to cell.")
-        self._enter(LIMITS)
-        self._begun_with = {node.program: _written(node.program) for node in self._running.described}
-        runtime.current.robot = self
+    def wait_for_nodes(self) -> None:
+        """Wait until each program has a node, or one has ended."""
 
         def there() -> bool:
             running = [program for _, program in self._running.programs if program.running()]
-            return len(running) < len(self._running.programs) or len(self._observer.nodes()) >= len(running)
+            return len(running) < len(self._running.programs) or len(self.observer.nodes()) >= len(running)
 
-        self._observer.wait(there, _THERE_WITHIN)
-        self.told_in = runtime.current.front_end.number
-        print(self.status())
-
-    def stop(self, name: str = "", *, kill: bool = False) -> None:
-        """End a program, or all."""
-        raise NotImplementedError
+        self.observer.wait(there, _THERE_WITHIN)
 
     def news(self) -> list[str]:
         """What has become of the programs since they were started, a sentence each."""
@@ -79,22 +64,37 @@ class Robot(Expectations):
         ]
         return ended + changed
 
-    def status(self) -> str:
+    def __str__(self) -> str:
         """What runs, where it can be looked at, and how it is ended."""
         running = [program.name for _, program in self._running.programs if program.running()]
         lines = self.news()
         if not running:
             return "\n".join([*lines, "Nothing runs any more."])
-        nodes = ", ".join(self._observer.nodes()) or "none yet"
-        domain = self._observer.domain_id
+        nodes = ", ".join(self.observer.nodes()) or "none yet"
+        terminal = f"ROS_DOMAIN_ID={self.observer.domain_id} {Path(sys.prefix) / 'bin' / 'ros2'} node list"
         return "\n".join(
             [
                 *lines,
                 f"running: {', '.join(running)} (nodes: {nodes})",
                 "  look at it with %ros2, as in `%ros2 node list`; end it with .stop()",
-                f"  in a terminal: ROS_DOMAIN_ID={domain} {Path(sys.prefix) / 'bin' / 'ros2'} node list",
+                f"  in a terminal: {terminal}",
             ]
         )
+
+
+def make_room() -> None:
+    """End what went on from cell to cell before.
+
+    Raises:
+        Misuse: nothing can go on from here.
+    """
+    if runtime.current.front_end is None or runtime.current.front_end.scored:
+        raise Misuse("start() is for looking around in a notebook; a check is a block: with launch(…) as ros:")
+    if runtime.current.block is not None:
+        raise Misuse("A launch is started inside of another one's block; let that end before.")
+    if runtime.current.robot is not None:
+        runtime.current.robot.stop()
+        print("What was started before has been stopped: one launch at a time goes on from cell to cell.")
 
 
 def _written(program: str) -> int:
