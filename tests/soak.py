@@ -22,7 +22,7 @@ from rich.table import Table
 
 from autograder.core.results import SubmissionResult
 from autograder.course.lab import Lab, load_lab
-from autograder.grading.pool import run_class
+from autograder.grading.class_runner import run_class
 from autograder.grading.runner import Settings
 
 BUSY_LOOPS = 4

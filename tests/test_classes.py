@@ -20,7 +20,7 @@ from autograder.authoring.mutation.reach import reached, using
 from autograder.core.results import CheckResult, SubmissionResult
 from autograder.course.lab import Cell, Lab, load_lab
 from autograder.grading.job import Job
-from autograder.grading.runner import Settings, job_of, run_submission
+from autograder.grading.runner import Settings, job_of, without_running
 from autograder.grading.supervisor import run_in_worker
 from autograder.submission.reader import read_submission
 
@@ -47,9 +47,10 @@ def grading(lab: Lab, student: str, into: Path, complete: bool) -> Grade:
     folder = sample_class.build_student(lab, student, into)
     path = next(iter(sorted(folder.glob("*.ipynb"))), folder / f"{lab.name}.ipynb")
     cells = list(lab.cells) if complete else cells_to_run(lab, student, path)
-    if cells == list(lab.cells):
-        return lambda stop: run_submission(path, student, lab, SETTINGS, stop=stop)
-    job = job_of(read_submission(path, lab), student, lab, SETTINGS).model_copy(update={"cells": cells})
+    submission = read_submission(path, lab)
+    job = job_of(submission, student, lab, SETTINGS).model_copy(update={"cells": cells})
+    if not submission.readable:
+        return lambda _: without_running(submission, job)
     return lambda stop: run_in_worker(job, stop)
 
 
@@ -90,7 +91,7 @@ def graded(
     wanted = [(p["lab_name"], p["student"]) for p in chosen if {"lab_name", "student"} <= p.keys()]
     into, complete = tmp_path_factory.mktemp("classes"), request.config.getoption("complete")
     stop = threading.Event()
-    with ThreadPoolExecutor(SETTINGS.parallel) as pool:
+    with ThreadPoolExecutor(SETTINGS.at_once) as pool:
         try:
             jobs = {
                 (name, student): grading(load_lab(ROOT, name), student, into / name, complete)

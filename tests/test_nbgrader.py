@@ -99,7 +99,7 @@ class Course:
 def course(tmp_path_factory: pytest.TempPathFactory) -> Any:
     """One course for the module, for a fresh gradebook takes seconds."""
     patch = pytest.MonkeyPatch()
-    patch.setattr(runner, "run_in_worker", lambda job, *_: validated(toy.judge(job), job.checks))
+    patch.setattr(runner, "run_in_workers", lambda job, *_: validated(toy.judge(job), job.checks))
     yield Course(tmp_path_factory.mktemp("nbgrader") / "course")
     patch.undo()
 

@@ -11,8 +11,8 @@ import toy
 from autograder.core.results import SubmissionResult
 from autograder.course.lab import load_lab
 from autograder.grading import runner, supervisor
+from autograder.grading.class_runner import run_class
 from autograder.grading.job import Job
-from autograder.grading.pool import run_class
 from autograder.grading.runner import Settings, run_submission
 from autograder.grading.store import ResultStore
 from autograder.grading.validation import validated
@@ -23,7 +23,7 @@ def test_as_many_run_at_once_as_the_cores_that_may_be_used_carry() -> None:
     usable = os.sched_getaffinity(0)
     os.sched_setaffinity(0, {min(usable)})
     try:
-        assert Settings().parallel == 5
+        assert Settings().at_once == 5
     finally:
         os.sched_setaffinity(0, usable)
 
@@ -56,7 +56,7 @@ def test_only_a_worker_without_a_result_is_asked_again(
         asked.append(job)
         return validated(toy.judge(job), job.checks) if gives_a_result else supervisor.unknown(job, "It died.")
 
-    monkeypatch.setattr(runner, "run_in_worker", worker)
+    monkeypatch.setattr(runner, "run_in_workers", worker)
     for expected in runs:
         assert run_submission(notebook, "ann", lab, Settings(), ResultStore(tmp_path)).needs_instructor
         assert len(asked) == expected

@@ -21,6 +21,8 @@ class CourseSettings(BaseModel):
     """Heading of the students' start page."""
     labs: list[str] = []
     """The labs in the course's order; those that it leaves out follow by their names."""
+    executor: str = "local"
+    """Who runs the jobs of a class, `NAME` or `NAME://ADDRESS`, by the names of `autograder.grading.executors`."""
 
 
 def read_settings(root: Path) -> CourseSettings:

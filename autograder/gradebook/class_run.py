@@ -14,7 +14,7 @@ from autograder.core.results import SubmissionResult
 from autograder.course.lab import load_lab
 from autograder.gradebook.grades import write_grades
 from autograder.gradebook.recorder import Recorder
-from autograder.grading.pool import run_class
+from autograder.grading.class_runner import run_class
 from autograder.grading.runner import Settings
 from autograder.submission.intake import collect
 

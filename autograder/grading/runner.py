@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import os
 import random
-import threading
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,7 +15,7 @@ from autograder.core.results import Isolation, SubmissionResult
 from autograder.course.lab import Lab
 from autograder.grading.job import Job
 from autograder.grading.store import ResultStore
-from autograder.grading.supervisor import run_in_worker, run_in_workers
+from autograder.grading.supervisor import run_in_workers
 from autograder.grading.validation import all_for_one_reason, lacks_a_result
 from autograder.submission.reader import read_submission
 from autograder.submission.submission import Submission
@@ -38,7 +37,7 @@ class Settings:
     """How many run at once; 0 lets the machine decide."""
 
     @property
-    def parallel(self) -> int:
+    def at_once(self) -> int:
         """How many run at once. A run mostly waits for messages, so a core carries several."""
         return self.jobs or min(20, 5 * len(os.sched_getaffinity(0)))
 
@@ -59,7 +58,6 @@ def run_submission(
     lab: Lab,
     settings: Settings,
     store: ResultStore | None = None,
-    stop: threading.Event | None = None,
     workers: int = 1,
 ) -> SubmissionResult:
     """Read one submission, run its checks in the sandbox, and return what came of it.
@@ -70,31 +68,26 @@ def run_submission(
         lab: that it answers.
         settings: how to run it.
         store: to keep the result in, and to take it from if nothing changed; None keeps nothing.
-        stop: when it is set, the run is ended.
         workers: that share its checks and run at once.
 
     Raises:
         KitError: this machine cannot isolate programs as asked.
-        Stopped: by `stop`; nothing is kept.
     """
     submission = read_submission(path, lab)
     known = stored(student, submission, lab, settings, store) if store is not None else None
     if known is not None:
         return known
-    result = _run(submission, student, lab, settings, stop, workers)
+    job = job_of(submission, student, lab, settings)
+    result = run_in_workers(job, workers) if submission.readable else without_running(submission, job)
     if store is not None:
         store.save(result)
     return result
 
 
-def _run(
-    submission: Submission, student: str, lab: Lab, settings: Settings, stop: threading.Event | None, workers: int
-) -> SubmissionResult:
-    job = job_of(submission, student, lab, settings)
-    if not submission.readable:
-        problem = submission.problems[-1].model_copy(update={"title": "there is a notebook to check"})
-        return job.result([all_for_one_reason(cell, problem, points=0.0) for cell in lab.checks])
-    return run_in_worker(job, stop) if workers == 1 else run_in_workers(job, workers)
+def without_running(submission: Submission, job: Job) -> SubmissionResult:
+    """Return the result of a submission that cannot be read: no check is passed."""
+    problem = submission.problems[-1].model_copy(update={"title": "there is a notebook to check"})
+    return job.result([all_for_one_reason(cell, problem, points=0.0) for cell in job.checks])
 
 
 def job_of(submission: Submission, student: str, lab: Lab, settings: Settings) -> Job:
