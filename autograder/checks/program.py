@@ -30,7 +30,7 @@ class Program:
     cores: int = 2
     """CPUs that the program may use: the same number on every machine that has them."""
     environment: Mapping[str, str] = field(default_factory=dict)
-    """Variables beside those that every program has."""
+    """Variables beside those that every program has. `ROS_DOMAIN_ID` puts it into another domain than the launch's."""
     warnings: Sequence[str] = ()
     """What a launch file names and does not have; the program starts without it."""
 
@@ -53,6 +53,11 @@ class Program:
     def all_rules(self) -> list[str]:
         """The remap rules, those that were typed included."""
         return self.rules() + remap_rules.rules_in([*self.arguments_of_its_own, *self._typed()])
+
+    def node_name(self) -> str:
+        """The name that the launch gives to the program's node; empty where it leaves that to the program."""
+        names = [rule.removeprefix("__node:=") for rule in self.all_rules() if rule.startswith("__node:=")]
+        return next(iter(names), "")
 
     def rules(self) -> list[str]:
         """The remap rules in the order in which they are given: the first that matches wins."""

@@ -29,7 +29,7 @@ class ProgramExpectations(Expectations):
         """The last started program of this name; a missing one is a failed outcome.
 
         Args:
-            name: of the program.
+            name: of the program, or of its node as the launch names it: that tells several runs of one program apart.
 
         Example:
             `printed = ros.program("talker").output()`
@@ -38,7 +38,7 @@ class ProgramExpectations(Expectations):
             `program-missing`, `nothing-started`.
         """
         for node, program in reversed(self._running.programs):
-            if node.program == name:
+            if name in (node.program, node.node_name()):
                 return program
         self._fail(f"The program `{name}` is there", diagnosis.program_trouble(self._scene()))
 
@@ -50,7 +50,8 @@ class ProgramExpectations(Expectations):
         """End one of several programs: politely (SIGTERM), or without a chance to clean up.
 
         Args:
-            name: of the program; without one, a launch that `start` began ends as a whole.
+            name: of the program, or of its node as the launch names it; without one, a launch that `start` began ends as a
+                whole.
             kill: end it without a chance to clean up.
 
         Example:
