@@ -747,3 +747,82 @@ def test_what_a_message_sets_off_is_heard_from_the_first_one_on(grade: Grade, ec
         echo__py=echo,
     )
     assert result.points == 2.0, result
+
+
+def test_one_run_of_a_program_is_killed_and_started_again_with_the_same_words(grade: Grade) -> None:
+    result = grade(
+        """\
+        def talker(side):
+            return Program("talker", namespace=f"/{side}", name=side, parameters={"word": side})
+
+
+        with launch(talker("left"), talker("right")) as ros:
+            for side in ("left", "right"):
+                ros.expect_messages(f"/{side}/chatter", String, at_least=3)
+            ros.stop("left", kill=True)
+            ros.require(not ros.program("left").running(), "The left one has ended")
+            ros.expect_running("right")
+            before = ros.listen("/left/chatter", String).count
+            ros.restart("left")
+            again = ros.expect_messages("/left/chatter", String, at_least=3, skip=before, publishers=2)
+            ros.require_equal("It has its word again", again[-1].data.split()[0], "left")
+        ros.score(2)
+        """,
+        talker__py=TALKER,
+    )
+    assert result.points == 2.0, result
+
+
+def test_what_still_runs_is_not_started_again(grade: Grade) -> None:
+    result = grade(
+        """\
+        with launch("talker") as ros:
+            ros.restart("talker")
+        ros.score(2)
+        """,
+        talker__py=TALKER,
+    )
+    assert result.points is None
+    assert "restart: `talker` still runs" in result.outcomes[0].because, result
+
+
+def test_programs_of_one_launch_in_two_domains_do_not_see_each_other(grade: Grade) -> None:
+    result = grade(
+        """\
+        with launch(Program("talker", name="stranger", environment={"ROS_DOMAIN_ID": "0"}),
+                    Program("talker", name="neighbour")) as ros:
+            ros.expect_messages("/chatter", String, at_least=10, publisher="/neighbour")
+            ros.expect_running("stranger")
+            ros.expect_no_node("/stranger")
+        ros.score(2)
+        """,
+        talker__py=TALKER,
+    )
+    assert result.points == 2.0, result
+
+
+@pytest.mark.parametrize(("evident", "code"), [("", "waits-for-service"), (", evident=True", "order")])
+def test_a_check_that_leaves_a_service_out_on_purpose_gives_its_own_reason(
+    grade: Grade, evident: str, code: str
+) -> None:
+    result = grade(
+        f"""\
+        with launch("asker") as ros:
+            ros.expect_node("/asker")
+            ros.wait(lambda: "waits" in ros.log("asker"))
+            ros.require(False, "The layers come in order", because="They did not.", code="order"{evident})
+        ros.score(2)
+        """,
+        asker__py="""
+import rclpy
+from std_srvs.srv import Trigger
+
+rclpy.init()
+node = rclpy.create_node("asker")
+client = node.create_client(Trigger, "gone")
+print("waits", flush=True)
+while not client.wait_for_service(timeout_sec=1.0):
+    rclpy.spin_once(node, timeout_sec=0.1)
+""",
+    )
+    assert failure(result).code == code

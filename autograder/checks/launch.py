@@ -173,6 +173,8 @@ class Launch(
     def restart(self, name: str) -> None:
         """Start a program of the launch once more, with the words that it was started with before.
 
+        One that was killed is still on the graph for a while: its topics have one publisher more than there is.
+
         Args:
             name: of the program, or of its node as the launch names it. It has ended, or `stop` has ended it.
 

@@ -23,6 +23,7 @@ class Facts(Expectations):
         because: str = "",
         hint: str = "",
         code: str = "",
+        evident: bool = False,
     ) -> None:
         """State a fact: passed if `condition` is true in Python's sense.
 
@@ -37,6 +38,8 @@ class Facts(Expectations):
             because: what is wrong if it does not hold.
             hint: a pointer for the student.
             code: of that reason.
+            evident: the check has seen that this is the reason, so what callbacks wait for or do not reach is none: in
+                a launch where something is missing or hangs on purpose, a right program waits as well.
 
         Example:
             `ros.require(reply.success, "The order is accepted", because=reply.message)`
@@ -49,7 +52,7 @@ class Facts(Expectations):
             return
         self._running.settle_programs()
         scene = self._scene()
-        found = (diagnosis.program_trouble(scene), diagnosis.inside_reason(scene))
+        found = (diagnosis.program_trouble(scene), None if evident else diagnosis.inside_reason(scene))
         # Where the check has a reason, these say less: they are what a program looks like that does nothing more.
         vague = ("exited", "not-spinning", "spinning-ended") if because else ()
         trouble = next((one for one in found if one and one.code not in vague), None)

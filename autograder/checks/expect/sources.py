@@ -10,6 +10,11 @@ from autograder.diagnosis import Diagnosis
 from autograder.graph.names import full_name
 from autograder.graph.recording import Received
 
+_UNKNOWN = "_NODE_NAME_UNKNOWN_"
+"""What rmw calls the node of an endpoint that has been heard of before its node."""
+_NAMED_WITHIN = 2.0
+"""Seconds that the word of which node an endpoint belongs to may be under way."""
+
 
 class SourceExpectations(EndExpectations):
     """What expectations of messages ask of their publishers."""
@@ -20,6 +25,10 @@ class SourceExpectations(EndExpectations):
         """Fail if the messages may come from another publisher than the one that is meant."""
         if not received:
             return
+        self._observer.wait(
+            lambda: all(end.node_name != _UNKNOWN for end in self._ends(topic, msg_type, "publisher", "")),
+            _NAMED_WITHIN,
+        )
         ends = self._ends(topic, msg_type, "publisher", "")
         owners = [full_name(end.node_namespace, end.node_name) for end in ends]
         named = ", ".join(sorted(owners))
