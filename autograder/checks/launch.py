@@ -170,25 +170,6 @@ class Launch(
         program = self._group.start(launched.program, words, environment, cores=launched.cores)
         self._running.programs.append((launched, program))
 
-    def restart(self, name: str) -> None:
-        """Start a program of the launch once more, with the words that it was started with before.
-
-        One that was killed is still on the graph for a while: its topics have one publisher more than there is.
-
-        Args:
-            name: of the program, or of its node as the launch names it. It has ended, or `stop` has ended it.
-
-        Example:
-            `ros.restart("planner")`
-
-        Codes:
-            those of `program`.
-        """
-        wanted = self.program(name)
-        if wanted.running():
-            raise Misuse(f"restart: `{name}` still runs; end it with ros.stop({name!r}) before.")
-        self.start(next(launched for launched, program in self._running.programs if program is wanted))
-
     def _miss(self, program: str) -> None:
         """No cell has written this program."""
         here = runtime.current.front_end

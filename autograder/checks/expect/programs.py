@@ -13,6 +13,7 @@ from autograder import diagnosis
 from autograder.checks import outcomes
 from autograder.checks.expect.expectations import WITHIN, Expectations
 from autograder.checks.misuse import Misuse
+from autograder.checks.program import Program
 from autograder.diagnosis import Diagnosis
 from autograder.graph.clock import ClockDriver
 from autograder.graph.recording import Recording
@@ -46,12 +47,15 @@ class ProgramExpectations(Expectations):
         """End the launch."""
         raise NotImplementedError
 
+    def _start(self, node: Program | str) -> None:
+        """Start one more program."""
+        raise NotImplementedError
+
     def stop(self, name: str = "", *, kill: bool = False) -> None:
         """End one of several programs: politely (SIGTERM), or without a chance to clean up.
 
         Args:
-            name: of the program, or of its node as the launch names it; without one, a launch that `start` began ends as a
-                whole.
+            name: of the program, or of its node as the launch names it; without one, a launch that `start` began ends.
             kill: end it without a chance to clean up.
 
         Example:
@@ -67,6 +71,25 @@ class ProgramExpectations(Expectations):
         self._running.may_end.append(program)
         self._running.stopped.append(program)
         program.stop(grace=0.0 if kill else 2.0)
+
+    def restart(self, name: str) -> None:
+        """Start a program of the launch once more, with the words that it was started with before.
+
+        One that was killed is still on the graph for a while: its topics have one publisher more than there is.
+
+        Args:
+            name: of the program, or of its node as the launch names it. It has ended, or `stop` has ended it.
+
+        Example:
+            `ros.restart("planner")`
+
+        Codes:
+            those of `program`.
+        """
+        wanted = self.program(name)
+        if wanted.running():
+            raise Misuse(f"restart: `{name}` still runs; end it with ros.stop({name!r}) before.")
+        self._start(next(launched for launched, program in self._running.programs if program is wanted))
 
     def expect_running(self, name: str, *, hint: str = "") -> None:
         """A program has not ended.

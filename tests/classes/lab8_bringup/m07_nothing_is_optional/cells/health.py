@@ -23,7 +23,8 @@ class Health(Node):
         self.last[topic] = time.monotonic()
 
     def tell(self):
-        silent = [topic for topic in self.last if not self.count_publishers(topic)]
+        oldest = time.monotonic() - 1000 * self.get_parameter("silence").value
+        silent = [topic for topic, last in self.last.items() if last is None or last < oldest]
         self.publisher.publish(String(data=" ".join(silent) or "ok"))
 
 
