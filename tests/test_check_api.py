@@ -23,7 +23,7 @@ EXPECTATIONS = """
 """
 WAITING = "wait wait_for_graph pause"
 SENDING = """
-    call call_many clock open_publisher publish send_goal serve set_parameter start stop stream transition
+    call call_many clock open_publisher publish restart send_goal serve set_parameter start stop stream transition
 """
 LOOKING = """
     account available_transitions changes concurrency descriptions get_parameters kept_waiting list_parameters
