@@ -305,6 +305,31 @@ def test_no_name_in_a_zip_stops_a_class(names: list[str], tmp_path: Path) -> Non
         assert taken["bob"].read_text() == "bob's work"
 
 
+@pytest.mark.parametrize("zipped", [False, True])
+def test_when_it_was_handed_in_is_taken_if_it_is_a_time(tmp_path: Path, zipped: bool) -> None:
+    course = toy.make_course(tmp_path / "course")
+    said = {
+        "ann": "2026-11-02 14:30:00.123456 UTC\n",
+        "bob": "{{ evil }}",
+        "cem": "2026-11-02 14:30" + " " * 9000 + "x",
+    }
+    for student, text in said.items():
+        toy.hand_in(tmp_path / "class", student, "{").with_name("timestamp.txt").write_text(text, encoding="utf-8")
+    source = tmp_path / "class"
+    if zipped:
+        source = tmp_path / "class.zip"
+        with zipfile.ZipFile(source, "w") as archive:
+            for path in (tmp_path / "class").rglob("*.*"):
+                archive.write(path, path.relative_to(tmp_path))
+    collected = collect(source, toy.LAB, course)
+    stamps = {who: path.with_name("timestamp.txt") for who, path in collected.notebooks.items()}
+    assert stamps["ann"].read_text(encoding="utf-8") == "2026-11-02 14:30:00.123456 UTC"
+    assert not stamps["bob"].exists() and collected.refused[0].startswith("timestamp.txt of bob is no date and time")
+    (tmp_path / "class" / "ann" / "timestamp.txt").unlink()
+    collect(tmp_path / "class", toy.LAB, course)
+    assert not stamps["ann"].exists()
+
+
 @pytest.mark.parametrize("source", ["\n \t" * 20_000 + '"', "a." * 30_000, '"' + "x" * 500])
 def test_code_that_would_take_the_colouring_long_is_shown_plain(source: str) -> None:
     from autograder.gradebook.feedback import ColouredCode

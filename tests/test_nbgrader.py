@@ -17,12 +17,16 @@ import toy
 
 from autograder.authoring.release import release
 from autograder.core.errors import KitError
+from autograder.core.results import Isolation
 from autograder.course.lab import Lab, grade_id_of, load_lab
+from autograder.gradebook.class_run import grade_class
 from autograder.gradebook.grades import write_grades
 from autograder.gradebook.preparation import prepare_nbgrader
 from autograder.gradebook.recorder import Recorder
 from autograder.gradebook.release import register
+from autograder.gradebook.settings import TEMPLATE
 from autograder.grading import runner
+from autograder.grading.executors import local
 from autograder.grading.runner import Settings
 from autograder.grading.store import ResultStore
 from autograder.grading.validation import validated
@@ -311,6 +315,48 @@ def test_a_manual_grade_stays_and_reaches_the_feedback(course: Course) -> None:
     assert "(Score: 7.5 / 9.0)" in course.feedback("manual")
     course.grade("manual", force=True)
     assert "manual,toy,7.5,9,0\n" in write_grades(course.root).read_text()
+
+
+LATE = """
+import nbgrader.plugins
+
+
+class PerHour(nbgrader.plugins.BasePlugin):
+    def late_submission_penalty(self, student_id, score, total_seconds_late):
+        return 0.5 * (total_seconds_late // 3600)
+
+
+get_config().AssignLatePenalties.plugin_class = PerHour
+"""
+
+
+def test_who_is_late_has_the_same_score_everywhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(local, "run_in_worker", lambda job, *_: validated(toy.judge(job), job.checks))
+    late = Course(tmp_path / "course")
+    template = TEMPLATE.read_text(encoding="utf-8")
+    (late.root / "nbgrader_config.py").write_text(template + LATE, encoding="utf-8")
+    for student, hour in (("ann", "11:59"), ("bob", "14:10")):
+        notebook = toy.hand_in(tmp_path / "class", student, late.cells())
+        notebook.with_name("timestamp.txt").write_text(f"2026-11-02 {hour}:00.5 UTC\n", encoding="utf-8")
+    prepare_nbgrader()
+    from nbgrader.api import Gradebook
+
+    address = f"sqlite:///{late.root / 'build' / 'gradebook.db'}"
+    (late.root / "build").mkdir()
+    with Gradebook(address) as gradebook:
+        gradebook.add_assignment(toy.LAB, duedate="2026-11-02 12:00 UTC")
+    run = grade_class(late.root, toy.LAB, tmp_path / "class", Settings(isolation=Isolation.NONE))
+    assert run.unrecorded == {} and run.refused == []
+    assert run.grades.read_text().splitlines()[1:] == ["ann,toy,5,9,1", "bob,toy,4,9,1"]
+    assert "(Score: 5.0 / 9.0)" in late.feedback("ann") and "(Score: 4.0 / 9.0)" in late.feedback("bob")
+    assert "Late submission penalty (Score: -1.0)" in late.feedback("bob")
+    with Gradebook(address) as gradebook:
+        submission = gradebook.find_submission(toy.LAB, "bob")
+        assert submission.score - submission.late_submission_penalty == 4.0
+    (tmp_path / "class" / "bob" / "timestamp.txt").write_text("2026-11-02T12:00:00Z", encoding="utf-8")
+    again = grade_class(late.root, toy.LAB, tmp_path / "class", Settings(isolation=Isolation.NONE))
+    assert again.grades.read_text().splitlines()[2] == "bob,toy,5,9,1"
+    assert "(Score: 5.0 / 9.0)" in late.feedback("bob")
 
 
 def test_changed_graded_cells_are_refused_with_a_way_out(course: Course, tmp_path: Path) -> None:

@@ -15,8 +15,9 @@ from autograder.gradebook.settings import gradebook_address, gradebook_file
 def write_grades(root: Path) -> Path:
     """Write `build/grades.csv` from the gradebook and return its path.
 
-    A row for each student and lab. The score stays empty as long as a check waits for an instructor's verdict.
-    `waiting` counts the cells that a person has yet to grade: those checks, and explanations, which count 0 until then.
+    A row for each student and lab. The score is what is left after nbgrader's penalty for who was late; it stays empty
+    as long as a check waits for an instructor's verdict. `waiting` counts the cells that a person has yet to grade:
+    those checks, and explanations, which count 0 until then.
     """
     paths = CoursePaths(root)
     path = paths.grades
@@ -33,7 +34,8 @@ def write_grades(root: Path) -> Path:
             for submission in assignment.submissions:
                 grades = [grade for notebook in submission.notebooks for grade in notebook.grades]
                 waiting = [grade.name for grade in grades if grade.auto_score is None and grade.manual_score is None]
-                score = "" if set(waiting) - answers else f"{sum(grade.score for grade in grades):g}"
+                left = max(0.0, sum(grade.score for grade in grades) - submission.late_submission_penalty)
+                score = "" if set(waiting) - answers else f"{left:g}"
                 top = f"{sum(grade.max_score for grade in grades):g}"
                 rows.append((submission.student_id, assignment.name, score, top, len(waiting)))
     text = io.StringIO()

@@ -15,6 +15,7 @@ from autograder.gradebook.api import answered, last_error, open_api
 from autograder.gradebook.release import register
 from autograder.gradebook.settings import gradebook_file
 from autograder.grading.store import ResultStore
+from autograder.submission import timestamp
 
 
 class Recorder:
@@ -75,7 +76,8 @@ class Recorder:
         """The steps of nbgrader's that a student needs; none if neither the result nor a grade changed."""
         recorded = self._paths.autograded_notebook(student, self._lab.name)
         result = self._store.path(self._lab.name, student)
-        if self._force or modified(recorded) < max(modified(result), modified(self._lab.notebook)):
+        handed_in = self._paths.submitted_notebook(student, self._lab.name).with_name(timestamp.FILE_NAME)
+        if self._force or modified(recorded) < max(map(modified, (result, self._lab.notebook, handed_in))):
             return ["autograde", "generate_feedback"]
         # The gradebook was younger than the feedback where somebody graded by hand since.
         stale = modified(self._paths.feedback_page(student, self._lab.name)) < self._last_grade

@@ -1,7 +1,8 @@
 """Takes in what was handed in: a folder or a zip with a folder for each student, into `build/submitted`.
 
-Of each student only the lab's notebook is taken, as bytes. Names are checked, links are not followed, nothing is
-unpacked to a place that a name in a zip could choose. What is not taken is said, and costs nobody else anything.
+Of each student only the lab's notebook is taken, as bytes, and when it was handed in. Names are checked, links are not
+followed, nothing is unpacked to a place that a name in a zip could choose. What is not taken is said, and costs nobody
+else anything.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from pathlib import Path, PurePosixPath
 from autograder.core.errors import KitError
 from autograder.core.files import read_plain, write_beside
 from autograder.course.paths import CoursePaths
+from autograder.submission import timestamp
 from autograder.submission.notebook_file import NOTEBOOK_BYTES
 
 _NAME_BYTES = 120
@@ -39,6 +41,16 @@ import sys
 
 sys.exit("This folder is not a course: start nbgrader in the folder above it. Nothing was executed.")
 """
+
+
+@dataclass
+class _HandedIn:
+    """What lies in a student's folder."""
+
+    notebook: bytes = b""
+    """Empty: there is none that can be used."""
+    timestamp: bytes = b""
+    """Empty: nothing says when it was handed in."""
 
 
 @dataclass
@@ -70,7 +82,7 @@ def collect(source: Path, lab: str, root: Path) -> Collected:
     if found and not (paths.build / "nbgrader_config.py").is_file():
         write_beside(paths.build / "nbgrader_config.py", _CLOSED)
     owners: dict[str, str] = {}
-    for folder, content in sorted(found.items()):
+    for folder, handed_in in sorted(found.items(), key=lambda item: item[0]):
         student = _student(folder)
         if student is None:
             collected.refused.append(f"The folder {folder[:80]!r} cannot be a student's name; it was left out.")
@@ -84,13 +96,26 @@ def collect(source: Path, lab: str, root: Path) -> Collected:
             collected.refused.append(f"The name {folder[:80]!r} is too long; the student is called {student!r} here.")
         path = paths.submitted_notebook(student, lab)
         # An unchanged file keeps its time: nbgrader and people can see that nothing new was handed in.
-        if _read(paths.submitted, [student, lab, path.name]) != content:
+        if _read(paths.submitted, [student, lab, path.name]) != handed_in.notebook:
             _make_room(paths.submitted, student, lab)
-            write_beside(path, content)
+            write_beside(path, handed_in.notebook)
+        _keep_timestamp(paths.submitted, student, lab, handed_in.timestamp, collected.refused)
         collected.notebooks[student] = path
     if not collected.notebooks:
         raise KitError(f"There are no submissions in {source}.", f"Each student needs a folder that holds {lab}.ipynb.")
     return collected
+
+
+def _keep_timestamp(submitted: Path, student: str, lab: str, content: bytes, refused: list[str]) -> None:
+    """Write when a student handed in to where nbgrader looks for it, which decides about penalties."""
+    path = submitted / student / lab / timestamp.FILE_NAME
+    said = timestamp.moment(content) if content else ""
+    if said is None:
+        refused.append(f"{timestamp.FILE_NAME} of {student} is no date and time; it was left out.")
+    if not said:
+        path.unlink(missing_ok=True)
+    elif _read(submitted, [student, lab, path.name]) != said.encode():
+        write_beside(path, said)
 
 
 def _student(folder: str) -> str | None:
@@ -126,8 +151,8 @@ def _make_room(submitted: Path, student: str, lab: str) -> None:
             path.unlink()
 
 
-def _from_folder(source: Path, lab: str, refused: list[str]) -> dict[str, bytes]:
-    found: dict[str, bytes] = {}
+def _from_folder(source: Path, lab: str, refused: list[str]) -> dict[str, _HandedIn]:
+    found: dict[str, _HandedIn] = {}
     for entry in sorted(source.iterdir()):
         if entry.name.startswith(_PACKERS_PREFIXES):
             continue
@@ -135,9 +160,9 @@ def _from_folder(source: Path, lab: str, refused: list[str]) -> dict[str, bytes]
             refused.append(f"{_shown(entry)} is a link; links are not followed, so it was left out.")
         elif entry.is_dir():
             try:
-                found[entry.name] = _notebook_in(source, entry.name, lab)
+                found[entry.name] = _HandedIn(_notebook_in(source, entry.name, lab), _stamp_in(source, entry.name, lab))
             except OSError as error:  # such as a folder that may not be entered: the class goes on
-                found[entry.name] = b""
+                found[entry.name] = _HandedIn()
                 why = f"{_shown(entry)} cannot be read ({error.strerror})"
                 refused.append(f"{why}; it counts as handed in without a notebook.")
     return found
@@ -167,6 +192,13 @@ def _notebook_in(source: Path, student: str, lab: str) -> bytes:
     return read_plain(source, [student, *others[0]], NOTEBOOK_BYTES + 1) if len(others) == 1 else b""
 
 
+def _stamp_in(source: Path, student: str, lab: str) -> bytes:
+    for folders in ([], [lab]):
+        with contextlib.suppress(OSError):
+            return read_plain(source, [student, *folders, timestamp.FILE_NAME], timestamp.MOST_BYTES)
+    return b""
+
+
 def _open_zip(source: Path, lab: str) -> zipfile.ZipFile:
     try:
         return zipfile.ZipFile(source)
@@ -177,8 +209,8 @@ def _open_zip(source: Path, lab: str) -> zipfile.ZipFile:
         ) from error
 
 
-def _from_zip(source: Path, lab: str, refused: list[str]) -> dict[str, bytes]:
-    found: dict[str, bytes] = {}
+def _from_zip(source: Path, lab: str, refused: list[str]) -> dict[str, _HandedIn]:
+    found: dict[str, _HandedIn] = {}
     others: dict[str, list[zipfile.ZipInfo]] = {}
     with _open_zip(source, lab) as archive:
         members = archive.infolist()
@@ -191,14 +223,16 @@ def _from_zip(source: Path, lab: str, refused: list[str]) -> dict[str, bytes]:
             if len(inside) < 2:
                 continue
             student, rest = inside[0], inside[1:]
-            found.setdefault(student, b"")
+            handed_in = found.setdefault(student, _HandedIn())
             if rest in ((f"{lab}.ipynb",), (lab, f"{lab}.ipynb")):
-                found[student] = _member(archive, member, refused)
+                handed_in.notebook = _member(archive, member, refused)
+            elif rest in ((timestamp.FILE_NAME,), (lab, timestamp.FILE_NAME)):
+                handed_in.timestamp = _member(archive, member, refused)[: timestamp.MOST_BYTES]
             elif rest[-1].endswith(".ipynb") and (len(rest) == 1 or rest[:-1] == (lab,)):
                 others.setdefault(student, []).append(member)
         for student, candidates in others.items():
-            if not found[student] and len(candidates) == 1:
-                found[student] = _member(archive, candidates[0], refused)
+            if not found[student].notebook and len(candidates) == 1:
+                found[student].notebook = _member(archive, candidates[0], refused)
     return found
 
 
