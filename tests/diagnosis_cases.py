@@ -534,6 +534,12 @@ CASES = {
         ask=trouble,
         never=("crashed", "not-spinning"),
     ),
+    "exits_after_one": Case(
+        main="rclpy.spin_once(node, timeout_sec=0.1)",
+        says="exited",
+        because="`) runs one callback at the most and returns",
+        ask=trouble,
+    ),
     "exits_unspun": Case(main="pass", says="not-spinning", ask=trouble, never=("exited",)),
     "undeclared": Case(
         "self.get_parameter('rate')\n", says="parameter-not-declared", ask=trouble, never=("parameter-type", "crashed")

@@ -264,11 +264,14 @@ def test_a_check_that_breaks_takes_no_points_and_gives_none(grade: Grade, check:
     assert result.status is Status.UNKNOWN
 
 
-def test_a_second_publisher_on_a_counted_topic_is_told(grade: Grade) -> None:
-    twice = TALKER.replace(
-        "        self.count = 0\n",
-        '        self.count = 0\n        self.more = self.create_publisher(String, "chatter", 10)\n',
-    )
+USED = "        self.create_timer(0.05, lambda: self.more.publish(String()))\n"
+OF_ANOTHER_NODE = '        self.more = rclpy.create_node("more").create_publisher(String, "chatter", 10)\n'
+MADE_TWICE = '        self.more = self.create_publisher(String, "chatter", 10)\n'
+
+
+@pytest.mark.parametrize("more", [MADE_TWICE + USED, OF_ANOTHER_NODE], ids=["used", "of another node"])
+def test_a_second_publisher_on_a_counted_topic_is_told(grade: Grade, more: str) -> None:
+    twice = TALKER.replace("        self.count = 0\n", "        self.count = 0\n" + more)
     result = grade(
         """\
         with launch("talker") as ros:
@@ -278,6 +281,18 @@ def test_a_second_publisher_on_a_counted_topic_is_told(grade: Grade) -> None:
         talker__py=twice,
     )
     assert failure(result).code == "extra-publisher"
+
+
+def test_a_publisher_that_its_node_makes_once_more_and_never_uses_is_no_mistake(grade: Grade) -> None:
+    result = grade(
+        """\
+        with launch("talker") as ros:
+            ros.expect_messages("/chatter", String, at_least=3, publisher="/talker")
+        ros.score(2)
+        """,
+        talker__py=TALKER.replace("        self.count = 0\n", "        self.count = 0\n" + MADE_TWICE),
+    )
+    assert result.points == 2.0
 
 
 TWIN = """

@@ -18,6 +18,7 @@ from autograder.launch_files import (
     LaunchedNode,
     LaunchFileError,
     ParamsFile,
+    declared_arguments,
     read_launch_file,
     remove_written,
 )
@@ -224,6 +225,34 @@ def test_what_cannot_be_read_is_said_with_its_place(tmp_path: Path, text: str, t
     message = refusal(tmp_path, text)
     assert told in message
     assert message.startswith("a.launch.yaml")
+
+
+@pytest.mark.parametrize(
+    ("text", "hint"),
+    [
+        (f'launch:\n{CAMERA}, name: "$(arg side)"}}\n', "In ROS 2 it is `$(var NAME)`"),
+        (f'launch:\n{CAMERA}, name: "${{side}}"}}\n', "`$(var NAME)`"),
+        ("launch:\n- group:\n    include: {file: x}\n", "Below `group:` stands a list"),
+        ("launch:\n- include: {file: $(dirname)/a_launch.yaml}\n", "Is `a.launch.yaml` meant?"),
+    ],
+)
+def test_what_is_often_meant_is_in_the_hint(tmp_path: Path, text: str, hint: str) -> None:
+    (tmp_path / "a.launch.yaml").write_text(text)
+    with pytest.raises(LaunchFileError) as caught:
+        read_launch_file(tmp_path / "a.launch.yaml", {})
+    assert hint in caught.value.hint
+
+
+def test_an_argument_that_is_spelt_otherwise_is_named(tmp_path: Path) -> None:
+    text = f'launch:\n- arg: {{name: side, default: x}}\n{CAMERA}, name: "$(var sied)"}}\n'
+    assert "`side` is there; is that meant?" in refusal(tmp_path, text)
+
+
+def test_the_arguments_that_a_file_declares_are_known(tmp_path: Path) -> None:
+    (tmp_path / "a.launch.yaml").write_text(
+        "launch:\n- arg: {name: side}\n- group:\n  - arg: {name: rate, default: x}\n"
+    )
+    assert declared_arguments(tmp_path / "a.launch.yaml") == ["side", "rate"]
 
 
 def test_a_file_that_is_missing(tmp_path: Path) -> None:

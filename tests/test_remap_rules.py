@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -89,6 +90,7 @@ def test_a_rule_that_rcl_takes_is_not_blamed(rule: str) -> None:
         (["__node:=rear", "/camera_demo/status:=image"], "/image", "private-rule"),
         (["__node:=rear", "camera_demo/status:=image"], "/image", "private-rule"),
         (["__ns:=/x", "/camera/image_color:=image"], "/x/image", "absolute-rule"),
+        (["front/image:=camera/image_color"], "/front/image", "rule-without-match"),
     ],
 )
 def test_a_rule_without_effect_is_explained(rules: list[str], wanted: str, code: str) -> None:
@@ -97,6 +99,54 @@ def test_a_rule_without_effect_is_explained(rules: list[str], wanted: str, code:
     reason = remap_rules.without_effect(rules, wanted, [node], topics)
     assert reason is not None
     assert reason[1] == code
+
+
+def test_a_swapped_rule_is_told_from_one_that_is_misspelt() -> None:
+    node, topics = names(["front/image:=camera/image_color"])
+    for rule, said in (("front/image:=camera/image_color", True), ("camera/image_colour:=front/image", False)):
+        reason = remap_rules.without_effect([rule], "/front/image", [node], topics)
+        assert reason is not None and ("swapped" in reason[0]) == said
+
+
+def test_what_renames_no_node_is_told() -> None:
+    assert names(["camera_demo:=front"])[0] == "/camera_demo"
+    found = remap_rules.node_without_effect(["camera_demo:=front"], "/front", ["/camera_demo"])
+    assert found is not None and found[1] == "rule-kind" and "-r __node:=front" in found[2]
+    assert remap_rules.node_without_effect(["camera_demo:=rear"], "/front", ["/camera_demo"]) is None
+    given = remap_rules.renames_nothing(["a:=1", "camera_name:=front"], "/front")
+    assert given is not None and given[0].startswith("`-p camera_name:=front` gives a parameter")
+    assert remap_rules.renames_nothing(["a:=1", "camera_name:=rear"], "/front") is None
+
+
+def test_a_value_given_with_the_option_for_rules_leads_to_the_one_for_parameters() -> None:
+    found, other = remap_rules.refused(["camera_rate:=40"]), remap_rules.refused(["camera:=2nd"])
+    assert found is not None and "-p camera_rate:=40" in found[2]
+    assert other is not None and "-p" not in other[2]
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "words"),
+    [
+        ("/a:\n  ros_parameters:\n    b: 1\n", 4, "no `name: value` below `ros__parameters:`"),
+        ("/a:\n  b: 1\n", 3, "no `name: value` below `ros__parameters:`"),
+        ("/a:\n  ros__parameters:\n    - b: 1\n    - c: 2\n", 5, "no `name: value` below `ros__parameters:`"),
+        ("/a:\n  ros__parameters: &x {b: 1}\n/c:\n  ros__parameters: *x\n", 5, "an anchor"),
+        ("/a/:\n  ros__parameters:\n    b: 1\n", 0, "ends with a slash"),
+        ("/a:\n  /a/c:\n    ros__parameters:\n      b: 1\n", 0, "which is no node's name"),
+    ],
+)
+def test_a_parameter_file_that_rcl_refuses_is_explained(tmp_path: Path, text: str, line: int, words: str) -> None:
+    (tmp_path / "car.yaml").write_text(text)
+    with contextlib.chdir(tmp_path), pytest.raises(Exception, match="params file") as caught:
+        rclpy.init(context=rclpy.Context(), args=["x", "--ros-args", "--params-file", "car.yaml"])
+    found = params_file.why_refused(f"Traceback\nRCLError: {caught.value}", tmp_path)
+    assert found is not None and words in found[0]
+    assert not line or f"line {line} of the cell" in found[0]
+
+
+def test_the_names_in_a_parameter_file_are_known_by_node() -> None:
+    text = "/a/b:\n  ros__parameters: {x: 1, y: 2}\n/**:\n  ros__parameters: {z: 3}\n/c:\n  ros__parameters: {v: 4}\n"
+    assert sorted(params_file.names_for(text, "/a/b")) == ["x", "y", "z"]
 
 
 def test_an_absolute_name_in_the_code_is_told_from_a_wrong_rule() -> None:

@@ -135,3 +135,12 @@ def test_a_file_is_read_or_named(tmp_path: Path) -> None:
         read(path)
     path.write_text("a: ü", encoding="utf-8")
     assert read(path) == {"a": "ü"}
+
+
+def test_in_a_table_a_line_that_stands_twice_costs_itself_only_and_a_value_may_have_an_anchor() -> None:
+    read = load("a: &same none\nb: *same\nc: 1\nd: 2\nc: 3\n", table=True)
+    assert {key: read[key] for key in "abd"} == {"a": "none", "b": "none", "d": 2}
+    assert str(read["c"]) == "stands there twice, in lines 4 and 6 of the cell"
+    for grows in ("a: &many [1]\nb: *many", "a: &many {b: 1}", "a: *nothing"):
+        with pytest.raises(StudentFileError):
+            load(grows, table=True)

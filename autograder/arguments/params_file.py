@@ -3,11 +3,34 @@
 from __future__ import annotations
 
 import itertools
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from autograder.core.student_yaml import StudentFileError, load, read
+
+_REFUSED = re.compile(
+    r"parse params file: '--params-file (?P<file>[^']+)'\. Error: (?P<what>.*?)"
+    r"(?: at line (?P<line>\d+))?(?:, at /|\s*$)",
+    re.MULTILINE,
+)
+"""What rcl says of a parameter file that it cannot read."""
+_ABOVE = (
+    "Below a node's name stands `ros__parameters:`, with two underscores, and below that, indented further, the names "
+    "of the parameters with their values, without dashes."
+)
+_WHOLE = (
+    "The key is the node's full name, such as `/car/front_demo:`; of keys that stand below one another each is a part "
+    "of it."
+)
+_IN_WORDS = {
+    "value before ros__parameters": ("has a value there that is no `name: value` below `ros__parameters:`", _ABOVE),
+    "aliasing": ("has an anchor (`&`) or an alias (`*`), which ROS 2 does not read", "Write the values out."),
+    "repeated forward slash": ("has keys that together make `{what}`, which is no node's name", _WHOLE),
+    "node name must not be empty": ("has a key that ends with a slash", _WHOLE),
+}
+"""By rcl's words: what is wrong, and what to do."""
 
 
 def unreadable(words: Sequence[str], folder: Path) -> StudentFileError | None:
@@ -44,6 +67,38 @@ def node_keys(text: str) -> list[str]:
 
     walk(content, "", 0)
     return found
+
+
+def names_for(text: str, node: str) -> list[str]:
+    """The names of the parameters that the file has values for, as far as they are for this node."""
+    try:
+        content = load(text)
+    except StudentFileError:
+        return []
+    found: list[str] = []
+
+    def walk(part: Any, path: str, depth: int) -> None:
+        for key, below in part.items() if isinstance(part, dict) and depth <= 10 else ():
+            if key == "ros__parameters" and is_for(path or "/", node) and isinstance(below, dict):
+                found.extend(map(str, below))
+            elif key != "ros__parameters":
+                walk(below, f"{path}/{str(key).strip('/')}", depth + 1)
+
+    walk(content, "", 0)
+    return found
+
+
+def why_refused(error: str, folder: Path) -> tuple[str, str, str] | None:
+    """Why rcl could not read a parameter file, by what a program printed: a sentence, a short word, what to do."""
+    match = _REFUSED.search(error)
+    if match is None or not (folder / match["file"]).is_file():
+        return None
+    at = f", line {int(match['line']) + 1} of the cell," if match["line"] else ""
+    words, hint = next(
+        ((ours, what_to_do) for theirs, (ours, what_to_do) in _IN_WORDS.items() if theirs in match["what"]),
+        (f"is refused by ROS 2: {match['what']}", "Look at the keys and the indentation there."),
+    )
+    return f"`{match['file']}`{at} {words.format(what=match['what'].split(' ')[0])}.", "params-file", hint
 
 
 def is_for(key: str, node: str) -> bool:

@@ -85,7 +85,27 @@ def without_effect(
             reason = why(case)
             if reason:
                 return reason
+    for rule in read:
+        for node in _own_nodes(rules, nodes):
+            reason = _swapped(_Case(rule, 0, node, read, [n for n, of in users.items() if node in of], nodes, wanted))
+            if reason:
+                return reason
     return None
+
+
+def _swapped(case: _Case) -> Reason | None:
+    old = full_name(case.rule.right, case.node)
+    if not case.is_for(case.rule) or case.left != case.wanted or case.left in case.used or old not in case.used:
+        return None
+    if any(rule is not case.rule for rule in case.makes(old)):
+        return None
+    return (
+        f"{case.said} nothing is called `{case.left}`, the name on its left side, and `{old}`, the one on its right, "
+        "is there: old and new are swapped.",
+        "rule-without-match",
+        "The name in the code stands on the left (in a launch file, in `from`): "
+        f"`{case.rule.right}:={case.rule.left}`.",
+    )
 
 
 def node_without_effect(rules: Sequence[str], wanted: str, nodes: Sequence[str]) -> Reason | None:
@@ -97,6 +117,13 @@ def node_without_effect(rules: Sequence[str], wanted: str, nodes: Sequence[str])
         nodes: full names of the nodes on the graph.
     """
     space, _, base = wanted.rpartition("/")
+    for rule in map(parse, rules):
+        if rule and rule.renames_topics and rule.right == base:
+            return (
+                f"The rule `{rule.text}` renames topics and services, and no node.",
+                "rule-kind",
+                f"A node's name is given with `__node`: `-r __node:={base}`.",
+            )
     names, spaces = {node.rpartition("/")[2] for node in nodes}, {node.rpartition("/")[0] for node in nodes}
     for rule in map(parse, rules):
         if rule is None or not rule.prefix:
@@ -120,6 +147,25 @@ def node_without_effect(rules: Sequence[str], wanted: str, nodes: Sequence[str])
                 f"{', '.join(nodes)}).",
                 "rule-prefix",
                 "The prefix of a `__ns` rule is the name that the node has now, after `__node`.",
+            )
+    return None
+
+
+def renames_nothing(parameter_rules: Sequence[str], wanted: str) -> Reason | None:
+    """Why `-p`, given the name that should be there for a value, did not make it.
+
+    Args:
+        parameter_rules: of one program, `name:=value` each.
+        wanted: the full name of a node, a topic or a service that should be there, and is not.
+    """
+    for text in parameter_rules:
+        value = text.partition(":=")[2].strip("'\"")
+        if value and value in (wanted, wanted.removeprefix("/"), wanted.rpartition("/")[2]):
+            return (
+                f"`-p {text}` gives a parameter its first value; it renames nothing.",
+                "rule-kind",
+                "Names are changed with `-r`: `__node:=NEW` for a node, `__ns:=/NEW` for a namespace, `OLD:=NEW` for a "
+                "topic or service.",
             )
     return None
 

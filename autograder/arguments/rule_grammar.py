@@ -131,6 +131,12 @@ def _of_names(rule: Rule) -> Reason | None:
             "rule-colon",
             "Write one name of a node, without slash, then `:`, then the old name: `NODE:old:=new`.",
         )
+    if re.fullmatch(r"[+-]?\d[\d.]*", rule.right):
+        return (
+            "a number is no name, and `-r` gives a new name.",
+            "begins-with-digit",
+            f"A parameter gets its value with `-p`: `-p {rule.text}`.",
+        )
     return _of_name(rule.left, "the left side", left=True) or _of_name(rule.right, "the right side")
 
 

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from autograder.checks import findings, outcomes, runtime
-from autograder.checks.forms import NAME_OR_NONE, allowed, begins_with_slash, one_of, same, seal
+from autograder.checks.forms import NAME_OR_NONE, allowed, begins_with_slash, misses, one_of, same, seal
 from autograder.checks.parts import part
 from autograder.checks.scoring import Score, score
 from autograder.core import student_yaml
@@ -55,7 +55,7 @@ class Answers:
             because, hint = here.why_missing("file", self.file)
             outcomes.failed(title, because=because, hint=hint, code="file-missing")
         try:
-            table = student_yaml.read(runtime.current.use(self.file))
+            table = student_yaml.read(runtime.current.use(self.file), table=True)
         except student_yaml.StudentFileError as error:
             hint = error.hint or _LINES
             outcomes.failed(title, because=error.because, hint=hint, code=error.code)
@@ -83,12 +83,14 @@ class Answers:
         title = f"`{question}` is answered"
         answer = self._table.get(question)
         form = self._forms.get(question, ())
+        if isinstance(answer, student_yaml.Twice):
+            outcomes.failed(title, because=f"`{question}` {answer}.", code="yaml-refused")
         if answer is None or answer == "?":
             expected = one_of(form) if form else ""
             because = f"`{question}` has no answer yet." + self._misspelt(question)
             outcomes.failed(title, expected=expected, because=because, code="unanswered")
         if form and not allowed(answer, form):
-            because = f"`{question}` is `{_spelt(answer)}`, which is none of the allowed answers: {one_of(form)}."
+            because = f"`{question}` is `{_spelt(answer)}`{misses(answer, form)}."
             outcomes.failed(title, expected=one_of(form), observed=_spelt(answer), because=because, code="answer-form")
         return answer
 

@@ -63,6 +63,8 @@ class CommandLine:
                     "command-line",
                     "There is no space after `:=`."
                     if before.endswith(":=")
+                    else "Leave out `ros2 run` and all that stands before the words after `--ros-args`."
+                    if "ros2" in words or "--ros-args" in words
                     else f"Every rule has its own `-r`, every parameter its own `-p`: {example}.",
                 )
             option = "" if option or word in _ALONE else word
@@ -78,7 +80,7 @@ class CommandLine:
 
     def _text(self) -> str:
         try:
-            table = student_yaml.read(runtime.current.use(self.file))
+            table = student_yaml.read(runtime.current.use(self.file), table=True)
         except student_yaml.StudentFileError as error:
             raise CommandLineError(error.because, error.code, error.hint or "Write `entry: words`.") from None
         text = table.get(self.entry) if isinstance(table, dict) else None
@@ -89,6 +91,8 @@ class CommandLine:
                 + (f" `{near[:60]}` is there; did you mean `{self.entry}`?" if near else ""),
                 "unanswered",
             )
+        if isinstance(text, student_yaml.Twice):
+            raise CommandLineError(f"`{self.entry}` in `{self.file}` {text}.", "yaml-refused")
         if not isinstance(text, str) or len(text) > _LONGEST:
             raise CommandLineError(
                 f"`{self.entry}` in `{self.file}` is not a command line.",

@@ -77,6 +77,23 @@ def one_of(form: Sequence[Any]) -> str:
     return _or(["yes" if value is True else "no" if value is False else str(value) for value in form])
 
 
+def misses(answer: Any, form: Sequence[Any]) -> str:
+    """What keeps an answer from being of the form, as the end of a sentence that has named the answer."""
+    if not form or not isinstance(form[0], (list, tuple)):
+        return f", which is none of the allowed answers: {one_of(form)}"
+    wanted = len(form[0])
+    if isinstance(answer, str):
+        return f", a text; a list of {wanted} words stands in brackets, `[…, …]`"
+    if isinstance(answer, list) and len(answer) != wanted:
+        return f", a list of {len(answer)}; {wanted} words are asked for"
+    if isinstance(answer, list):
+        words = {str(word): word for value in form for word in value}
+        other = next((one for one in answer if not any(same(one, word) for word in words.values())), answer)
+        told = "no" if other is False else "yes" if other is True else other
+        return f"; `{told}` is none of the words {_or(sorted(words))}"
+    return f", which is none of the allowed answers: {one_of(form)}"
+
+
 def _or(words: Sequence[str]) -> str:
     return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} or {words[-1]}"
 

@@ -121,6 +121,7 @@ class Launch(
         if self._file is not None:
             try:
                 self._running.described = self._file.nodes()
+                self._running.unused_arguments = self._file.unused
             except LaunchFileError as error:  # which every expectation then tells
                 self._running.trouble.append(Diagnosis(str(error), "launch-file", error.hint))
         for launched in self._running.described:

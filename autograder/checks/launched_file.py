@@ -8,7 +8,7 @@ from pathlib import Path
 
 from autograder.checks import runtime
 from autograder.checks.program import Program
-from autograder.launch_files import read_launch_file
+from autograder.launch_files import declared_arguments, read_launch_file
 
 
 @dataclass(frozen=True)
@@ -54,6 +54,11 @@ class LaunchedFile:
             )
             for one in found
         ]
+
+    def unused(self) -> list[str]:
+        """The given arguments that the file does not declare, which `ros2 launch` passes over."""
+        declared = declared_arguments(runtime.current.folder.resolve() / self.name)
+        return [name for name in self.arguments if name not in declared]
 
     def _stand_in(self, node: Program) -> Program:
         """The course's own program in place of the student's, if the check has one, started with the same words."""

@@ -59,6 +59,10 @@ class Program:
         names = [rule.removeprefix("__node:=") for rule in self.all_rules() if rule.startswith("__node:=")]
         return next(iter(names), "")
 
+    def parameter_rules(self) -> list[str]:
+        """The parameter rules that were typed, `name:=value`."""
+        return remap_rules.parameter_rules_in(self._typed())
+
     def rules(self) -> list[str]:
         """The remap rules in the order in which they are given: the first that matches wins."""
         rules = [f"{old}:={new}" for old, new in self.remappings]

@@ -37,6 +37,8 @@ class Running:
         """Programs that no cell has written."""
         self.trouble: list[Diagnosis] = []
         """Why a program, or the whole launch file, could not be started."""
+        self.unused_arguments: Callable[[], list[str]] = list
+        """Tells the arguments of the launch that its launch file does not have."""
         self.stopped: list[RunningProgram] = []
         """Programs that the check itself has stopped."""
         self.may_end: list[RunningProgram] = []
@@ -50,10 +52,11 @@ class Running:
             [program for _, program in self.programs],
             self.missing,
             runtime.current.folder,
-            [node.all_rules() for node, _ in self.programs],
-            [list(node.parameters) for node, _ in self.programs],
-            self.trouble,
-            self.stopped,
+            rules=[node.all_rules() for node, _ in self.programs],
+            parameter_rules=[node.parameter_rules() for node, _ in self.programs],
+            parameters=[list(node.parameters) for node, _ in self.programs],
+            trouble=self.trouble,
+            stopped=self.stopped,
         )
 
     def all_ended(self) -> bool:

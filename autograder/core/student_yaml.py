@@ -2,11 +2,13 @@
 
 What it accepts is what `yaml.safe_load` makes of plain YAML. Everything that lets a short text stand for a long one
 (anchors, aliases, merge keys), every tag beyond the plain types, and everything too large or too deep is refused; and
-whatever is wrong with a text becomes one `StudentFileError`, a sentence with the line as the notebook shows it.
+whatever is wrong with a text becomes one `StudentFileError`, a sentence with the line as the notebook shows it. In a
+table of answers a single value may have an anchor, and a line that stands twice is no reason to refuse the others.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -62,17 +64,30 @@ class StudentFileError(Exception):
         self.because, self.code, self.line, self.hint = because, code, line, hint
 
 
+@dataclass(frozen=True)
+class Twice:
+    """In a table, the value of a key that stands there more than once."""
+
+    lines: tuple[int, int]
+    """The first two of them, as the notebook counts them in the cell."""
+
+    def __str__(self) -> str:
+        """What is wrong, as the end of a sentence about the key."""
+        return "stands there twice, in lines {} and {} of the cell".format(*self.lines)
+
+
 def cell_line(index: int, text: str) -> int:
     """Return the line of a cell at which a character of its file stands: the magic above the file is line 1."""
     return text.count("\n", 0, index) + 2
 
 
-def load(text: str, name: str = "the file") -> Any:
+def load(text: str, name: str = "the file", table: bool = False) -> Any:
     """Read a YAML text.
 
     Args:
         text: what stands below the cell's first line.
         name: what the sentence of an error calls it.
+        table: whether it is a table of answers, in which the value of a key that stands there twice is a `Twice`.
 
     Raises:
         StudentFileError: it is not YAML, or not plain enough. Nothing else is ever raised.
@@ -80,7 +95,7 @@ def load(text: str, name: str = "the file") -> Any:
     if len(text) > FILE_BYTES or len(text.encode("utf-8", "replace")) > FILE_BYTES:
         raise StudentFileError(f"{name} is larger than {FILE_BYTES // 1024} KiB.", "file-too-large")
     try:
-        loader = _Loader(text)
+        loader = _Loader(text, table)
         try:
             return loader.get_single_data()
         finally:
@@ -99,8 +114,8 @@ def load(text: str, name: str = "the file") -> Any:
         raise _error(text, name, None, " is not YAML: it cannot be read") from None
 
 
-def read(path: Path) -> Any:
-    """Read a student's YAML file.
+def read(path: Path, table: bool = False) -> Any:
+    """Read a student's YAML file; for `table` see `load`.
 
     Raises:
         StudentFileError: it is missing, is no text, or `load` refuses it.
@@ -114,7 +129,7 @@ def read(path: Path) -> Any:
         hint = "Check the first line of the cell; it must stand there unchanged."
         raise StudentFileError(because, "file-missing", hint=hint) from None
     try:
-        return load(content.decode("utf-8", "strict" if len(content) <= FILE_BYTES else "replace"), name)
+        return load(content.decode("utf-8", "strict" if len(content) <= FILE_BYTES else "replace"), name, table)
     except UnicodeDecodeError:
         raise StudentFileError(f"{name} is not text in UTF-8.") from None
 
@@ -143,20 +158,20 @@ class _RefusedError(Exception):
 class _Loader(yaml.SafeLoader):
     """PyYAML's safe loader for plain YAML; it refuses while it reads, before anything can grow."""
 
-    def __init__(self, text: str) -> None:
+    def __init__(self, text: str, table: bool) -> None:
         super().__init__(text)
-        self._text = text
+        self._text, self._table = text, table
         self._depth = self._values = 0
 
     def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
         event: Any = self.peek_event()  # type: ignore[no-untyped-call]
-        if isinstance(event, yaml.AliasEvent):
+        if isinstance(event, yaml.AliasEvent) and not self._table:
             raise _RefusedError(
                 event.start_mark, f"aliases (`*{str(event.anchor)[:40]}`) are not allowed; write it out"
             )
-        if event.anchor is not None:
+        if event.anchor is not None and not (self._table and isinstance(event, yaml.ScalarEvent | yaml.AliasEvent)):
             raise _RefusedError(event.start_mark, f"anchors (`&{event.anchor[:40]}`) are not allowed; leave it out")
-        if event.tag not in (None, "!", *_PLAIN_TAGS):
+        if getattr(event, "tag", None) not in (None, "!", *_PLAIN_TAGS):
             tag = event.tag.replace(_PREFIX, "!!")[:40]
             raise _RefusedError(event.start_mark, f"the type `{tag}` is not allowed; leave it out")
         self._values += 1
@@ -188,6 +203,7 @@ class _Loader(yaml.SafeLoader):
         if not isinstance(node, yaml.MappingNode):
             raise _RefusedError(node.start_mark, "`key: value` lines are expected there")
         first: dict[Any, yaml.Node] = {}
+        twice: dict[Any, Twice] = {}
         for key_node, _ in node.value:
             if not isinstance(key_node, yaml.ScalarNode):
                 raise _RefusedError(key_node.start_mark, "a key is a plain word, not a list or a mapping")
@@ -196,9 +212,12 @@ class _Loader(yaml.SafeLoader):
             key = self.construct_object(key_node)
             if key in first:
                 line = cell_line(first[key].start_mark.index, self._text)
+                if self._table:
+                    twice.setdefault(key, Twice((line, cell_line(key_node.start_mark.index, self._text))))
+                    continue
                 raise _RefusedError(
                     key_node.start_mark,
                     f"the key `{key_node.value[:40]}` stands a second time; it is also in line {line}",
                 )
             first[key] = key_node
-        return super().construct_mapping(node, deep)
+        return {**super().construct_mapping(node, deep), **twice}

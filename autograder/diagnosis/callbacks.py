@@ -149,6 +149,11 @@ def _error(program: str, event: CallbackError) -> Diagnosis:
         )
     code = _CODES.get(event.kind, "callback-exception")
     hint = "The line that raised it, and what was in its variables, is where to begin." if event.line else ""
+    if event.kind == "parameter":
+        hint = (
+            "A value that cannot be used is refused: what `add_on_set_parameters_callback` was given returns "
+            "SetParametersResult(successful=False, reason=…). An exception ends the node."
+        )
     if event.kind == "task" and not event.line:
         hint = "What `add_done_callback` is given is called with one argument, the future."
     for exception, word, advice in KNOWN_ERRORS:

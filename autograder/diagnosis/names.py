@@ -56,6 +56,14 @@ def _twins(scene: Scene, name: str) -> set[str]:
     }
 
 
+def _given_as_a_parameter(scene: Scene, insides: Sequence[Inside], wanted: str) -> remap_rules.Reason | None:
+    """Why a name given with `-p` to one of these programs is not there."""
+    pairs = zip(scene.insides, scene.parameter_rules, strict=False)
+    return next(
+        (why for it, given in pairs if it in insides and (why := remap_rules.renames_nothing(given, wanted))), None
+    )
+
+
 def _nothing_of(silent: Sequence[Inside]) -> Diagnosis:
     """Why programs that live show no node: what is wrong inside, or how far the first of them was seen to come."""
     made = [name for name, node in silent[0].nodes.items() if not node.destroyed]
@@ -86,6 +94,9 @@ def why_no_node(scene: Scene, wanted: str) -> Diagnosis:
         idle = remap_rules.node_without_effect(rules, wanted, own) if inside in around else None
         if idle:
             return Diagnosis(*idle)
+    idle = _given_as_a_parameter(scene, around, wanted)
+    if idle:
+        return Diagnosis(*idle)
     base = wanted.rsplit("/", 1)[-1]
     there = [name for name in own if name.rsplit("/", 1)[-1] == base]
     if there:
@@ -237,7 +248,8 @@ def _idle_rule(scene: Scene, topic: str, node: str) -> Diagnosis | None:
             found[1] != "absolute-name" or any(_is_absolute(scene, name) for name in users if name in found[0])
         ):
             return Diagnosis(*found)
-    return None
+    given = _given_as_a_parameter(scene, scene.inside_of(node) if node else scene.insides, topic)
+    return Diagnosis(*given) if given else None
 
 
 def _is_absolute(scene: Scene, name: str) -> bool:

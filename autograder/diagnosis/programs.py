@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from autograder.arguments import remap_rules
+from autograder.arguments import params_file, remap_rules
 from autograder.diagnosis import callbacks
 from autograder.diagnosis.inside import Inside
 from autograder.diagnosis.reason import Diagnosis
@@ -27,7 +27,8 @@ def program_trouble(scene: Scene) -> Diagnosis | None:
         refused = remap_rules.refused(scene.rules[number]) if number < len(scene.rules) else None
         if refused and "arse remap rule" in program.output():
             return Diagnosis(*refused)
-        return _death(scene.inside(program))
+        unread = params_file.why_refused(program.output(), scene.folder)
+        return Diagnosis(*unread) if unread else _death(scene.inside(program))
     return None
 
 
@@ -61,6 +62,20 @@ def _death(inside: Inside) -> Diagnosis:
         f"`{program.name}` ended by itself with exit status {status}"
         + (f"; the last line it printed is `{last.strip()[:200]}`." if last else ", and it printed nothing."),
         "exited",
+        _why_over(inside),
+    )
+
+
+def _why_over(inside: Inside) -> str:
+    """What is to be said of how the program spins, if it does so in its own file."""
+    names = ("spin", "spin_once", "spin_until_future_complete")
+    spins = {name: number for name in names if (number := inside.source.calls(name))}
+    if not spins or "spin" in spins:
+        return "`spin()` goes on until the program is stopped, or until it shuts down itself." if spins else ""
+    name, number = spins.popitem()
+    returns = "runs one callback at the most" if name == "spin_once" else "spins until its future is done"
+    return (
+        f"Line {number} (`{inside.source.line(number)}`) {returns} and returns. `spin()` goes on until it is stopped."
     )
 
 

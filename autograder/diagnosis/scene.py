@@ -27,6 +27,8 @@ class Scene:
     """Where the programs' sources are."""
     rules: Sequence[Sequence[str]] = ()
     """The remap rules given to each of the programs, as on the command line."""
+    parameter_rules: Sequence[Sequence[str]] = ()
+    """The parameter rules typed for each of the programs."""
     parameters: Sequence[Collection[str]] = ()
     """The names of the parameters given to each of the programs by the check."""
     trouble: Sequence[Diagnosis] = field(default=())

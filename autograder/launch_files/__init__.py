@@ -10,7 +10,7 @@ that could grow has a limit.
 
 from autograder.launch_files.errors import INCLUDE_DEPTH, MOST_NODES, LaunchFileError
 from autograder.launch_files.nodes import ForAll, Inline, LaunchedNode, ParamsFile, ParamsText, remove_written
-from autograder.launch_files.reader import read_launch_file
+from autograder.launch_files.reader import declared_arguments, read_launch_file
 
 __all__ = [
     "INCLUDE_DEPTH",
@@ -21,6 +21,7 @@ __all__ = [
     "LaunchedNode",
     "ParamsFile",
     "ParamsText",
+    "declared_arguments",
     "read_launch_file",
     "remove_written",
 ]

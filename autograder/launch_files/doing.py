@@ -9,6 +9,7 @@ from rclpy.exceptions import InvalidNamespaceException, InvalidNodeNameException
 from rclpy.validate_namespace import validate_namespace
 from rclpy.validate_node_name import validate_node_name
 
+from autograder.graph.names import nearest
 from autograder.launch_files import substitutions, values
 from autograder.launch_files.errors import Place
 from autograder.launch_files.nodes import Inline, LaunchedNode, ParamsFile, ParamsText
@@ -95,7 +96,10 @@ class Doing:
 
     def missing(self, key: str) -> Exception:
         """The error for a file that does not exist."""
-        return self.place.error(_no_file(self.text(key)), "Write `$(dirname)/NAME.yaml`; NAME is a cell's `%%file`.")
+        text = self.text(key)
+        near = nearest(text.rsplit("/", 1)[-1], {*self.context.packages.stand_ins, *_beside(self.place.folder)})
+        hint = f" Is `{near}` meant?" if near else ""
+        return self.place.error(_no_file(text), f"Write `$(dirname)/NAME.yaml`; NAME is a cell's `%%file`.{hint}")
 
     def parameters(self, node: LaunchedNode) -> None:
         """Add the parameters of a node's own."""
@@ -156,6 +160,10 @@ class Doing:
             )
 
 
+def _beside(folder: Path) -> list[str]:
+    return [path.name for path in folder.glob("*.yaml")]
+
+
 def _no_file(text: str) -> str:
     if not text.startswith("/"):
         return f"there is no file `{text}`: `ros2 launch` looks for it in the folder that it is called from."
@@ -185,4 +193,6 @@ def namespace(outer: str | None, inner: str | None, place: Place) -> str | None:
 def _invalid(what: str, error: Exception) -> tuple[str, str]:
     """rclpy's reason why a name is invalid, as one sentence."""
     reason = str(error).splitlines()[0].split(": ", 1)[-1].rstrip(".")
+    if "${" in what:
+        return f"{what}: {reason}.", "The value of an argument is written with round brackets: `$(var NAME)`."
     return f"{what}: {reason}.", "A name has letters, digits and underscores, and no part of it begins with a digit."

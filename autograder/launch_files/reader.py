@@ -50,6 +50,20 @@ def read_launch_file(
     return reader.nodes
 
 
+def declared_arguments(path: Path) -> list[str]:
+    """The names of the arguments that a launch file declares, included files left out.
+
+    Raises:
+        LaunchFileError: it cannot be read.
+    """
+
+    def among(actions: list[Action]) -> list[str]:
+        own = [action.given["name"] for action in actions if action.kind == "arg"]
+        return own + [name for action in actions for name in among(action.children)]
+
+    return among(read_file(path))
+
+
 class _Reader:
     def __init__(self) -> None:
         self.nodes: list[LaunchedNode] = []

@@ -125,7 +125,10 @@ def _keys(body: Any, schema: dict[str, Key], place: Place, ignored: bool = False
         raise place.error("keys with values are expected here, such as `name: …`, indented further than the action.")
     for key, expected in schema.items():
         if expected.needed and key not in body:
-            raise place.error(f"the key `{key}` is missing.", f"Write `{key}: …` below it.")
+            hint = f"Write `{key}: …` below it."
+            if key == "children":
+                hint = "Below `group:` stands a list: each entry begins with a `-`, such as `- push_ros_namespace:`."
+            raise place.error(f"the key `{key}` is missing.", hint)
     unknown = [] if ignored else [str(key) for key in body if key not in schema]
     if unknown:
         known = ", ".join(f"`{key}`" for key in sorted(schema))

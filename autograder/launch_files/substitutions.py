@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from autograder.core import student_yaml
+from autograder.graph.names import nearest
 from autograder.launch_files import expressions
 from autograder.launch_files.errors import TEXT_LENGTH, ValueRefused
 from autograder.launch_files.files import Packages
@@ -60,7 +61,8 @@ def check(text: Text) -> None:
         if call.name in _NOT_COVERED:
             raise ValueRefused(f"the substitution `{call.written}` is not covered here.", f"Covered are {covered}.")
         if call.name not in _VALUES:
-            raise ValueRefused(f"there is no substitution `{call.name}`.", f"Covered here are {covered}.")
+            hint = "In ROS 2 it is `$(var NAME)`." if call.name == "arg" else f"Covered here are {covered}."
+            raise ValueRefused(f"there is no substitution `{call.name}`.", hint)
         least, most = _VALUES[call.name]
         if not least <= len(call.values) <= most:
             wanted = f"{least}" if least == most else f"{least} or {most}"
@@ -133,8 +135,10 @@ def _value(call: Call, context: Context, folder: Path) -> str:
 def _configuration(name: str, context: Context) -> str:
     value = context.configurations.get(name)
     if value is None:
+        near = nearest(name, [known for known, text in context.configurations.items() if isinstance(text, str)])
         raise ValueRefused(
-            f"there is no launch argument `{name}` here.", f"Declare it above with `- arg:` and `name: {name}`."
+            f"there is no launch argument `{name}` here." + (f" `{near}` is there; is that meant?" if near else ""),
+            f"An argument is declared above with `- arg:` and `name: {name}`.",
         )
     if not isinstance(value, str):
         raise ValueRefused(f"`{name}` is a name that `launch_ros` uses itself; it is not covered here.")

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from autograder import diagnosis
 from autograder.checks import outcomes
+from autograder.checks.expect import rates
 from autograder.checks.expect.concurrency import ConcurrencyExpectations
 from autograder.checks.expect.expectations import WITHIN
 from autograder.checks.expect.offering import Offering
@@ -86,9 +87,30 @@ class MeanwhileExpectations(ConcurrencyExpectations, SourceExpectations, Offerin
         if not enough():
             if not service and not seen:
                 self._wait_for_runs(activity, [callback], 1, title, 0.0, hint)
+            if callback:
+                self._too_short(title, topic, msg_type, activity, callback, at_least, hint)
             self._paused(title, topic, activity or topic, seen, at_least, hint)
         self._one_source(title, topic, msg_type, "", 1, self._observer.record(topic, msg_type).messages)
         outcomes.passed(title, observed=", ".join(str(count) for count in seen))
+
+    def _too_short(
+        self, title: str, topic: str, msg_type: type, activity: str, callback: str, at_least: int, hint: str
+    ) -> None:
+        """Fail if no run of the callback was long enough for so many messages, at the pace at which these come."""
+        gap = rates.median_gap(self._observer.record(topic, msg_type).messages)
+        spans = [span.end - span.begin for span in self.concurrency(activity).spans() if span.name == callback]
+        if spans and 0.0 < max(spans) < (at_least - 1) * gap:
+            self._fail(
+                title,
+                Diagnosis(
+                    f"The longest run of `{callback}` took {max(spans):.2f} s, and a message comes on `{topic}` every "
+                    f"{gap:.2f} s: too short for {at_least} of them.",
+                    "paused",
+                ),
+                expected=f"at least {at_least} messages in one run",
+                observed=f"runs of at most {max(spans):.2f} s",
+                hint=hint,
+            )
 
     def _paused(self, title: str, topic: str, activity: str, seen: Sequence[int], at_least: int, hint: str) -> None:
         scene = self._scene()

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Mapping, Sequence
 from typing import Any, NoReturn
 
 from rcl_interfaces.srv import GetParameters
 
 from autograder import diagnosis
-from autograder.arguments import params_file, remap_rules
-from autograder.checks import runtime
+from autograder.checks.expect import parameter_reasons
 from autograder.checks.expect.expectations import WITHIN
 from autograder.checks.expect.meeting import Meeting
 from autograder.checks.parts import asked
@@ -20,11 +18,6 @@ from autograder.graph.services import ServiceMissing
 
 _NO_RESULT = "Callback returned an invalid type"
 """What rclpy says in place of a reason."""
-
-_EVERY_NODE = ("use_sim_time", "start_type_description_service")
-"""Parameters that rclpy declares for every node."""
-
-_KINDS = {bool: "a bool", int: "an integer", float: "a double", str: "a text", type(None): "without a value"}
 
 
 class ParameterExpectations(Meeting):
@@ -116,8 +109,8 @@ class ParameterExpectations(Meeting):
             `ros.expect_parameter("/camera", "rate", 5.0)`
 
         Codes:
-            `parameter-undeclared`, `parameter-value`, `parameter-as-rule`, `parameter-for-others`, `params-file-key`,
-            `params-file-missing`, and those of `get_parameters`.
+            `parameter-undeclared`, `parameter-value`, `parameter-as-rule`, `parameter-for-others`, `launch-argument`,
+            `params-file-key`, `params-file-missing`, and those of `get_parameters`.
         """
         title = f"Parameter `{name}` of `{node}` is {value!r}"
         try:
@@ -128,17 +121,7 @@ class ParameterExpectations(Meeting):
         except (ServiceMissing, parameters.NoAnswer) as error:
             self._no_parameters(title, node, error, hint)
         if name not in have:
-            own = [one for one in declared if one not in _EVERY_NODE and "qos_overrides" not in one]
-            self._fail(
-                title,
-                Diagnosis(
-                    f"`{node}` has not declared a parameter `{name}`" + (f"; it has {', '.join(own)}." if own else "."),
-                    "parameter-undeclared",
-                    "A value given at the start reaches declared parameters only.",
-                ),
-                expected=repr(value),
-                hint=hint,
-            )
+            self._fail(title, parameter_reasons.undeclared(node, name, declared), expected=repr(value), hint=hint)
         same = type(have[name]) is type(value) and (
             abs(have[name] - value) < 1e-9 if isinstance(value, float) else have[name] == value
         )
@@ -147,12 +130,7 @@ class ParameterExpectations(Meeting):
         self._expect_that(
             same,
             title,
-            lambda: (
-                self._file_for_others(node)
-                or self._given_as_a_rule(name)
-                or self._given_to_another(node, name)
-                or _other_value(have[name], value)
-            ),
+            lambda: parameter_reasons.why_other(self._running, node, name, have[name], value),
             expected=repr(value),
             observed=repr(have[name]),
             hint=hint,
@@ -199,51 +177,3 @@ class ParameterExpectations(Meeting):
             observed=reply.reason,
             hint=hint,
         )
-
-    def _given_as_a_rule(self, name: str) -> Diagnosis | None:
-        """Whether the parameter was given with `-r`, as if it were a name to be changed."""
-        for text in itertools.chain.from_iterable(self._scene().rules):
-            rule = remap_rules.parse(text)
-            if rule and rule.left == name:
-                because = f"`{text}` is given as a remap rule; such rules rename topics and services, not parameters."
-                return Diagnosis(because, "parameter-as-rule", f"Give it as a parameter: `-p {text}`.")
-        return None
-
-    def _given_to_another(self, node: str, name: str) -> Diagnosis | None:
-        """Whether `-p NODE:name:=value` was meant for this node: a node's name there is one in the namespace `/`."""
-        for launched, _ in self._running.programs:
-            for option, text in itertools.pairwise(launched.arguments()):
-                meant, _, parameter = text.partition(":=")[0].rpartition(":")
-                if option in ("-p", "--param") and parameter == name and meant and f"/{meant}" != node:
-                    because = f"`-p {text}` is for the node `/{meant}`, and this one is `{node}`."
-                    hint = "Leave the node out: the value is for every node of the process then."
-                    return Diagnosis(because, "parameter-for-others", hint)
-        return None
-
-    def _file_for_others(self, node: str) -> Diagnosis | None:
-        """Whether the parameter files of the launch have nothing for this node."""
-        for launched, _ in self._running.programs:
-            if launched.warnings:
-                hint = "Write `$(dirname)/NAME.yaml`; NAME is a cell's `%%file`."
-                return Diagnosis(f"{launched.warnings[0]} The node started without it.", "params-file-missing", hint)
-            words = launched.arguments()
-            for option, file in itertools.pairwise(words):
-                path = runtime.current.folder / file
-                if option != "--params-file" or not path.is_file():
-                    continue
-                because = params_file.why_not_reached(path.read_text(encoding="utf-8"), node)
-                if because:
-                    return Diagnosis(because, "params-file-key", "The key is the node's full name, namespace included.")
-        return None
-
-
-def _other_value(found: Any, wanted: Any) -> Diagnosis:
-    """What a parameter is instead; where its type differs, that is said."""
-    kind, asked = _KINDS.get(type(found), "a list"), _KINDS.get(type(wanted), "a list")
-    if kind == asked:
-        return Diagnosis(f"It is {found!r}.", "parameter-value")
-    return Diagnosis(
-        f"It is {found!r}, {kind}, and not {asked}.",
-        "parameter-value",
-        "40 is an integer, 40.0 a double, '40' a text. Given another type than it declares, a node ends at its start.",
-    )

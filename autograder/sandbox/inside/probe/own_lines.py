@@ -30,13 +30,19 @@ def own_line() -> Where:
 
 
 def error_line(error: BaseException) -> Where:
-    """The innermost line of the student's that an exception has passed."""
-    found = nowhere()
+    """The innermost line of the student's files that an exception has passed, and the one in another file before it."""
+    passed: list[tuple[str, int]] = []
     trace = error.__traceback__
     while trace is not None:
         if trace.tb_frame.f_code.co_filename.startswith(_Own.folder):
-            found = _line(trace.tb_frame.f_code.co_filename, trace.tb_lineno)
+            passed.append((trace.tb_frame.f_code.co_filename, trace.tb_lineno))
         trace = trace.tb_next
+    if not passed:
+        return nowhere()
+    found = _line(*passed[-1])
+    callers = [_line(*one)["line"] for one in passed if one[0] != passed[-1][0]]
+    if callers:
+        found["line"] += f", called in {callers[-1]}"
     return found
 
 

@@ -1,0 +1,146 @@
+"""Why a parameter has another value than it should: what was given, and to whom."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Collection, Iterator
+from typing import Any
+
+from autograder.arguments import params_file, remap_rules
+from autograder.checks import runtime
+from autograder.checks.program import Program
+from autograder.checks.running import Running
+from autograder.diagnosis import Diagnosis
+from autograder.graph import parameters
+from autograder.graph.names import nearest
+from autograder.graph.services import ServiceMissing
+
+_EVERY_NODE = ("use_sim_time", "start_type_description_service")
+"""Parameters that rclpy declares for every node."""
+_KINDS = {bool: "a bool", int: "an integer", float: "a double", str: "a text", type(None): "without a value"}
+_WITHIN = 2.0
+
+
+def own(declared: Collection[str]) -> list[str]:
+    """Those of a node's parameters that rclpy did not declare for it."""
+    return [name for name in declared if name not in _EVERY_NODE and "qos_overrides" not in name]
+
+
+def undeclared(node: str, name: str, declared: Collection[str]) -> Diagnosis:
+    """That a node has not declared a parameter; what it has."""
+    has = own(declared)
+    return Diagnosis(
+        f"`{node}` has not declared a parameter `{name}`" + (f"; it has {', '.join(has)}." if has else "."),
+        "parameter-undeclared",
+        "A value given at the start reaches declared parameters only.",
+    )
+
+
+def why_other(running: Running, node: str, name: str, found: Any, wanted: Any) -> Diagnosis:
+    """Why the parameter `name` of `node` is `found` and not `wanted`: a reason that is established, or what it is."""
+    reasons: tuple[Callable[[], Diagnosis | None], ...] = (
+        lambda: _file_for_others(running, node),
+        lambda: _given_as_a_rule(running, name),
+        lambda: _given_to_another(running, node, name),
+        lambda: _given_by_another_name(running, node, name, found),
+        lambda: _no_such_argument(running, found),
+    )
+    return next((reason for ask in reasons if (reason := ask())), None) or _other_value(found, wanted)
+
+
+def _given_as_a_rule(running: Running, name: str) -> Diagnosis | None:
+    """Whether the parameter was given with `-r`, as if it were a name to be changed."""
+    for launched, _ in running.programs:
+        for text in launched.all_rules():
+            rule = remap_rules.parse(text)
+            if rule and rule.left == name:
+                because = f"`{text}` is given as a remap rule; such rules rename topics and services, not parameters."
+                return Diagnosis(because, "parameter-as-rule", f"Give it as a parameter: `-p {text}`.")
+    return None
+
+
+def _given_to_another(running: Running, node: str, name: str) -> Diagnosis | None:
+    """Whether `-p NODE:name:=value` was meant for this node: a node's name there is one in the namespace `/`."""
+    for launched, _ in running.programs:
+        for text in launched.parameter_rules():
+            meant, _, parameter = text.partition(":=")[0].rpartition(":")
+            if parameter == name and meant and f"/{meant}" != node:
+                because = f"`-p {text}` is for the node `/{meant}`, and this one is `{node}`."
+                hint = "Leave the node out: the value is for every node of the process then."
+                return Diagnosis(because, "parameter-for-others", hint)
+    return None
+
+
+def _given_by_another_name(running: Running, node: str, name: str, found: Any) -> Diagnosis | None:
+    """Whether values were given under names that the node has not declared, and none under this one."""
+    given = {one for launched, _ in running.programs for one in _given(launched, node)}
+    if name in given or not given:
+        return None
+    try:
+        declared = own(parameters.list_parameters(running.observer, node, _WITHIN, running.all_ended))
+    except (ServiceMissing, parameters.NoAnswer):
+        return None
+    strange = sorted(given - set(declared))
+    if not strange:
+        return None
+    short = [one for one in strange if name.endswith(one)]
+    one = nearest(name, strange) or (short or strange)[0]
+    return Diagnosis(
+        f"It is {found!r}. A value was given for `{one}`, which `{node}` has not declared; it has "
+        f"{', '.join(declared)}.",
+        "parameter-undeclared",
+        "A value for a name that is not declared is passed over without a word.",
+    )
+
+
+def _given(launched: Program, node: str) -> Iterator[str]:
+    """Names of the parameters that a program's words and files give values to, as far as they are for this node."""
+    for text in launched.parameter_rules():
+        meant, _, parameter = text.partition(":=")[0].rpartition(":")
+        if not meant or f"/{meant}" == node:
+            yield parameter
+    for option, file in itertools.pairwise(launched.arguments()):
+        path = runtime.current.folder / file
+        if option == "--params-file" and path.is_file():
+            yield from params_file.names_for(path.read_text(encoding="utf-8"), node)
+
+
+def _no_such_argument(running: Running, found: Any) -> Diagnosis | None:
+    """Whether the launch was given arguments that the launch file does not have."""
+    unused = running.unused_arguments()
+    if not unused:
+        return None
+    given = ", ".join(f"`{name}`" for name in unused)
+    return Diagnosis(
+        f"It is {found!r}. The launch was given {given}, and the launch file has no argument of that name.",
+        "launch-argument",
+        "`- arg:` with a `name` declares one; `ros2 launch` passes over the others without a word.",
+    )
+
+
+def _file_for_others(running: Running, node: str) -> Diagnosis | None:
+    """Whether the parameter files of the launch have nothing for this node."""
+    for launched, _ in running.programs:
+        if launched.warnings:
+            hint = "Write `$(dirname)/NAME.yaml`; NAME is a cell's `%%file`."
+            return Diagnosis(f"{launched.warnings[0]} The node started without it.", "params-file-missing", hint)
+        for option, file in itertools.pairwise(launched.arguments()):
+            path = runtime.current.folder / file
+            if option != "--params-file" or not path.is_file():
+                continue
+            because = params_file.why_not_reached(path.read_text(encoding="utf-8"), node)
+            if because:
+                return Diagnosis(because, "params-file-key", "The key is the node's full name, namespace included.")
+    return None
+
+
+def _other_value(found: Any, wanted: Any) -> Diagnosis:
+    """What a parameter is instead; where its type differs, that is said."""
+    kind, asked = _KINDS.get(type(found), "a list"), _KINDS.get(type(wanted), "a list")
+    if kind == asked:
+        return Diagnosis(f"It is {found!r}.", "parameter-value")
+    return Diagnosis(
+        f"It is {found!r}, {kind}, and not {asked}.",
+        "parameter-value",
+        "40 is an integer, 40.0 a double, '40' a text. Given another type than it declares, a node ends at its start.",
+    )
