@@ -51,7 +51,7 @@ release: setup ## make labs/ from solutions/
 
 lectures: setup-dev ## build the book and the slides into build/lectures
 	@$(RUN) python -m sphinx -q -W --keep-going -b html -d build/lectures/doctrees/book lectures build/lectures/book $(ARGS)
-	@$(RUN) python -m sphinx -q -W --keep-going -b revealjs -d build/lectures/doctrees/slides lectures build/lectures/slides $(ARGS)
+	@$(RUN) python -m sphinx -q -W --keep-going -b revealjs -c lectures -d build/lectures/doctrees/slides lectures/slides build/lectures/slides $(ARGS)
 	@echo build/lectures/book/index.html build/lectures/slides/index.html
 
 test: setup-dev ## run every test, ruff and mypy among them

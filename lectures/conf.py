@@ -1,7 +1,7 @@
-"""Sphinx configuration: one MyST notebook per topic becomes a page of the book and a deck of slides.
+"""Sphinx configuration: a page of the book and a deck of slides for each topic, both MyST notebooks.
 
-Every code cell runs on the real rclpy, in a ROS domain of this build's own; a cell that fails ends the build. The
-second builder takes the outputs of the first from the cache, so book and slides show the same run.
+Every code cell runs on the real rclpy; a cell that fails ends the build. The book is made of this folder. The slides
+are made of the folder `slides`, in which each lecture is a talk of its own that runs the programs of the book's page.
 """
 
 from __future__ import annotations
@@ -12,13 +12,14 @@ from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent
-sys.path[:0] = [str(ROOT), str(HERE / "_ext")]
+sys.path[:0] = [str(ROOT), str(HERE / "_ext"), str(HERE / "_lib")]
 
 from autograder.graph.domains import free_domains  # noqa: E402
 from autograder.sandbox.environment import profile_environment  # noqa: E402  (needs the path above)
 
 # What the kernels inherit. The log folder must exist before rclpy starts.
 os.environ |= profile_environment() | {"ROS_DOMAIN_ID": str(next(free_domains())), "JUPYTER_PREFER_ENV_PATH": "1"}
+os.environ |= {"LECTURES": str(HERE), "PYTHONPATH": str(HERE / "_lib")}
 Path(os.environ["ROS_LOG_DIR"]).mkdir(parents=True, exist_ok=True)
 # A page that runs the command `autograder` means the one of this environment.
 os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])
@@ -26,8 +27,8 @@ os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), os.envir
 project = "ROS 2 in Python: executors, names, lifecycle, quality of service"
 author = "The course kit's authors"
 language = "en"
-extensions = ["myst_nb", "sphinx_revealjs", "slides", "reference"]
-exclude_patterns = ["_*"]
+extensions = ["myst_nb", "sphinx_revealjs", "slides", "talk", "programs", "drawings", "claims", "reference"]
+exclude_patterns = ["_*", "slides"]
 pygments_style = "default"
 myst_enable_extensions = ["colon_fence", "deflist"]
 myst_heading_anchors = 3
@@ -56,7 +57,7 @@ html_title = "ROS 2 in Python"
 html_static_path = ["_static"]
 html_css_files = ["course.css"]
 html_copy_source = False
-html_use_index = False
+html_use_index = True
 
 revealjs_html_theme = "deck"
 revealjs_style_theme = "course.css"

@@ -55,6 +55,10 @@ class Runs(Sequence[Run]):
         """Return the runs of these callbacks; of all of them if none is named."""
         return self._chosen(lambda run: not callbacks or run.callback in callbacks)
 
+    def of_node(self, node: str) -> Runs:
+        """Return the runs of the callbacks of one node, by its full name."""
+        return self._chosen(lambda run: run.node == node)
+
     def between(self, begin: float, end: float) -> Runs:
         """Return the runs that were under way at some time from `begin` to `end`."""
         return self._chosen(lambda run: run.begin < end and run.end >= begin)

@@ -56,16 +56,8 @@ def on_doctree(app: Sphinx, doctree: nodes.document) -> None:
             block.parent.remove(block)
 
 
-def on_builder(app: Sphinx) -> None:
-    """Make no slides of the part for instructors; the book, which is built first, has followed the links to it."""
-    if app.builder.name == "revealjs":
-        app.config.exclude_patterns.append("instructors")
-        app.config.suppress_warnings += ["toc.excluded", "toc.not_readable", "ref.doc"]
-
-
 def setup(app: Sphinx) -> dict[str, Any]:
     """Register with Sphinx."""
-    app.connect("builder-inited", on_builder)
     app.connect("source-read", on_read)
     app.connect("doctree-read", on_doctree)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

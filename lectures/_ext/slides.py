@@ -269,6 +269,8 @@ def on_resolved(app: Sphinx, doctree: nodes.document, docname: str) -> None:
     """Prepare a document for the builder that is about to write it."""
     if app.builder.name == "revealjs":
         note_aspects(doctree, Path(app.srcdir))
+        if app.env.metadata[docname].get("talk"):  # its author has cut it
+            return
         for section in [node for node in doctree.children if isinstance(node, nodes.section)]:
             paginate(section)
     else:

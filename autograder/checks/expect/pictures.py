@@ -24,17 +24,18 @@ class Pictures(LifecycleExpectations):
         """
         return seen.runs(self._insides())
 
-    def timeline(self, *, seconds: float | None = None, by: str = "callback") -> Picture:
+    def timeline(self, *callbacks: str, seconds: float | None = None, by: str = "callback") -> Picture:
         """A picture of when each callback ran, on which thread, in which callback group.
 
         Args:
+            callbacks: names of those to draw; by default all.
             seconds: how much of it; by default all, and not more than 4 s.
             by: `callback`, a row for each callback, or `thread`, a row for each thread.
 
         Example:
             `ros.timeline(seconds=2)`
         """
-        return pictures.timeline(self.runs(), seconds=seconds, by=by)
+        return pictures.timeline(self.runs().of(*callbacks), seconds=seconds, by=by)
 
     def graph(self) -> Picture:
         """A picture of the nodes and topics, with the quality of service of each end: now, or as it was at the end.

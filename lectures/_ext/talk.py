@@ -1,0 +1,45 @@
+"""The links between a deck and its page of the book, and figures that can be enlarged."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import re
+from pathlib import Path
+from typing import Any
+
+from docutils import nodes
+from sphinx.application import Sphinx
+
+LECTURES = Path(__file__).resolve().parent.parent
+_FIGURE = re.compile(r'<img ([^>]*?)src="data:image/svg\+xml;base64,([A-Za-z0-9+/=]+)"([^>]*)>')
+
+
+def on_page(app: Sphinx, pagename: str, template: str, context: dict[str, Any], doctree: nodes.document | None) -> None:
+    """Tell the theme where the other form of a lecture is, and make each figure of the book a link to its file.
+
+    A phone shows a figure as wide as its page; opened by itself it can be enlarged.
+    """
+    talks = (LECTURES / "slides" / f"{pagename}.md").exists() and pagename != "index"
+    context["slides"] = f"../slides/{pagename}.html" if talks else ""
+    context["book"] = f"../book/{pagename}.html"
+    if app.builder.name != "html" or "body" not in context:
+        return
+    folder = Path(app.outdir) / "_images"
+    above = "../" * pagename.count("/")
+
+    def linked(found: re.Match[str]) -> str:
+        svg = base64.b64decode(found[2])
+        name = f"{hashlib.sha256(svg).hexdigest()[:16]}.svg"
+        folder.mkdir(exist_ok=True)
+        (folder / name).write_bytes(svg)
+        where = f"{above}_images/{name}"
+        return f'<a class="figure" href="{where}"><img {found[1]}src="{where}"{found[3]}></a>'
+
+    context["body"] = _FIGURE.sub(linked, context["body"])
+
+
+def setup(app: Sphinx) -> dict[str, Any]:
+    """Register with Sphinx."""
+    app.connect("html-page-context", on_page)
+    return {"parallel_read_safe": True, "parallel_write_safe": True}
