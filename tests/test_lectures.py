@@ -15,6 +15,8 @@ import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
 LECTURES = sorted(path.stem for path in (ROOT / "lectures").glob("*.md"))
+DECKS = sorted(path.stem for path in (ROOT / "lectures" / "slides").glob("*.md"))
+TALKS = [name for name in DECKS if name != "index" and not (ROOT / "lectures" / "slides" / f"{name}.md").is_symlink()]
 PAGES = [*LECTURES, *sorted(f"instructors/{path.stem}" for path in (ROOT / "lectures" / "instructors").glob("*.md"))]
 
 # Runs in a deck: what lies outside of its slide, for each slide.
@@ -28,6 +30,28 @@ OUTSIDE = """() => Reveal.getSlides().flatMap((slide, number) => {
   return shown && right <= innerWidth && bottom <= innerHeight
     ? [] : [`slide ${number + 1} "${slide.innerText.slice(0, 40)}" reaches ${right} x ${bottom}, title ${title.top}`];
 })"""
+# Runs in a talk: slides without notes, with much code, or with words that a last row cannot read. Of a figure the
+# smallest text counts, as large as it is shown.
+UNFIT = """() => Reveal.getSlides().flatMap((slide, number) => {
+  const at = Reveal.getIndices(slide), found = [];
+  Reveal.slide(at.h, at.v);
+  const sizes = [];
+  for (const element of slide.querySelectorAll('*:not(aside)')) {
+    const words = [...element.childNodes].some(node => node.nodeType === 3 && node.textContent.trim());
+    if (words && !element.closest('aside')) sizes.push(parseFloat(getComputedStyle(element).fontSize));
+  }
+  for (const image of slide.querySelectorAll('img')) {
+    const drawing = new DOMParser().parseFromString(atob(image.src.split('base64,')[1]), 'image/svg+xml');
+    const [, , width, height] = drawing.documentElement.getAttribute('viewBox').split(' ').map(Number);
+    const scale = Math.min(image.clientWidth / width, image.clientHeight / height);
+    drawing.querySelectorAll('text').forEach(text => sizes.push(scale * parseFloat(text.getAttribute('font-size'))));
+  }
+  if (Math.min(...sizes) < 0.025 * 720) found.push(`text of ${Math.min(...sizes)} px`);
+  if (!slide.querySelector('aside.notes')) found.push('no notes');
+  const lines = [...slide.querySelectorAll('pre')].map(block => block.innerText.trimEnd().split('\\n').length);
+  if (Math.max(0, ...lines) > 12) found.push(`${Math.max(...lines)} lines of code`);
+  return found.length ? [`slide ${number + 1} "${slide.querySelector('h1, h2').innerText}": ${found}`] : [];
+})"""
 BROKEN_IMAGES = """async () => {
   const images = [...document.images];
   await Promise.all(images.map(image => image.decode().catch(() => null)));
@@ -39,10 +63,10 @@ BROKEN_IMAGES = """async () => {
 def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Build book and slides from nothing, as `make lectures` does, every cell run anew."""
     folder = tmp_path_factory.mktemp("lectures")
-    for builder, output in (("html", "book"), ("revealjs", "slides")):
-        command = [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", "-b", builder]
+    for builder, output, source in (("html", "book", "."), ("revealjs", "slides", "slides")):
+        command = [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", "-b", builder, "-c", ROOT / "lectures"]
         command += ["-d", f"{folder}/doctrees-{output}", "-D", f"nb_execution_cache_path={folder}/cache"]
-        command += [str(ROOT / "lectures"), f"{folder}/{output}"]
+        command += [ROOT / "lectures" / source, f"{folder}/{output}"]
         done = subprocess.run(command, capture_output=True, text=True, timeout=600)
         assert done.returncode == 0, done.stderr.partition("Versions\n")[0]
     return folder
@@ -79,7 +103,26 @@ def test_every_page_of_the_book_can_be_read(site: Path, page: Any, name: str) ->
     assert violations(page) == []
 
 
-@pytest.mark.parametrize("name", LECTURES)
+@pytest.mark.parametrize("name", [name for name in LECTURES if name[0].isdigit()])
+def test_a_phone_shows_a_page_without_scrolling_sideways(site: Path, page: Any, name: str) -> None:
+    """At a phone's width nothing is wider than the window, and each figure leads to a file that can be enlarged."""
+    page.set_viewport_size({"width": 390, "height": 800})
+    page.goto(f"file://{site}/book/{name}.html")
+    page.evaluate("document.querySelectorAll('details').forEach(fold => { fold.open = true })")
+    assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+    assert page.evaluate("[...document.querySelectorAll('main img[src$=svg]')].every(one => one.closest('a[href]'))")
+
+
+@pytest.mark.parametrize("name", TALKS)
+def test_a_talk_can_be_given(site: Path, page: Any, name: str) -> None:
+    """25 to 35 slides, each with notes, at most 12 lines of code, and no text below 2.5 % of the height."""
+    page.goto(f"file://{site}/slides/{name}.html")
+    page.wait_for_function("Reveal.isReady()")
+    assert 25 <= page.evaluate("Reveal.getTotalSlides()") <= 35
+    assert page.evaluate(UNFIT) == []
+
+
+@pytest.mark.parametrize("name", DECKS)
 def test_every_slide_fits_a_projector(site: Path, page: Any, name: str) -> None:
     """Nothing lies outside of 1280 x 720 pixels, no slide is empty, no picture is broken or undescribed."""
     page.goto(f"file://{site}/slides/{name}.html")
@@ -88,7 +131,7 @@ def test_every_slide_fits_a_projector(site: Path, page: Any, name: str) -> None:
     assert page.evaluate(OUTSIDE) == []
 
 
-@pytest.mark.parametrize("name", LECTURES)
+@pytest.mark.parametrize("name", DECKS)
 def test_axe_has_nothing_against_the_slides(site: Path, page: Any, name: str) -> None:
     """All slides of a deck are checked at once, in the view for printing."""
     page.goto(f"file://{site}/slides/{name}.html?print-pdf")
@@ -96,11 +139,13 @@ def test_axe_has_nothing_against_the_slides(site: Path, page: Any, name: str) ->
     assert violations(page) == []
 
 
-@pytest.mark.parametrize("name", [name for name in LECTURES if name != "index"])
+@pytest.mark.parametrize("name", [name for name in LECTURES if name[0].isdigit()])
 def test_a_lecture_has_what_each_lecture_has(name: str) -> None:
     """Goals, demos, common mistakes, exercises with folded solutions, a summary, and assertions at the end."""
     text = (ROOT / "lectures" / f"{name}.md").read_text()
-    for heading in ("## Goals", "## What people get wrong", "## Exercises", "## Summary"):
+    # A page whose deck is a talk has the form that `instructors/write_a_lecture.md` describes.
+    more = ("## Quiz", "## Read on", "## What this page measured") if name in TALKS else ()
+    for heading in ("## Goals", "## What people get wrong", "## Exercises", "## Summary", *more):
         assert f"\n{heading}\n" in text, f"{name} lacks the section {heading}"
     cells = text.split("```{code-cell}")[1:]
     assert any("hide-cell" in cell for cell in cells), f"{name} has no folded solution"

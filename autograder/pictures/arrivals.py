@@ -47,7 +47,7 @@ def arrivals(topic: str, traffic: Sequence[Traffic], *, seconds: float | None = 
         if row.since is not None and 0 <= row.since - zero <= length:
             x = left + (row.since - zero) * per_second
             canvas.line([(x, y + 6), (x, y + 52)], dashed=True)
-            canvas.words(x + 5, y + 18, "starts", size=SMALL - 2)
+            canvas.words(x + 5, y + 18, "starts", size=SMALL - 1)
         for time in row.times:
             if 0 <= time - zero <= length:
                 x = left + (time - zero) * per_second

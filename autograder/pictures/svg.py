@@ -9,7 +9,7 @@ from autograder.core.picture import Picture
 
 TEXT = 18
 """Size of words, in units of a canvas that is WIDTH wide: still 2.5 % of the height of a slide that it fills."""
-SMALL = 15
+SMALL = 16
 WIDTH = 900.0
 LETTER = 0.58
 """Width of a letter beside its height, about: an `<img>` cannot ask for the font that it gets."""

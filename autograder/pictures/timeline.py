@@ -191,7 +191,7 @@ def _draw_run(
     x, width = left + begin * per_second, max((end - begin) * per_second, 4.0)
     canvas.box(x, top + 3, width, _LANE - 6, look=look, dashed=not run.ended)
     if by == "callback" and width > 34:
-        canvas.badge(x + width / 2, top + _LANE / 2, str(run.thread), SMALL - 2)
+        canvas.badge(x + width / 2, top + _LANE / 2, str(run.thread), SMALL - 1)
 
 
 def _legend(canvas: Canvas, y: float, looks: Mapping[str, int]) -> None:

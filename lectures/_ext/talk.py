@@ -21,6 +21,7 @@ def on_page(app: Sphinx, pagename: str, template: str, context: dict[str, Any], 
     A phone shows a figure as wide as its page; opened by itself it can be enlarged.
     """
     talks = (LECTURES / "slides" / f"{pagename}.md").exists() and pagename != "index"
+    context["talk"] = app.builder.name == "revealjs" and app.env.metadata.get(pagename, {}).get("talk")
     context["slides"] = f"../slides/{pagename}.html" if talks else ""
     context["book"] = f"../book/{pagename}.html"
     if app.builder.name != "html" or "body" not in context:
