@@ -20,7 +20,7 @@ echo "No Python was found. The kit needs Python 3.11 to 3.14." >&2; \
 echo "What to do: sudo apt-get install python3 python3-venv   or name one: make PYTHON=/path/to/python3.12" >&2; exit 2
 endef
 
-.PHONY: help setup setup-dev doctor grade check test test-all lint jupyter lectures release soak mutants bench lock clean distclean
+.PHONY: help setup setup-dev doctor grade check test test-all lint jupyter lectures release wheel soak mutants bench lock clean distclean
 
 help: ## this list
 	@echo 'make TARGET [LAB=$(LAB)] [PYTHON=python3.12] [ARGS="more options"]'; echo
@@ -44,7 +44,7 @@ check: setup ## report on one notebook: NB=path/to/notebook.ipynb
 	@$(RUN) autograder check "$(NB)" $(ARGS)
 
 jupyter: setup ## open the labs in JupyterLab
-	@cd labs && JUPYTER_CONFIG_PATH="$(CURDIR)/autograder/notebook/jupyter" $(RUN) jupyter lab $(if $(filter 0,$(shell id -u)),--allow-root) $(ARGS)
+	@$(RUN) autograder jupyter $(ARGS)
 
 release: setup ## make labs/ from solutions/
 	@$(RUN) autograder release $(ARGS)
@@ -53,6 +53,11 @@ lectures: setup-dev ## build the book and the slides into build/lectures
 	@$(RUN) python -m sphinx -q -W --keep-going -b html -d build/lectures/doctrees/book lectures build/lectures/book $(ARGS)
 	@$(RUN) python -m sphinx -q -W --keep-going -b revealjs -c lectures -d build/lectures/doctrees/slides lectures/slides build/lectures/slides $(ARGS)
 	@echo build/lectures/book/index.html build/lectures/slides/index.html
+
+wheel: setup-dev ## build the kit as a wheel, for courses elsewhere, into build/wheel
+	@rm -rf build/lib build/wheel
+	@$(RUN) uv build --quiet --wheel --no-build-isolation --out-dir build/wheel .
+	@rm -rf build/lib build/bdist.* *.egg-info; ls build/wheel/*.whl
 
 test: setup-dev ## run every test, ruff and mypy among them
 	@$(RUN) python -m pytest -n 2 --dist loadfile --no-loadscope-reorder $(ARGS)

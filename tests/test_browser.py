@@ -55,14 +55,14 @@ def jupyter(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Path, st
     environment |= {
         "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}",
         "HOME": str(home),
-        "JUPYTER_CONFIG_PATH": str(ROOT / "autograder" / "notebook" / "jupyter"),
         "JUPYTER_RUNTIME_DIR": str(home / "runtime"),
         "JUPYTERLAB_SETTINGS_DIR": str(home / "settings"),
     }
-    command = [sys.executable, "-m", "jupyter", "lab", "--no-browser", "--ServerApp.port=0", "--ServerApp.ip=127.0.0.1"]
-    command += [f"--ServerApp.root_dir={work}", "--IdentityProvider.token=lab", "--allow-root"]
+    command = [str(Path(sys.executable).with_name("autograder")), "jupyter"]
+    command += ["--no-browser", "--ServerApp.port=0", "--ServerApp.ip=127.0.0.1"]
+    command += [f"--ServerApp.root_dir={work}", "--IdentityProvider.token=lab"]
     with (tmp_path / "jupyter.log").open("w") as log:
-        server = subprocess.Popen(command, cwd=work, env=environment, stdout=log, stderr=subprocess.STDOUT)
+        server = subprocess.Popen(command, cwd=ROOT, env=environment, stdout=log, stderr=subprocess.STDOUT)
         try:
             yield work, _address(home / "runtime", server, tmp_path / "jupyter.log")
         finally:

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+
+from autograder.core.version import VERSION
 
 KIT = Path(__file__).resolve().parent.parent
 LAB = "lab2_talkers"
@@ -140,6 +143,25 @@ def test_nbgraders_own_settings_of_a_course_hold_everywhere(environment: Environ
     assert f"gradebook  {tmp_path}/elsewhere.db" in told
     assert (tmp_path / "elsewhere.db").is_file() and not (root / "build" / "gradebook.db").exists()
     assert f"ann,{LAB},5,5,0" in (root / "build" / "grades.csv").read_text(encoding="utf-8")
+
+
+def test_the_doctor_speaks_of_the_course_and_of_no_checkout(environment: Environment, course: Path) -> None:
+    told = environment.run(course, "autograder", "doctor", "--json")
+    findings = {one["name"]: one for one in json.loads(told)["findings"]}
+    assert findings["environment"]["found"] == f"{environment.folder} (kit {VERSION})"
+    assert str(course) in findings["free space"]["found"]
+    assert "make " not in told
+
+
+def test_students_settings_of_jupyterlab_come_with_the_wheel(environment: Environment, course: Path) -> None:
+    shown = environment.run(course, "autograder", "jupyter", "--show-config")
+    assert "/lab/tree/README.md" in shown and "'nbgrader.server_extensions.formgrader': False" in shown
+
+
+def test_the_wheel_has_the_version_that_the_changelog_prepares(environment: Environment) -> None:
+    assert next(environment.folder.parent.glob(f"*-{VERSION}-*.whl"))
+    changes = (KIT / "CHANGELOG.md").read_text(encoding="utf-8")
+    assert re.findall(r"^## (\S+)", changes, re.MULTILINE)[0] == VERSION
 
 
 def test_outside_of_a_course_nbgrader_executes_nothing(environment: Environment, tmp_path: Path) -> None:

@@ -15,6 +15,9 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from autograder.core.errors import KitError
+from autograder.core.version import VERSION
+from autograder.course.folder import course_root
 from autograder.sandbox.environment import profile_environment
 from autograder.setup.environment import digest, read_marker
 from autograder.setup.interpreter import NEWEST, OLDEST
@@ -55,6 +58,11 @@ print(json.dumps(found))
 
 TRY_PROBE = "import json; from autograder.sandbox.inside.probe import attach; print(json.dumps(attach.prepare()))"
 """In a process of its own: to try is to put notes around rclpy's functions."""
+
+
+IN_CHECKOUT = (ROOT / "Makefile").is_file()
+"""Or else the kit was installed from its wheel, and `make` has nothing to do with it."""
+ANEW = "make distclean setup" if IN_CHECKOUT else "install the kit again, into a new environment"
 
 
 @dataclass(frozen=True)
@@ -106,7 +114,8 @@ def python() -> Finding:
     """Whether this Python is one that the ROS wheels exist for."""
     version = platform.python_version()
     good = OLDEST <= sys.version_info[:2] <= NEWEST
-    do = "" if good else "Use Python 3.11 to 3.14: make setup PYTHON=/path/to/python3.12"
+    how = "make setup PYTHON=/path/to/python3.12" if IN_CHECKOUT else "install the kit into an environment of one"
+    do = "" if good else f"Use Python 3.11 to 3.14: {how}"
     return Finding("Python", good, f"{version}  {sys.executable}", do)
 
 
@@ -114,7 +123,9 @@ def environment() -> Finding:
     """Whether `.venv` is finished and agrees with the lock."""
     name = "environment"
     if Path(sys.prefix).resolve() != VENV:
-        return Finding(name, True, f"{sys.prefix} (not the kit's own .venv)")
+        return Finding(
+            name, True, f"{sys.prefix} ({'not the .venv of the checkout' if IN_CHECKOUT else 'kit ' + VERSION})"
+        )
     state = read_marker()
     if not state:
         return Finding(name, False, f"{VENV} is unfinished, or was moved", "Run: make setup")
@@ -136,7 +147,6 @@ def foreign_ros() -> Finding:
 def ros() -> Finding:
     """Whether rclpy really works: it is imported, and one message goes from a publisher to a subscription."""
     name = "ROS 2"
-    repair = "Make the environment anew: make distclean setup"
     try:
         process = subprocess.run(
             [sys.executable, "-P", "-c", TRY_ROS],
@@ -151,11 +161,11 @@ def ros() -> Finding:
             name, False, f"no message arrived in {ROS_TIME_LIMIT:g} s", "See that no firewall blocks UDP on 127.0.0.1."
         )
     if process.returncode:
-        return Finding(name, False, (process.stderr.strip().splitlines() or ["rclpy does not start"])[-1], repair)
+        return Finding(name, False, (process.stderr.strip().splitlines() or ["rclpy does not start"])[-1], ANEW)
     found = json.loads(process.stdout.strip().splitlines()[-1])
     place = Path(found["place"])
     if not (place.is_relative_to(sys.prefix) or place.is_relative_to("/opt/ros/jazzy")):
-        return Finding(name, False, f"rclpy comes from {place.parent}, not from this environment", repair)
+        return Finding(name, False, f"rclpy comes from {place.parent}, not from this environment", ANEW)
     if found["middleware"] != "rmw_fastrtps_cpp":
         return Finding(name, False, f"the middleware is {found['middleware']}", "Run: unset RMW_IMPLEMENTATION")
     return Finding(name, True, f"Jazzy, rclpy {found['version']}, Fast DDS: a message arrived".replace("  ", " "))
@@ -179,7 +189,7 @@ def probe() -> Finding:
     if moved:
         found = f"the probe cannot attach to this rclpy. {moved[0]}"
         found += f" ({len(moved)} such places)" if len(moved) > 1 else ""
-        repair = "Use the locked rclpy (make distclean setup); until then failed checks are given fewer reasons."
+        repair = f"Use the locked rclpy ({ANEW}); until then failed checks are given fewer reasons."
         return Finding(name, False, found, repair)
     return Finding(name, True, "the probe attaches to this rclpy")
 
@@ -203,9 +213,12 @@ def cores() -> Finding:
 
 def space() -> Finding:
     """Free space where results are written."""
-    folder = ROOT
+    try:
+        folder = course_root()
+    except KitError:
+        folder = Path.cwd()
     free = shutil.disk_usage(folder).free
-    do = "" if free >= NEEDED_SPACE else f"Free {NEEDED_SPACE // GIB} GiB; make clean removes what was built."
+    do = "" if free >= NEEDED_SPACE else f"Free {NEEDED_SPACE // GIB} GiB; what was built lies in {folder / 'build'}."
     if not os.access(folder, os.W_OK):
         return Finding("free space", False, f"{folder} is not writable", "Work in a copy that is yours.")
     return Finding("free space", free >= NEEDED_SPACE, f"{free / GIB:.1f} GiB in {folder}", do)

@@ -1,4 +1,4 @@
-"""`autograder doctor`, what this machine offers, and `autograder ros2`, what runs on it."""
+"""`autograder doctor`, what this machine offers, `jupyter` and `ros2`, what runs on it."""
 
 from __future__ import annotations
 
@@ -15,6 +15,16 @@ def doctor(as_json: JsonOption = False) -> None:
     from autograder.cli.doctor import run
 
     raise typer.Exit(run(as_json))
+
+
+@app.command(add_help_option=False, context_settings={"ignore_unknown_options": True})
+def jupyter(
+    words: Annotated[list[str] | None, typer.Argument(metavar="...", help="As for `jupyter lab`.")] = None,
+) -> None:
+    """Open the course's labs in JupyterLab, with the settings that students work with."""
+    from autograder.cli.jupyter import open_labs
+
+    open_labs(words or [])
 
 
 @app.command("ros2", add_help_option=False, context_settings={"ignore_unknown_options": True})

@@ -1,3 +1,3 @@
-"""The kit's version; it stands in every result."""
+"""The kit's version, which stands in every result; the wheel takes its own from here."""
 
-VERSION = "0.1.0"
+VERSION = "0.2.0"

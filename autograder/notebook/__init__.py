@@ -1,1 +1,6 @@
 """The IPython extension: what a student sees and uses in a notebook."""
+
+from pathlib import Path
+
+JUPYTER_SETTINGS = Path(__file__).with_name("jupyter")
+"""JupyterLab's settings for students, without formgrader."""

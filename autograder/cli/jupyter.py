@@ -1,0 +1,36 @@
+"""`autograder jupyter`: JupyterLab as students have it."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Sequence
+from typing import NoReturn
+
+from autograder.core.errors import KitError
+from autograder.course.folder import course_root
+from autograder.course.paths import CoursePaths
+from autograder.notebook import JUPYTER_SETTINGS
+
+
+def open_labs(words: Sequence[str]) -> NoReturn:
+    """Become JupyterLab in the folder of labs.
+
+    Its settings are not those of the whole environment: an instructor who starts `jupyter lab` there has formgrader.
+
+    Args:
+        words: further options of `jupyter lab`.
+
+    Raises:
+        KitError: the course has no labs yet.
+    """
+    labs = CoursePaths(course_root()).labs
+    if not labs.is_dir():
+        raise KitError(f"There are no labs in {labs}.", "Make them from the solutions: autograder release")
+    os.chdir(labs)
+    environment = dict(os.environ)
+    environment["JUPYTER_CONFIG_PATH"] = str(JUPYTER_SETTINGS)
+    # What runs in a notebook starts the environment's programs by their bare name.
+    environment["PATH"] = os.pathsep.join((os.path.dirname(sys.executable), os.environ.get("PATH", os.defpath)))  # noqa: PTH120
+    root = ["--allow-root"] if os.getuid() == 0 else []
+    os.execve(sys.executable, [sys.executable, "-P", "-m", "jupyterlab", *root, *words], environment)
