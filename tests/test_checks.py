@@ -841,3 +841,30 @@ while not client.wait_for_service(timeout_sec=1.0):
 """,
     )
     assert failure(result).code == code
+
+
+HOLDER = """
+import rclpy
+
+rclpy.init()
+node = rclpy.create_node("holder", automatically_declare_parameters_from_overrides=True)
+rclpy.spin(node)
+"""
+
+
+def test_a_parameter_reaches_the_program_as_what_it_is(grade: Grade) -> None:
+    given = {"text": "1e5", "yes": "y", "lines": 'two\n"lines" \\ 🤖', "texts": ["on", "7"], "whole": 40, "real": 40.0,
+             "tiny": 1e-7, "huge": 1e22, "flag": True, "reals": [1.0, 2.5]}  # fmt: skip
+    result = grade(
+        f"""\
+        given = {given!r}
+        with launch("holder", parameters=given) as ros:
+            ros.expect_node("/holder")
+            held = {{name: list(v) if isinstance(given[name], list) else v
+                    for name, v in ros.get_parameters("/holder", list(given)).items()}}
+            ros.require_equal("What it holds", repr(held), repr(given))
+        ros.score(2)
+        """,
+        holder__py=HOLDER,
+    )
+    assert result.points == 2.0, result.outcomes

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
-
-import yaml
 
 from autograder.arguments import remap_rules
 from autograder.checks.command_line import CommandLine
@@ -42,7 +41,9 @@ class Program:
         if self.params_file:
             words += ["--params-file", self.params_file]
         for name, value in self.parameters.items():
-            words += ["-p", f"{name}:={_yaml_value(value)}"]
+            # As JSON, rcl reads each value as what it is. What `yaml.dump` writes, which `ros2 launch` uses and
+            # launch_files/nodes.py therefore too, it does not: to it a bare `1e5` or `y` is no text.
+            words += ["-p", f"{name}:={json.dumps(value, ensure_ascii=False)}"]
         words += self._typed()
         return [*self.arguments_of_its_own, *(["--ros-args", *words] if words else [])]
 
@@ -71,12 +72,3 @@ class Program:
         if self.name:
             rules.append(f"__node:={self.name}")
         return rules
-
-
-def _yaml_value(value: Any) -> str:
-    """A parameter value as the command line wants it; strings are quoted so that `40` stays a string."""
-    if isinstance(value, str):
-        return '"' + value.replace("\\", "\\\\").replace('"', '\\"') + '"'
-    if isinstance(value, float):
-        return repr(value)  # keeps the point: 40.0 is a double, 40 an integer
-    return yaml.safe_dump(value, default_flow_style=True, width=10_000).splitlines()[0]

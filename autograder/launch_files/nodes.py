@@ -122,6 +122,6 @@ def remove_written(folder: Path) -> None:
 
 
 def _on_a_command_line(value: Any) -> str:
-    """A value as `yaml.dump` would write it into a parameter file, in one word."""
+    """A value as `launch_ros` writes it, with `yaml.dump`, in one word: here a text may become a number, too."""
     text = yaml.safe_dump(value, default_flow_style=True, width=1_000_000)
     return text.removesuffix("\n...\n").removesuffix("\n")

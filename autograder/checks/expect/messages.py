@@ -63,6 +63,17 @@ class _Wanted:
         return f"{number} message{'s' * (self.need != 1)}{which} on `{topic}`{rate}"
 
 
+def _numbers(at_least: int, at_most: int | None, exactly: int | None, rate: float | None) -> tuple[int, int | None]:
+    """How many messages have to come, and how many may."""
+    if exactly is not None and (at_least or at_most is not None):
+        raise Misuse("expect_messages: exactly=… already says at_least=… and at_most=….")
+    if min(at_least, at_most or 0, exactly or 0) < 0 or (rate is not None and rate <= 0):
+        raise Misuse("expect_messages: a number of messages is not negative, and a rate is above 0.")
+    if exactly is not None:
+        return exactly, exactly
+    return at_least or (0 if at_most == 0 else 10 if rate else 1), at_most
+
+
 def _number(messages: int) -> str:
     return f"{messages} message{'s' * (messages != 1)}"
 
@@ -109,14 +120,13 @@ class MessageExpectations(SourceExpectations):
         Args:
             topic: full name.
             msg_type: message class.
-            at_least: so many (by default 1, or 10 with `rate`), counted from the first.
+            at_least: so many, by default 1, or 10 with `rate`.
             at_most: not more, watched for `for_seconds`; 0 means that none may come.
             exactly: both at once.
-            rate: hertz, of the last messages; judged by the median gap of the publisher's own stamps, so that a slow
-                grader does not matter.
+            rate: hertz, of the last messages, by the publisher's own stamps: a slow grader does not matter.
             tolerance: allowed deviation of the rate, as a share.
             for_seconds: how long it is watched, in seconds, whether more than `at_most` come.
-            skip: leaves out the first so many messages of the topic, for example those of a node's first life.
+            skip: leaves out so many messages at the beginning, such as those of a node's first life.
             where: counts only messages for which it gives something true.
             saying: what `where` asks for, in words for the student, such as "`ok`".
             values: looks at all counted messages; a sentence that says what is wrong fails, and so does what is false.
@@ -135,24 +145,16 @@ class MessageExpectations(SourceExpectations):
         Codes:
             `too-few`, `too-many`, `content`, `rate`, `extra-publisher`, `wrong-node`, and what keeps a topic silent.
         """
-        if exactly is not None and (at_least or at_most is not None):
-            raise Misuse("expect_messages: exactly=… already says at_least=… and at_most=….")
-        if min(at_least, at_most or 0, exactly or 0) < 0 or (rate is not None and rate <= 0):
-            raise Misuse("expect_messages: a number of messages is not negative, and a rate is above 0.")
-        most = exactly if exactly is not None else at_most
-        need = exactly if exactly is not None else at_least or (0 if most == 0 else 10 if rate else 1)
+        need, most = _numbers(at_least, at_most, exactly, rate)
         recording = self._observer.record(topic, msg_type, qos)
         wanted = _Wanted(recording, need, most, rate, skip, where, saying, hint)
         if not self.wait(wanted.enough, within, lambda: self._ends(topic, msg_type, "publisher", "")):
             self._too_few(wanted, qos or quiet_profile(), within)
-        if most is not None:
-            self._not_more(wanted, most, for_seconds)
+        self._not_more(wanted, for_seconds)
         self._one_source(wanted.title, topic, msg_type, publisher, publishers, recording.messages[skip:])
-        if rate is not None:
-            self._at_rate(wanted, rate, tolerance, within)
+        self._at_rate(wanted, tolerance, within)
         received = wanted.counted()
-        if values is not None:
-            self._say(wanted, received, values)
+        self._say(wanted, received, values)
         outcomes.passed(wanted.title, observed=f"{len(received)} messages")
         return [r.msg for r in received]
 
@@ -176,7 +178,10 @@ class MessageExpectations(SourceExpectations):
         expected, observed = _number(wanted.need), _number(got)
         self._fail(wanted.title, reason, expected=expected, observed=observed, hint=wanted.hint)
 
-    def _not_more(self, wanted: _Wanted, most: int, for_seconds: float) -> None:
+    def _not_more(self, wanted: _Wanted, for_seconds: float) -> None:
+        most = wanted.most
+        if most is None:
+            return
         self._observer.wait(lambda: len(wanted.counted()) > most, for_seconds)
         came = len(wanted.counted())
         if came > most:
@@ -188,8 +193,10 @@ class MessageExpectations(SourceExpectations):
                 hint=wanted.hint,
             )
 
-    def _at_rate(self, wanted: _Wanted, rate: float, tolerance: float, within: float) -> None:
-        need, every = wanted.need, wanted.where is None
+    def _at_rate(self, wanted: _Wanted, tolerance: float, within: float) -> None:
+        rate, need, every = wanted.rate, wanted.need, wanted.where is None
+        if rate is None:
+            return
         # What a busy machine held up for a moment comes at its rate again; what has another rate never does.
         enough = need if wanted.most is not None else _RATE_DECIDED * need
 
@@ -218,7 +225,9 @@ class MessageExpectations(SourceExpectations):
                 hint=wanted.hint,
             )
 
-    def _say(self, wanted: _Wanted, received: list[Received], values: Callable[[list[Any]], object]) -> None:
+    def _say(self, wanted: _Wanted, received: list[Received], values: Callable[[list[Any]], object] | None) -> None:
+        if values is None:
+            return
         verdict = values([r.msg for r in received])
         if not isinstance(verdict, str) and verdict:
             return
