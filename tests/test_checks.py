@@ -169,6 +169,85 @@ def test_a_wrong_node_loses_the_points_for_its_own_reason(
     assert because in outcome.because, outcome
 
 
+CAREFUL = TALKER.replace(
+    "    rclpy.spin(Talker())\n",
+    "    try:\n        rclpy.spin(Talker())\n    except (KeyboardInterrupt, ExternalShutdownException):\n        pass\n"
+    "    rclpy.try_shutdown()\n",
+).replace("import rclpy\n", "import rclpy\nfrom rclpy.executors import ExternalShutdownException\n", 1)
+
+
+@pytest.mark.parametrize("by", ["SIGINT", "SIGTERM"])
+def test_a_program_that_is_told_to_end_may_end_cleanly(grade: Grade, by: str) -> None:
+    result = grade(
+        f"""\
+        with launch("talker", parameters={{"period": 60.0}}) as ros:
+            ros.expect_node("/talker")
+            ros.expect_clean_end("talker", by={by!r})
+        ros.score(2)
+        """,
+        talker__py=CAREFUL,
+    )
+    assert result.points == 2, result
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "by", "code", "because"),
+    [
+        ("KeyboardInterrupt, ", "", "SIGINT", "unclean-end", "KeyboardInterrupt. That was at Ctrl-C"),
+        (", ExternalShutdownException)", ",)", "SIGTERM", "unclean-end", "ExternalShutdownException. That was at SIGTERM"),
+        ("try_shutdown()", "shutdown()", "SIGINT", "unclean-end", "already called"),
+        ("    rclpy.try_shutdown()", "    raise SystemExit(4)", "SIGTERM", "unclean-end", "with exit status 4."),
+        ("        pass", "        import time; time.sleep(60)", "SIGTERM", "signal-ignored", "still runs; it is in line"),
+        ('super().__init__("talker")', 'raise ValueError("no")', "SIGINT", "crashed", "ValueError: no"),
+    ],
+)  # fmt: skip
+def test_a_program_that_does_not_end_cleanly_is_told_what_it_did(
+    grade: Grade, old: str, new: str, by: str, code: str, because: str
+) -> None:
+    assert old in CAREFUL
+    result = grade(
+        f"""\
+        with launch("talker", parameters={{"period": 60.0}}) as ros:
+            ros.wait_for_graph(lambda: "/talker" in ros.nodes())
+            ros.expect_clean_end("talker", by={by!r})
+        ros.score(2)
+        """,
+        talker__py=CAREFUL.replace(old, new),
+    )
+    outcome = failure(result)
+    assert (outcome.code, because in outcome.because) == (code, True), outcome
+
+
+@pytest.mark.parametrize(("shuts_down", "points"), [("try_shutdown()", 2), ("shutdown()", 0)])
+def test_ctrl_c_finds_rclpy_shut_down_each_time(grade: Grade, shuts_down: str, points: int) -> None:
+    # In the middle of a callback is where Python and rclpy's own thread would be in a race.
+    program = CAREFUL.replace("try_shutdown()", shuts_down).replace("def tick(self):", "def tick(self):\n        busy()")
+    program = program.replace("class Talker", "def busy():\n    for _ in range(300_000):\n        pass\n\n\nclass Talker")
+    for _ in range(3):
+        result = grade(
+            """\
+            with launch("talker") as ros:
+                ros.expect_messages("/chatter", String, at_least=2)
+                ros.expect_clean_end("talker")
+            ros.score(2)
+            """,
+            talker__py=program,
+        )
+        assert result.points == points, result
+
+
+def test_a_status_is_asked_of_a_program_that_need_not_spin(grade: Grade) -> None:
+    result = grade(
+        """\
+        with launch("asker") as ros:
+            ros.expect_exit("asker", status=1)
+        ros.score(2)
+        """,
+        asker__py="import rclpy\nfrom rclpy.node import Node\nrclpy.init()\nNode('asker')\nrclpy.shutdown()\n",
+    )
+    assert (failure(result).code, failure(result).because) == ("exit-status", "It ended with status 0.")
+
+
 def test_what_follows_a_failure_is_listed_as_not_checked_and_hidden_lines_stay_marked(grade: Grade) -> None:
     result = grade(
         """\

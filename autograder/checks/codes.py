@@ -46,6 +46,8 @@ GROUPS: dict[str, dict[str, str]] = {
     "Expectations: programs and their output": {
         "still-running": "a program runs on that should have ended",
         "exit-status": "the program ended with another status",
+        "signal-ignored": "the program was told to end by a signal, and still ran when the time for that was over",
+        "unclean-end": "told to end by a signal, the program ended with another status than 0 or printed an error",
         "no-log": "no such line was logged, or not that often",
         "required": "a fact that the check established does not hold; the check gave no code of its own",
         "failed": "an expectation does not hold; nothing more is known",

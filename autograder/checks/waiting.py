@@ -33,6 +33,7 @@ _WAITS_FOR = {
     "expect_transitions": "transitions of `{}`",
     "expect_running": "the program `{}`",
     "expect_exit": "the end of the program `{}`",
+    "expect_clean_end": "the end of the program `{}`",
     "expect_log": "a line in the log of `{}`",
     "transition": "`{}` to change its state",
     "available_transitions": "an answer of `{}`",

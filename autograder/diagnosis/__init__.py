@@ -20,6 +20,7 @@ from autograder.diagnosis.reason import DiagnosedProgram, Diagnosis
 from autograder.diagnosis.scene import Scene
 from autograder.diagnosis.silence import SILENT, account, lifecycle_silence, paces, why_no_answer, why_silent
 from autograder.diagnosis.together import layout, waits_for_its_group, why_not_together, why_starved
+from autograder.diagnosis.traces import last_traceback
 from autograder.diagnosis.turns import why_kept_waiting
 
 __all__ = [
@@ -31,6 +32,7 @@ __all__ = [
     "called_from_outside",
     "failed_in_a_callback",
     "inside_reason",
+    "last_traceback",
     "layout",
     "lifecycle_silence",
     "paces",

@@ -12,6 +12,7 @@ import sys
 import traceback
 import types
 
+from .interrupt import interrupt
 from .kernel import PR_SET_DUMPABLE, filter_calls, limit, prctl
 from .probe import attach
 from .requests import Start
@@ -45,7 +46,7 @@ def become(start: Start) -> None:
     sys.stdout = open(1, "w", encoding="utf-8", errors="backslashreplace", buffering=1, closefd=False)
     sys.stderr = open(2, "w", encoding="utf-8", errors="backslashreplace", buffering=1, closefd=False)
     vars(sys).update(__stdin__=sys.stdin, __stdout__=sys.stdout, __stderr__=sys.stderr)
-    signal.signal(signal.SIGINT, signal.default_int_handler)
+    signal.signal(signal.SIGINT, interrupt)
     faulthandler.register(STACK_SIGNAL, file=_STACKS, all_threads=True, chain=False)
     filter_calls(start.filter)
 
