@@ -1,0 +1,30 @@
+%%node temperature_monitor
+import rclpy
+from rclpy.executors import ExternalShutdownException
+from rclpy.node import Node
+from rclpy.qos import qos_profile_sensor_data
+from sensor_msgs.msg import Temperature
+
+
+class TemperatureMonitor(Node):
+    def __init__(self):
+        super().__init__("temperature_monitor")
+        self.create_subscription(Temperature, "temperature", self.judge, qos_profile_sensor_data)
+
+    def judge(self, message):
+        if not message.temperature <= 30.0:
+            self.get_logger().info("looking")
+            self.get_logger().warning(f"too hot: {message.temperature:.1f} degrees")
+
+
+def main():
+    rclpy.init()
+    try:
+        rclpy.spin(TemperatureMonitor())
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    finally:
+        rclpy.try_shutdown()
+
+
+main()

@@ -1,0 +1,29 @@
+%%node add_server
+import rclpy
+from rclpy.executors import ExternalShutdownException
+from rclpy.node import Node
+from test_msgs.srv import BasicTypes
+
+
+class AddServer(Node):
+    def __init__(self):
+        super().__init__("add_server")
+        self.create_service(BasicTypes, "add_two_ints", self.add)
+
+    def add(self, request, response):
+        total = request.int32_value + request.int64_value
+        response.int64_value = (total + 2**31) % 2**32 - 2**31
+        return response
+
+
+def main():
+    rclpy.init()
+    try:
+        rclpy.spin(AddServer())
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    finally:
+        rclpy.try_shutdown()
+
+
+main()
