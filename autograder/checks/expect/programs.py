@@ -192,7 +192,9 @@ class ProgramExpectations(Expectations):
         program.signal(getattr(signal, by))
         if not self._observer.wait(lambda: not program.running(), within):
             because = f"{within:g} s after {_SAID[by]} it still runs{self._place_of(program)}."
-            self._fail(title, Diagnosis(because, "signal-ignored"), expected="ended", observed="still running", hint=hint)
+            self._fail(
+                title, Diagnosis(because, "signal-ignored"), expected="ended", observed="still running", hint=hint
+            )
         self._running.stopped.append(program)
         status, said = program.exit_status(), program.output()[said_before:]
         error = last_traceback(said, name) if status or "Traceback (most recent call last)" in said else None

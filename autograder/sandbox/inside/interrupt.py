@@ -1,8 +1,9 @@
 """Ctrl-C in a program: always in one order, which rclpy leaves to luck.
 
-At SIGINT a thread of rclpy's shuts the context down, while Python raises KeyboardInterrupt in the main thread. Whichever
-comes second finds the work done: `rclpy.shutdown()` after the exception mostly fails and now and then does not, and even
-`rclpy.try_shutdown()` fails once in a while, between its question and its deed. Here the shutdown always comes first.
+At SIGINT a thread of rclpy's shuts the context down, while Python raises KeyboardInterrupt in the main thread.
+Whichever comes second finds the work done. So `rclpy.shutdown()` after the exception mostly fails and sometimes does
+not, and even `rclpy.try_shutdown()` fails once in a while, between its question and its deed. Here the shutdown always
+comes first.
 """
 
 import contextlib
