@@ -13,6 +13,7 @@ from autograder.arguments import params_file, remap_rules
 from autograder.checks import contradictions, findings, outcomes, runtime, seen
 from autograder.checks.command_line import CommandLineError
 from autograder.checks.expect.actions import ActionExpectations
+from autograder.checks.expect.ending import EndingExpectations
 from autograder.checks.expect.facts import Facts
 from autograder.checks.expect.looking import Looking
 from autograder.checks.expect.meanwhile import MeanwhileExpectations
@@ -20,7 +21,6 @@ from autograder.checks.expect.messages import MessageExpectations
 from autograder.checks.expect.parameters import ParameterExpectations
 from autograder.checks.expect.periods import PeriodExpectations
 from autograder.checks.expect.pictures import Pictures
-from autograder.checks.expect.programs import ProgramExpectations
 from autograder.checks.expect.publishing import Publishing
 from autograder.checks.expect.qos import QosExpectations
 from autograder.checks.expect.services import ServiceExpectations
@@ -51,7 +51,7 @@ class Launch(
     ServiceExpectations,
     ParameterExpectations,
     ActionExpectations,
-    ProgramExpectations,
+    EndingExpectations,
     Facts,
     Looking,
     Pictures,

@@ -1,0 +1,119 @@
+"""Expectations of how programs end: by themselves, or when they are told to."""
+
+from __future__ import annotations
+
+import signal
+
+from autograder import diagnosis
+from autograder.checks.expect.expectations import WITHIN
+from autograder.checks.expect.programs import ProgramExpectations
+from autograder.checks.misuse import Misuse
+from autograder.diagnosis import Diagnosis, last_traceback
+from autograder.sandbox.node_sandbox import RunningProgram
+
+_SAID = {"SIGINT": "Ctrl-C (SIGINT)", "SIGTERM": "SIGTERM"}
+"""How a program is told to end, in words."""
+
+_ENDED = "`main` has to catch what spinning raises then: `KeyboardInterrupt` and `ExternalShutdownException`. "
+_ENDED += "After that `rclpy.try_shutdown()` is right, which does nothing where the signal has shut rclpy down already."
+
+
+class EndingExpectations(ProgramExpectations):
+    """How the programs end."""
+
+    def expect_exit(self, name: str, *, status: int | None = None, within: float = WITHIN, hint: str = "") -> None:
+        """A program ends by itself.
+
+        Args:
+            name: of the program.
+            status: its exit status; by default any.
+            within: seconds until it must have ended.
+            hint: a pointer for the student.
+
+        Example:
+            `ros.expect_exit("stopper", status=0)`
+
+        Codes:
+            `still-running`, `exit-status`, `shutdown-in-callback`, and reasons why a program ends or does not.
+        """
+        program = self.program(name)
+        self._running.may_end.append(program)
+        title = f"`{name}` ends by itself" + ("" if status is None else f" with exit status {status}")
+        if not self.wait(lambda: not program.running(), within):
+            where = self._place_of(program)
+            reason = diagnosis.inside_reason(self._scene())
+            if reason and reason.code in ("spinning-ended", "not-spinning"):  # a program that ends need not spin
+                reason = None
+            self._fail(
+                title,
+                reason or Diagnosis(f"It still runs after {within:g} s{where}.", "still-running"),
+                expected="ended",
+                observed="still running",
+                hint=hint,
+            )
+        ended = program.exit_status()
+        if program.stopped_by():
+            self._fail(title, diagnosis.program_trouble(self._scene()), expected="ended by itself", hint=hint)
+        self._expect_that(
+            status is None or ended == status,
+            title,
+            lambda: diagnosis.shut_down_inside(self._scene()) or self._why_this_status(ended),
+            expected=str(status),
+            observed=str(ended),
+            hint=hint,
+        )
+
+    def _why_this_status(self, ended: int | None) -> Diagnosis:
+        """Why a program that had to end did so with another status: an error, or nothing more than that is known."""
+        reason = diagnosis.program_trouble(self._scene())
+        if reason is not None and reason.code not in ("exited", "not-spinning"):  # it had to end, and need not spin
+            return reason
+        return Diagnosis(f"It ended with status {ended}.", "exit-status")
+
+    def expect_clean_end(self, name: str, *, by: str = "SIGINT", within: float = 3.0, hint: str = "") -> None:
+        """A program that is told to end does so: with exit status 0, and without printing an error.
+
+        Args:
+            name: of the program.
+            by: the signal that tells it: `SIGINT`, as Ctrl-C does, or `SIGTERM`, as launch and systemd do.
+            within: seconds until it must have ended.
+            hint: a pointer for the student.
+
+        Example:
+            `ros.expect_clean_end("talker", by="SIGTERM")`
+
+        Codes:
+            `signal-ignored`, `unclean-end`, and those of `expect_running`.
+        """
+        if by not in _SAID:
+            raise Misuse(f"expect_clean_end: by={by!r} is none of {', '.join(_SAID)}.")
+        self.expect_running(name)
+        program = self.program(name)
+        title = f"`{name}` ends cleanly at {_SAID[by]}"
+        self._running.may_end.append(program)
+        said_before = len(program.output())
+        program.signal(getattr(signal, by))
+        if not self._observer.wait(lambda: not program.running(), within):
+            because = f"{within:g} s after {_SAID[by]} it still runs{self._place_of(program)}."
+            self._fail(
+                title, Diagnosis(because, "signal-ignored"), expected="ended", observed="still running", hint=hint
+            )
+        self._running.stopped.append(program)
+        status, said = program.exit_status(), program.output()[said_before:]
+        error = last_traceback(said, name) if status or "Traceback (most recent call last)" in said else None
+        because = f"Told to end by {_SAID[by]}, it ended with exit status {status}."
+        if error is not None:
+            because = f"{error.because}. That was at {_SAID[by]}; the exit status is {status}."
+        self._expect_that(
+            status == 0 and error is None,
+            title,
+            lambda: Diagnosis(because, "unclean-end", _ENDED if error is not None else ""),
+            expected="exit status 0 and no error",
+            observed=f"exit status {status}" + (" and an error" if error is not None else ""),
+            hint=hint,
+        )
+
+    def _place_of(self, program: RunningProgram) -> str:
+        """Where the main thread of a program is, as the end of a sentence; empty if that cannot be seen."""
+        places = [inside.main_place() for inside in self._scene().insides if inside.program is program]
+        return f"; it is in {places[0]}" if places and places[0] else ""
