@@ -37,6 +37,7 @@ CELLS = """() => [...document.querySelectorAll('.jp-CodeCell')].map(cell => ({
   output: [...cell.querySelectorAll('.jp-OutputArea-output')].map(output => output.innerText).join('\\n'),
   error: !!cell.querySelector('[data-mime-type="application/vnd.jupyter.error"]'),
 }))"""
+PROMPTS = "() => [...document.querySelectorAll('.jp-CodeCell .jp-InputArea-prompt')].map(prompt => prompt.textContent)"
 
 
 @pytest.fixture(scope="module")
@@ -74,6 +75,14 @@ def jupyter(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Path, st
                 server.wait()
 
 
+@pytest.fixture(scope="module")
+def window(browser: Any) -> Iterator[Any]:
+    """Where pages are opened: they share what the browser has read and compiled of JupyterLab."""
+    opened = browser.new_context(viewport={"width": 1400, "height": 900})
+    yield opened
+    opened.close()
+
+
 def _address(runtime: Path, server: subprocess.Popen[bytes], log: Path) -> str:
     deadline = time.monotonic() + START_SECONDS
     while time.monotonic() < deadline and server.poll() is None:
@@ -91,9 +100,9 @@ def kernel_is_idle(kernels: list[dict[str, Any]]) -> bool:
     return any(kernel["execution_state"] == "idle" and kernel["connections"] for kernel in kernels)
 
 
-def _run_all(browser: Any, address: str, name: str) -> tuple[Any, list[dict[str, Any]]]:
+def _run_all(window: Any, address: str, name: str) -> tuple[Any, list[dict[str, Any]]]:
     """Open a notebook, choose Run > Run All Cells, and give the page and its code cells once the last has been run."""
-    page = browser.new_page(viewport={"width": 1400, "height": 900})
+    page = window.new_page()
     outside: list[str] = []
     own = (address, address.replace("http", "ws"), "data:", "blob:")
     page.on("request", lambda request: None if request.url.startswith(own) else outside.append(request.url))
@@ -103,7 +112,7 @@ def _run_all(browser: Any, address: str, name: str) -> tuple[Any, list[dict[str,
     page.wait_for_selector(".jp-Notebook-ExecutionIndicator[data-status='idle']", timeout=START_SECONDS * 1000)
     deadline = time.monotonic() + RUN_SECONDS
     # What is chosen while JupyterLab still connects to the kernel is not done; a dialog says so, or nothing does.
-    while all("[ ]" in cell["prompt"] for cell in page.evaluate(CELLS)):
+    while all("[ ]" in prompt for prompt in page.evaluate(PROMPTS)):
         assert time.monotonic() < deadline, "Run All Cells runs no cell"
         if page.locator(".jp-Dialog").count():
             page.keyboard.press("Escape")
@@ -111,7 +120,7 @@ def _run_all(browser: Any, address: str, name: str) -> tuple[Any, list[dict[str,
             page.click("text=Run >> nth=0")
             page.click("text='Run All Cells'")
         page.wait_for_timeout(2000)
-    while any("*" in cell["prompt"] or "[ ]" in cell["prompt"] for cell in page.evaluate(CELLS)):
+    while any("*" in prompt or "[ ]" in prompt for prompt in page.evaluate(PROMPTS)):
         assert time.monotonic() < deadline, [c for c in page.evaluate(CELLS) if not re.search(r"\d", c["prompt"])]
         page.wait_for_timeout(500)
     page.wait_for_selector(".jp-Notebook-ExecutionIndicator[data-status='idle']", timeout=30_000)
@@ -144,7 +153,7 @@ def _picture(page: Any, name: str) -> None:
     ("lab_name", "student"), [*((lab, "solution") for lab in lab_names(ROOT)), ("lab2_executors", "e03_no_groups")]
 )
 def test_the_lab_runs_top_to_bottom_with_the_verdicts_of_grading(
-    browser: Any, jupyter: tuple[Path, str], tmp_path: Path, lab_name: str, student: str
+    window: Any, jupyter: tuple[Path, str], tmp_path: Path, lab_name: str, student: str
 ) -> None:
     work, address = jupyter
     lab = load_lab(ROOT, lab_name)
@@ -154,7 +163,7 @@ def test_the_lab_runs_top_to_bottom_with_the_verdicts_of_grading(
     expected = sample_class.expected(lab, student)
     sources = [cell for cell in json.loads(handed_in.read_text())["cells"] if cell["cell_type"] == "code"]
 
-    page, cells = _run_all(browser, address, name)
+    page, cells = _run_all(window, address, name)
     _picture(page, name)
     _close(page, address, name)
 
@@ -178,17 +187,17 @@ def test_the_lab_runs_top_to_bottom_with_the_verdicts_of_grading(
         assert expected.because.get(check, "") in shown[check]
 
 
-def _page_with(browser: Any, address: str, path: str) -> Any:
-    page = browser.new_page(viewport={"width": 1400, "height": 900})
+def _page_with(window: Any, address: str, path: str) -> Any:
+    page = window.new_page()
     page.goto(f"{address}{path}?token=lab", timeout=START_SECONDS * 1000)
     return page
 
 
 def test_a_students_jupyterlab_opens_the_labs_and_has_none_of_an_instructors_tools(
-    browser: Any, jupyter: tuple[Path, str]
+    window: Any, jupyter: tuple[Path, str]
 ) -> None:
     work, address = jupyter
-    page = _page_with(browser, address, "")
+    page = _page_with(window, address, "")
     page.wait_for_selector(".jp-MarkdownViewer h1:has-text('The labs')", timeout=START_SECONDS * 1000)
     page.wait_for_selector(".jp-MarkdownViewer a:has-text('Lab 2')")
     _picture(page, "start")
@@ -274,7 +283,7 @@ def _brightness(colour: str) -> float:
 
 @pytest.mark.parametrize("theme", ["JupyterLab Light", "JupyterLab Dark"])
 def test_reports_can_be_read_in_every_theme_and_in_a_narrow_window(
-    browser: Any, jupyter: tuple[Path, str], theme: str
+    window: Any, jupyter: tuple[Path, str], theme: str
 ) -> None:
     work, address = jupyter
     name = theme.split()[1].lower()
@@ -296,7 +305,7 @@ def test_reports_can_be_read_in_every_theme_and_in_a_narrow_window(
     settings.parent.mkdir(parents=True, exist_ok=True)
     settings.write_text(json.dumps({"theme": theme}))
 
-    page, shown = _run_all(browser, address, name)
+    page, shown = _run_all(window, address, name)
 
     for number, words in enumerate(("", "written", "failed", "holds so far", "partly passed", "talker | tick")):
         assert words in shown[number]["output"]

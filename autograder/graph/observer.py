@@ -29,6 +29,10 @@ from autograder.graph.recording import Recording, quiet_profile
 POLL = 0.02
 """Seconds between two looks at the graph while waiting: rclpy reports messages, but not every graph change."""
 
+_LONGEST_POLL = 0.1
+_POLLS_A_WAIT = 10
+"""A wait that goes on looks less often: it ends late by a tenth of what it has taken at the most."""
+
 _CPU_ASKED_AFTER = 0.25
 """Seconds of waiting after which it pays to ask what the machine keeps the programs from."""
 
@@ -155,8 +159,9 @@ class Observer:
                 return False
             if self.meanwhile is not None:
                 self.meanwhile()
+            poll = min(max(POLL, (now - began) / _POLLS_A_WAIT), _LONGEST_POLL)
             with self.changed:
-                self.changed.wait(min(POLL, max(0.0, deadline - time.monotonic())))
+                self.changed.wait(min(poll, max(0.0, deadline - time.monotonic())))
 
     def pause(self, seconds: float) -> None:
         """Let time go by, exactly as much as is said: for experiments in which its length matters."""
