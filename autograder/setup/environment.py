@@ -16,6 +16,9 @@ from autograder.setup.jupyter import lead_jupyter
 from autograder.setup.places import MARKER, PYTHON, ROOT, VENV
 from autograder.setup.refusals import SetUpError, refuse_full_disk, tail
 
+_WITHOUT_GRAMMAR = "import sys; sys.modules.setdefault('rfc3987_syntax', None)"
+"""Jupyter's programs load jsonschema, which would build a grammar for one format of strings, unused here: a second."""
+
 
 def digest(lock: str) -> str:
     """Return the SHA-256 of the lock file `lock`."""
@@ -57,7 +60,7 @@ def finish(locks: "List[str]", version: "Tuple[int, ...]") -> None:
     status, text = output_of(str(PYTHON), "-I", "-c", "import sysconfig; print(sysconfig.get_path('purelib'))")
     if status:
         raise SetUpError("The new Python does not run:\n%s" % tail(text), "rm -rf .venv, then try again.")
-    Path(text.strip(), "autograder.pth").write_text("%s\n" % ROOT, encoding="utf-8")
+    Path(text.strip(), "autograder.pth").write_text("%s\n%s\n" % (ROOT, _WITHOUT_GRAMMAR), encoding="utf-8")
     write_commands()
     lead_jupyter()
     write_marker(locks, version)
