@@ -16,11 +16,20 @@ CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", 
 LONGEST = (
     "test_classes",
     "test_browser",
+    "test_nbgrader_doors",
     "test_checks",
-    "test_lectures",
-    "test_nbgrader",
     "test_setup",
+    "test_own_course",
+    "test_lectures",
+    "test_cli",
+    "test_graph",
+    "test_attacks",
+    "test_notebook",
+    "test_graded_attacks",
+    "test_nbgrader",
+    "test_parts",
     "test_sandbox",
+    "test_diagnosis",
 )
 """Files that take minutes, the longest first."""
 

@@ -124,7 +124,8 @@ def test_a_server_that_ends_for_want_of_work_loses_no_request() -> None:
 
 def test_a_server_that_does_not_begin_says_why() -> None:
     def start(channel: int, stderr: int) -> subprocess.Popen[bytes]:
-        return subprocess.Popen(["sh", "-c", "echo no sandbox here >&2; exit 1"], stderr=stderr)
+        command = ["sh", "-c", "echo no sandbox here >&2; exit 1"]
+        return subprocess.Popen(command, pass_fds=(channel,), stderr=stderr)
 
     server = ForkServer(start)
     fork = server.fork(["timeit"])
