@@ -535,7 +535,7 @@ CASES = {
         never=("crashed", "not-spinning"),
     ),
     "exits_after_one": Case(
-        main="rclpy.spin_once(node, timeout_sec=0.1)",
+        main="def spin(it):\n    rclpy.spin_once(it, timeout_sec=0.1)\nspin(node)",
         says="exited",
         because="`) runs one callback at the most and returns",
         ask=trouble,

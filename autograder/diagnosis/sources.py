@@ -82,12 +82,9 @@ class Source:
         return self._lines[number - 1].strip() if 0 < number <= len(self._lines) else ""
 
     def calls(self, name: str) -> int:
-        """The line of the first call of a function or method of this name; 0 if there is none."""
+        """The line of the first call `something.NAME(…)`; 0 if there is none."""
         calls = [node for node in ast.walk(self._tree) if isinstance(node, ast.Call)]
-        named = [
-            call.lineno for call in calls if name in (getattr(call.func, "id", ""), getattr(call.func, "attr", ""))
-        ]
-        return min(named, default=0)
+        return min((call.lineno for call in calls if getattr(call.func, "attr", "") == name), default=0)
 
     def place(self, name: str, looks: Sequence[list[Frame]], innermost: bool = False) -> Place | None:
         """Where the looks at one thread agree that the student's code is.
