@@ -18,6 +18,16 @@ _ENDED = "`main` has to catch what spinning raises then: `KeyboardInterrupt` and
 _ENDED += "After that `rclpy.try_shutdown()` is right, which does nothing where the signal has shut rclpy down already."
 
 
+def _comes_back(where: str) -> str:
+    """When the call comes back in which a program is that should have ended; empty if that is no call that spins."""
+    if "spin_until_future_complete(" in where:
+        return (
+            "`spin_until_future_complete` comes back once its future is done: that of `call_async` when the answer "
+            "comes, one of your own by `set_result` of that very object."
+        )
+    return "`spin` does not come back by itself." if ".spin(" in where else ""
+
+
 class EndingExpectations(ProgramExpectations):
     """How the programs end."""
 
@@ -41,6 +51,7 @@ class EndingExpectations(ProgramExpectations):
         title = f"`{name}` ends by itself" + ("" if status is None else f" with exit status {status}")
         if not self.wait(lambda: not program.running(), within):
             where = self._place_of(program)
+            hint = f"{_comes_back(where)} {hint}".strip()
             reason = diagnosis.inside_reason(self._scene())
             if reason and reason.code in ("spinning-ended", "not-spinning"):  # a program that ends need not spin
                 reason = None

@@ -23,16 +23,6 @@ _LEVELS = {"DEBUG": 10, "INFO": 20, "WARN": 30, "ERROR": 40, "FATAL": 50}
 """Numbers of rcl_interfaces/msg/Log."""
 
 
-def _comes_back(where: str) -> str:
-    """When the call comes back in which a program is that should have ended; empty if that is no call that spins."""
-    if "spin_until_future_complete(" in where:
-        return (
-            "`spin_until_future_complete` comes back once its future is done: that of `call_async` when the answer "
-            "comes, one of your own by `set_result` of that very object."
-        )
-    return "`spin` does not come back by itself." if ".spin(" in where else ""
-
-
 class ProgramExpectations(Expectations):
     """What the programs do as processes."""
 
@@ -121,58 +111,6 @@ class ProgramExpectations(Expectations):
             hint=hint,
         )
 
-<<<<<<< HEAD
-=======
-    def expect_exit(self, name: str, *, status: int | None = None, within: float = WITHIN, hint: str = "") -> None:
-        """A program ends by itself.
-
-        Args:
-            name: of the program.
-            status: its exit status; by default any.
-            within: seconds until it must have ended.
-            hint: a pointer for the student.
-
-        Example:
-            `ros.expect_exit("stopper", status=0)`
-
-        Codes:
-            `still-running`, `exit-status`, `shutdown-in-callback`, and reasons why a program ends or does not.
-        """
-        program = self.program(name)
-        self._running.may_end.append(program)
-        title = f"`{name}` ends by itself" + ("" if status is None else f" with exit status {status}")
-        if not self.wait(lambda: not program.running(), within):
-            scene = self._scene()
-            places = [inside.main_place() for inside in scene.insides if inside.program is program]
-            where = f"; it is in {places[0]}" if places and places[0] else ""
-            hint = f"{_comes_back(where)} {hint}".strip()
-            reason = diagnosis.inside_reason(scene)
-            if reason and reason.code in ("spinning-ended", "not-spinning"):  # a program that ends need not spin
-                reason = None
-            self._fail(
-                title,
-                reason or Diagnosis(f"It still runs after {within:g} s{where}.", "still-running"),
-                expected="ended",
-                observed="still running",
-                hint=hint,
-            )
-        ended = program.exit_status()
-        if program.stopped_by():
-            self._fail(title, diagnosis.program_trouble(self._scene()), expected="ended by itself", hint=hint)
-        self._expect_that(
-            status is None or ended == status,
-            title,
-            lambda: (
-                diagnosis.shut_down_inside(self._scene())
-                or diagnosis.program_trouble(self._scene())
-                or Diagnosis(f"It ended with status {ended}.", "exit-status")
-            ),
-            expected=str(status),
-            observed=str(ended),
-            hint=hint,
-        )
-
->>>>>>> 2232332 (A program that spins in the wrong way is told when its call comes back; numbers that a short queue pushed out are named; kill matrix)
     def expect_argument_needed(self, name: str, *, hint: str = "") -> None:
         """The launch file cannot be run, because a launch argument has no default and was not given.
 
