@@ -17,7 +17,8 @@ ROOT = Path(__file__).resolve().parent.parent
 LECTURES = sorted(path.stem for path in (ROOT / "lectures").glob("*.md"))
 DECKS = sorted(path.stem for path in (ROOT / "lectures" / "slides").glob("*.md"))
 TALKS = [name for name in DECKS if name != "index" and not (ROOT / "lectures" / "slides" / f"{name}.md").is_symlink()]
-PAGES = [*LECTURES, *sorted(f"instructors/{path.stem}" for path in (ROOT / "lectures" / "instructors").glob("*.md"))]
+OTHERS = [path for folder in ("appendix", "instructors") for path in (ROOT / "lectures" / folder).glob("*.md")]
+PAGES = [*LECTURES, *sorted(f"{path.parent.name}/{path.stem}" for path in OTHERS)]
 
 # Runs in a deck: what lies outside of its slide, for each slide.
 OUTSIDE = """() => Reveal.getSlides().flatMap((slide, number) => {

@@ -19,7 +19,7 @@ from test_notebook import SET_UP, TALKER, Notebook
 
 from autograder.graph.domains import free_domains
 from autograder.graph.observer import Observer
-from autograder.ros2.main import PROFILE, TimeIsUp, run
+from autograder.ros2.main import COMMANDS, PROFILE, TimeIsUp, run
 from autograder.sandbox.environment import profile_environment
 
 ROBOT = Path(__file__).parent / "ros2_robot"
@@ -248,3 +248,14 @@ def test_an_installed_ros2_goes_first(tmp_path: Path) -> None:
 def test_what_is_not_here_is_said(capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["run", "demo", "talker"]) == 1
     assert "launch(" in capsys.readouterr().err
+
+
+def test_the_page_of_the_book_names_every_verb() -> None:
+    page = (Path(__file__).parent.parent / "lectures" / "appendix" / "command_line.md").read_text(encoding="utf-8")
+    for command in COMMANDS:
+        row = next(line for line in page.splitlines() if line.startswith(f"| `ros2 {command}` |"))
+        helped = StringIO()
+        with redirect_stdout(helped):
+            assert run([command, "--help"]) == 0
+        verbs = re.findall(r"^    (\w+)", helped.getvalue(), re.MULTILINE)
+        assert set(verbs) == set(re.findall(r"`(\w+)`", row.partition(" | ")[2])), command
