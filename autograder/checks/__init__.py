@@ -2,9 +2,10 @@
 
 from autograder.checks import vary
 from autograder.checks.answers import answers
+from autograder.checks.building import build
 from autograder.checks.command_line import command_line
 from autograder.checks.forms import NAME_OR_NONE
 from autograder.checks.launching import launch, launch_file
 from autograder.checks.program import Program
 
-__all__ = ["NAME_OR_NONE", "Program", "answers", "command_line", "launch", "launch_file", "vary"]
+__all__ = ["NAME_OR_NONE", "Program", "answers", "build", "command_line", "launch", "launch_file", "vary"]

@@ -4,6 +4,8 @@ The diagnosis has its own table, `autograder.diagnosis.codes`. Codes that a lab'
 `ros.expect(…, code="lost-update")`, belong to that lab.
 """
 
+from autograder.packages.explain import CODES as BUILDS
+
 GROUPS: dict[str, dict[str, str]] = {
     "Expectations: nodes, ends, quality of service": {
         "node-present": "a node is on the graph that should have gone",
@@ -72,6 +74,15 @@ GROUPS: dict[str, dict[str, str]] = {
         "params-file": "the parameter file cannot be read as one",
         "launch-file": "the launch file cannot be run; the sentence names the line",
         "argument-not-needed": "a launch file runs without an argument that it should demand",
+    },
+    "Packages: building them": BUILDS,
+    "Packages: what was built": {
+        "executable-place": "the executable is installed, and not where `ros2 run` looks",
+        "entry-point": "setup.py has no entry point of this name",
+        "entry-point-target": "the entry point leads to a module or function that is not installed",
+        "not-installed": "the build installs no file at this place",
+        "no-interface": "the build installs no interface of this name",
+        "interface-fields": "the interface has other fields or types than asked for",
     },
     "Remap and parameter rules: their form": {
         "rule-form": "a rule has no `:=`, or two of them",

@@ -9,8 +9,8 @@ from contextlib import AbstractContextManager
 from types import TracebackType
 from typing import Any, Self
 
-from autograder.arguments import params_file, remap_rules
 from autograder.checks import contradictions, findings, outcomes, runtime, seen
+from autograder.checks.building import why_no_executable, why_no_package
 from autograder.checks.command_line import CommandLineError
 from autograder.checks.expect.actions import ActionExpectations
 from autograder.checks.expect.ending import EndingExpectations
@@ -30,13 +30,14 @@ from autograder.checks.parts import part
 from autograder.checks.program import Program
 from autograder.checks.robot import LIMITS, Robot, make_room
 from autograder.checks.scoring import Score, score
+from autograder.checks.starting import file_of, refused_words
 from autograder.checks.try_out import Log, log_of, try_out
 from autograder.checks.waiting import NotLaunchedError, watched
 from autograder.core.front_end import Watcher
-from autograder.core.results import NodeLog
 from autograder.diagnosis import Diagnosis
 from autograder.graph.observer import ForgedGraph, Observer
 from autograder.launch_files import LaunchFileError, remove_written
+from autograder.packages.workspace import INSTALLED
 from autograder.sandbox.environment import profile_environment, remove_logs
 from autograder.sandbox.node_sandbox import Limits, ProgramGroup
 
@@ -65,9 +66,11 @@ class Launch(
         serve: Iterable[tuple[Any, ...]],
         lifecycle: Iterable[str],
         file: LaunchedFile | None = None,
+        packages: Sequence[str] = (),
     ) -> None:
         """Use `launch` or `launch_file`."""
         super().__init__()
+        self._packages = [*packages, *(file.packages() if file else ())]
         self._running.described = list(nodes)
         self._file = file
         self._listen, self._serve, self._lifecycle = list(listen), list(serve), list(lifecycle)
@@ -111,6 +114,8 @@ class Launch(
 
     def _begin(self, limits: Limits | None) -> None:
         """Listen, and then start the programs."""
+        if not self._build():
+            return
         self._group = runtime.current.sandbox.group(limits)
         for topic, msg_type in self._listen:
             self._observer.record(topic, msg_type)
@@ -126,6 +131,12 @@ class Launch(
                 self._running.trouble.append(Diagnosis(str(error), "launch-file", error.hint))
         for launched in self._running.described:
             self._start(launched)
+
+    def _build(self) -> bool:
+        """Build the packages that the launch needs; whether it has them all."""
+        reasons = [reason for package in self._packages if (reason := why_no_package(package)) is not None]
+        self._running.trouble += reasons
+        return not reasons
 
     def start(self, node: Program | str | None = None) -> Self:
         """Start one more program. Without one, begin a launch that goes on from cell to cell, until `stop()`.
@@ -143,6 +154,8 @@ class Launch(
             runtime.current.robot = robot = self._enter(LIMITS)
             robot.wait_for_nodes()
             print(robot)
+        elif self._group is None and self._entered:
+            pass  # a package was not built, which every expectation tells
         elif self._group is None:
             raise Misuse("This launch does not run yet: name all its programs in launch(…), then .start() begins it.")
         else:
@@ -151,10 +164,16 @@ class Launch(
 
     def _start(self, node: Program | str) -> None:
         launched = Program(node) if isinstance(node, str) else node
-        runtime.current.use(f"{launched.program}.py")
+        file = file_of(launched)
+        runtime.current.use(file)
         if launched.params_file:
             runtime.current.use(launched.params_file)
-        if not runtime.current.has(f"{launched.program}.py"):
+        if launched.package:
+            reason = why_no_executable(launched.package, launched.program)
+            if reason is not None:
+                self._running.trouble.append(reason)
+                return
+        elif not runtime.current.has(file):
             self._miss(launched.program)
             return
         try:
@@ -162,13 +181,16 @@ class Launch(
         except CommandLineError as error:
             self._running.trouble.append(Diagnosis(error.because, error.code, error.hint))
             return
-        refused = _refused(words)
+        refused = refused_words(words)
         if refused is not None:
             self._running.trouble.append(refused)
             return
         environment = {"ROS_DOMAIN_ID": str(self._domain_id), **launched.environment, **profile_environment()}
         assert self._group is not None  # begun on entering
-        program = self._group.start(launched.program, words, environment, cores=launched.cores)
+        prefixes = [f"{INSTALLED}/{package}" for package in self._packages]
+        program = self._group.start(
+            launched.program, words, environment, cores=launched.cores, file=file, prefixes=prefixes
+        )
         self._running.programs.append((launched, program))
 
     def _miss(self, program: str) -> None:
@@ -274,25 +296,4 @@ class Launch(
             self._observer.close()
             remove_written(runtime.current.folder)
             remove_logs()
-        for launched, program in self._running.programs:
-            findings.current.logs.append(
-                NodeLog(
-                    program=launched.program,
-                    text=program.output(),
-                    truncated=program.truncated(),
-                    exit_status=ended[id(program)],
-                    stopped_by=program.stopped_by(),
-                )
-            )
-
-
-def _refused(words: Sequence[str]) -> Diagnosis | None:
-    """Why a program would not start with these words."""
-    refused = remap_rules.refused_parameter(words)
-    if refused:
-        return Diagnosis(*refused)
-    unreadable = params_file.unreadable(words, runtime.current.folder)
-    if unreadable is not None:
-        hint = "Look at the indentation there, and at brackets and quotation marks."
-        return Diagnosis(unreadable.because, "params-file", hint)
-    return None
+        findings.current.logs += self._running.logs(ended)

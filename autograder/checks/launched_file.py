@@ -26,26 +26,33 @@ class LaunchedFile:
     namespace: str
     """As if another file included this one after `push_ros_namespace`."""
 
+    def packages(self) -> list[str]:
+        """The package, if the student writes it as one that is built."""
+        return [self.package] if runtime.current.workspace.source(self.package).is_dir() else []
+
     def nodes(self) -> list[Program]:
         """What the file starts.
 
         Raises:
             LaunchFileError: it cannot be read.
         """
-        folder = runtime.current.folder.resolve()
+        built = runtime.current.workspace.build(self.package) if self.packages() else None
+        folder = built.folder / "share" / self.package if built else runtime.current.folder.resolve()
 
         def find(wanted: str) -> Path:
             if wanted != self.package:
                 raise KeyError(wanted)
             return folder
 
-        programs = set(self.stand_ins) or {path.stem for path in folder.glob("*.py")}
+        programs = set(built.executables if built else self.stand_ins) or {path.stem for path in folder.glob("*.py")}
+        name = built.shared(self.name) if built else self.name
         runtime.current.use(self.name)
-        found = read_launch_file(folder / self.name, self.arguments, find, programs, self.includes, self.namespace)
+        found = read_launch_file(folder / name, self.arguments, find, programs, self.includes, self.namespace)
         return [
             self._stand_in(
                 Program(
                     one.program,
+                    package=self.package if built else "",
                     ros_arguments=one.ros_arguments(),
                     arguments_of_its_own=one.arguments,
                     environment=one.environment,

@@ -28,6 +28,7 @@ def launch(
     listen: Iterable[tuple[str, type]] = (),
     serve: Iterable[tuple[str, type, Callable[[Any, Any], Any], float] | tuple[Any, ...]] = (),
     lifecycle: Iterable[str] = (),
+    packages: Sequence[str] = (),
 ) -> Launch:
     """Describe a launch; `with` starts it and ends it.
 
@@ -45,6 +46,7 @@ def launch(
         listen: (topic, message class) to record from before the start.
         serve: (service, class, answer, delay in seconds) that the observer offers.
         lifecycle: full names of lifecycle nodes whose transition events are recorded from before the start.
+        packages: packages of the student's that the programs import from; each is built first.
     """
     given = dict(parameters or {})
     if use_sim_time:
@@ -64,7 +66,8 @@ def launch(
                 cores=min(node.cores, cores),
             )
         )
-    return Launch(nodes, listen, serve, lifecycle)
+    needed = dict.fromkeys([*packages, *(node.package for node in nodes if node.package)])
+    return Launch(nodes, listen, serve, lifecycle, packages=list(needed))
 
 
 def launch_file(
@@ -81,7 +84,8 @@ def launch_file(
     """Describe the launch that a student's launch file describes; `with` starts it and ends it.
 
     Args:
-        file: a launch file in ROS 2's YAML schema, such as `vehicle.launch.yaml`.
+        file: a launch file in ROS 2's YAML schema, such as `vehicle.launch.yaml`. Of a package that is built it is
+            the installed one, as `ros2 launch PACKAGE FILE` finds it: anywhere below `share/PACKAGE`.
         arguments: launch arguments, as `name:=value` after `ros2 launch PACKAGE FILE`.
         package: the name of the package that the student's programs are said to be in.
         namespace: as if a launch file included this one after `push_ros_namespace` with it.

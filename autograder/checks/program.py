@@ -16,6 +16,8 @@ class Program:
     """One program of the student's and the ROS arguments it is started with, named as in a launch description."""
 
     program: str
+    package: str = ""
+    """The package of the student's that it is an executable of; empty for a program of a cell."""
     namespace: str = ""
     name: str = ""
     remappings: Sequence[tuple[str, str]] = ()

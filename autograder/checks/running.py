@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 from autograder.checks import runtime
 from autograder.checks.program import Program
 from autograder.checks.settling import Settling
+from autograder.core.results import NodeLog
 from autograder.diagnosis import Diagnosis, Scene
 from autograder.graph.observer import Observer
 from autograder.sandbox.node_sandbox import RunningProgram
@@ -58,6 +59,19 @@ class Running:
             trouble=self.trouble,
             stopped=self.stopped,
         )
+
+    def logs(self, ended: Mapping[int, int | None]) -> list[NodeLog]:
+        """What the programs printed, and how each ended by itself: its status by its identity."""
+        return [
+            NodeLog(
+                program=described.program,
+                text=program.output(),
+                truncated=program.truncated(),
+                exit_status=ended[id(program)],
+                stopped_by=program.stopped_by(),
+            )
+            for described, program in self.programs
+        ]
 
     def all_ended(self) -> bool:
         """Whether nothing can come any more: every program has ended (or none could be started), a moment ago."""

@@ -18,6 +18,7 @@ from autograder.core.front_end import FrontEnd
 from autograder.core.results import Isolation
 from autograder.graph.domains import free_domains
 from autograder.graph.observer import Observer
+from autograder.packages.workspace import SOURCES, Workspace
 from autograder.sandbox.node_sandbox import NodeSandbox
 
 
@@ -45,6 +46,7 @@ class Runtime:
         self.isolation = Isolation.NONE
         self.random = random.Random()
         self._sandbox: NodeSandbox | None = None
+        self._workspace: Workspace | None = None
         self._domains = free_domains()
         self.block: Running | None = None
         """The launch whose block runs: one at a time."""
@@ -111,8 +113,22 @@ class Runtime:
         """The launch that runs now: that of the block, or else the one that goes on from cell to cell."""
         return self.block or self.robot
 
+    @property
+    def workspace(self) -> Workspace:
+        """The packages that the student writes, and what has been built of them."""
+        if self._workspace is None:
+            self._workspace = Workspace(self.folder.resolve(), self.isolation)
+        return self._workspace
+
+    def use_package(self, name: str) -> None:
+        """Note that the check uses the files of a package."""
+        folder = self.folder / SOURCES / name
+        paths = sorted(path for path in folder.rglob("*") if path.is_file())
+        findings.current.used |= {str(path.relative_to(self.folder)) for path in paths}
+
     def close(self) -> None:
         """End every program and the sandbox."""
+        self._workspace = None
         if self.robot is not None:
             self.robot.stop()
         if self._sandbox is not None:

@@ -78,7 +78,7 @@ class Finding:
 
 def run(as_json: bool) -> int:
     """Look at everything and print it; return 0 if the machine can grade, 2 if something is lacking."""
-    looks = (python, environment, foreign_ros, ros, probe, isolation, cores, space)
+    looks = (python, environment, foreign_ros, ros, probe, isolation, cores, compiler, space)
     findings: list[Finding] = []
     for look in looks:
         try:
@@ -209,6 +209,17 @@ def cores() -> Finding:
     """How many cores this process may use; one is enough, but slow."""
     count = len(os.sched_getaffinity(0))
     return Finding("cores", True, str(count), "" if count > 1 else "With two or more, grading is faster.")
+
+
+def compiler() -> Finding:
+    """Whether packages with interfaces can be built here; everything else works without."""
+    from autograder.packages.workspace import INSTALL, missing_tools
+
+    lacking = missing_tools()
+    if not lacking:
+        return Finding("compiler", True, "C, C++, CMake, make, and Python's headers")
+    do = f"Only labs in which interfaces are built need it. {INSTALL}"
+    return Finding("compiler", True, f"without {', '.join(lacking)}", do)
 
 
 def space() -> Finding:

@@ -17,6 +17,8 @@ NAME_LENGTH = 100
 
 _NODE_NAME = re.compile(r"[a-z][a-z0-9_]{0,63}")
 _FILE_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}(\.[A-Za-z0-9_-]{1,32})*\.(yaml|yml|json|csv)")
+_PACKAGE_FILE = re.compile(r"src(/[A-Za-z0-9_][A-Za-z0-9_.-]{0,63}){2,5}")
+"""A file of a ROS package, in the place that it has in a colcon workspace."""
 
 
 class BadNameError(ValueError):
@@ -57,10 +59,11 @@ def check_name(magic: str, name: str) -> None:
         )
     if len(name) > NAME_LENGTH:
         raise BadNameError(f"The name `{name[:40]}…` is too long: at most {NAME_LENGTH} characters.")
-    if magic == "file" and not _FILE_NAME.fullmatch(name):
+    if magic == "file" and not _FILE_NAME.fullmatch(name) and not _PACKAGE_FILE.fullmatch(name):
         raise BadNameError(
             f"`{name[:80]}` cannot name a file: use letters, digits, `-`, `_` and dots, no folder,"
-            " and end in .yaml, .yml, .json or .csv."
+            " and end in .yaml, .yml, .json or .csv. A file of a package begins with the package's folder,"
+            " such as `src/car_sensors/package.xml`."
         )
 
 
@@ -98,6 +101,6 @@ def parse(source: str) -> CellFile | None:
         return None
     magic, name = match.group(1), match.group(2) or ""
     check_name(magic, name)
-    first = [f"# %%node {name}"] if magic == "node" else []
+    first = [f"# %%{magic} {name}"] if magic == "node" or name.endswith(".py") else []
     text = "\n".join([""] * above + first + lines[above + 1 :])
     return CellFile(magic, name, text if text.endswith("\n") or not text else text + "\n")

@@ -6,11 +6,16 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from autograder.core.results import CheckResult, Isolation, Outcome, SubmissionResult
 from autograder.course.lab import Cell
+from autograder.packages.workspace import SOURCES
+from autograder.sandbox.build import BUILD_SECONDS
 
 CELL_SECONDS = 120.0
 """Seconds after which a check cell is ended; all of them together have a limit too (`supervisor.SECONDS_PER_CHECK`)."""
 STUCK_SECONDS = 30.0
 """Seconds more after which a cell that did not end is stuck in a call that no exception reaches: the worker ends."""
+
+MOST_PACKAGES = 3
+"""As many packages of a submission are waited for."""
 
 
 class Job(BaseModel):
@@ -30,6 +35,12 @@ class Job(BaseModel):
     """Of the files that are answers: whether the cell is still as students receive it."""
     cells: list[Cell]
     problems: list[Outcome] = Field(default_factory=list)
+
+    @property
+    def build_seconds(self) -> float:
+        """Seconds that its packages may take to be built, besides what the checks may take."""
+        packages = {name.split("/")[1] for name in self.files if name.startswith(f"{SOURCES}/")}
+        return BUILD_SECONDS * min(len(packages), MOST_PACKAGES)
 
     @property
     def checks(self) -> list[Cell]:

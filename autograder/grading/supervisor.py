@@ -82,7 +82,7 @@ def _run_share(job: Job, share: Sequence[Cell], stop: threading.Event | None) ->
     while left and len(lost) < LOST:
         cells = [cell for cell in job.cells if cell.points is None or cell in left]
         part = job.model_copy(update={"cells": cells})
-        limit = _limit(len(left))
+        limit = _limit(len(left)) + job.build_seconds
         run = run_in_sandbox(
             ["autograder.grading.worker"], part.model_dump_json().encode("utf-8"), job.isolation, limit, stop
         )

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from autograder.core.files import write_beside
-from autograder.course.cell_file import CellFile
+from autograder.course.cell_file import BadNameError, CellFile, check_name
 
 NODES = "nodes"
 MANIFEST = ".autograder.json"
@@ -98,7 +98,7 @@ class ProgramFolder:
         text = written.file.text.encode("utf-8", "replace")
         if path.exists() and path.read_bytes() != text and (before is None or self.changed_by_hand(name)):
             told.append(self._move_aside(path))
-        self.path.mkdir(parents=True, exist_ok=True)
+        path.parent.mkdir(parents=True, exist_ok=True)
         write_beside(path, text.decode("utf-8"))
         self.written[name] = written
         self._note()
@@ -169,7 +169,16 @@ def _manifest(folder: Path) -> dict[str, Any]:
     files = found.get("files") if isinstance(found, dict) else None
     if not isinstance(files, dict) or not all(isinstance(entry, dict) for entry in files.values()):
         return {}
-    return {**found, "files": {name: entry for name, entry in files.items() if "/" not in name}}
+    return {**found, "files": {name: entry for name, entry in files.items() if _is_of_a_cell(name)}}
+
+
+def _is_of_a_cell(name: str) -> bool:
+    """Whether a cell can have written a file of this name: a manifest may have been changed by hand."""
+    try:
+        check_name("file", name)
+    except BadNameError:
+        return "/" not in name
+    return True
 
 
 def _owner(manifest: dict[str, Any]) -> int | None:

@@ -88,8 +88,9 @@ def python_places() -> PythonPlaces:
     lies beside a link is none of a program's business: the links are made anew, and only their ends are shown.
     """
     prefix, base = Path(sys.prefix), Path(sys.base_prefix)
-    wanted = [prefix / name for name in ("pyvenv.cfg", "bin", "lib", "lib64", "share") if prefix != base]
+    wanted = [prefix / name for name in ("pyvenv.cfg", "bin", "include", "lib", "lib64", "share") if prefix != base]
     wanted += [Path(sys.executable), Path(sysconfig.get_path("stdlib")), Path(sysconfig.get_path("platstdlib"))]
+    wanted += [Path(sysconfig.get_path("include"))]  # of Python itself: generated interfaces are extension modules
     wanted += sorted(library for folder in ("lib", "lib64") for library in (base / folder).glob("*.so*"))
     links: dict[Path, str] = {}
     found = {_real(path, links) for path in wanted if path.exists()}

@@ -101,25 +101,29 @@ class ProgramGroup:
                 raise GroupLost(self._broken or "no answer")
 
     def start(
-        self, program: str, args: Sequence[str] = (), env: Mapping[str, str] | None = None, cores: int = 2
-    ) -> RunningProgram:
-        """Start `program`.py of the folder as a process of its own.
+        self, program: str, args: Sequence[str] = (), env: Mapping[str, str] | None = None, cores: int = 2,
+        *, file: str = "", prefixes: Sequence[str] = (),
+    ) -> RunningProgram:  # fmt: skip
+        """Start a program of the folder as a process of its own.
 
         Args:
-            program: name without `.py`.
+            program: its name.
             args: `sys.argv[1:]`.
             env: variables besides those of every program, such as ROS_DOMAIN_ID.
             cores: the number of CPUs that it sees.
+            file: its path in the folder; by default `program`.py.
+            prefixes: paths in the folder of installed ROS packages, whose modules it can import.
 
         Raises:
             FileNotFoundError: the folder has no such program.
             KitError: it is not started.
         """
-        if not (self.folder / f"{program}.py").is_file():
-            raise FileNotFoundError(f"{program}.py")
+        file = file or f"{program}.py"
+        if not (self.folder / file).is_file():
+            raise FileNotFoundError(file)
         started = RunningProgram(program, self._limits, self.changed, self._pipes.catch_up)
         try:
-            known = self._request(started, list(args), dict(env or {}), cores)
+            known = self._request(started, file, list(args), {**(env or {}), **self._packages(prefixes)}, cores)
         except OSError:
             known = False
         if not known:
@@ -158,7 +162,11 @@ class ProgramGroup:
 
     # Starting.
 
-    def _request(self, program: RunningProgram, args: list[str], env: dict[str, str], cores: int) -> bool:
+    def _packages(self, prefixes: Sequence[str]) -> dict[str, str]:
+        """The variable by which ROS, and here the launcher too, finds installed packages."""
+        return {"AMENT_PREFIX_PATH": ":".join(f"{self._inside}/{one}" for one in prefixes)} if prefixes else {}
+
+    def _request(self, program: RunningProgram, file: str, args: list[str], env: dict[str, str], cores: int) -> bool:
         usable = sorted(os.sched_getaffinity(0))
         with self.changed:
             self._started += 1
@@ -166,7 +174,8 @@ class ProgramGroup:
             self._programs[number] = program
         request = {
             "id": number,
-            "path": f"{self._inside}/{program.name}.py",
+            "path": f"{self._inside}/{file}",
+            "folder": self._inside,
             "args": args,
             "env": {**self._variables, **env, **{name: self._variables[name] for name in _SET_BY_THE_SANDBOX}},
             # A random choice: with the same two CPUs for everyone, a big machine would be idle beside them.

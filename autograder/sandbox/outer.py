@@ -99,7 +99,7 @@ def _run(
     process: subprocess.Popen[bytes] | Fork, stdin: bytes, time_limit: float, stop: threading.Event | None
 ) -> OuterRun:
     try:
-        return _exchange(process, stdin, time_limit, stop or threading.Event())
+        return exchange(process, stdin, time_limit, stop)
     finally:
         with contextlib.suppress(ProcessLookupError):
             process.kill()
@@ -165,9 +165,20 @@ def _compile_package_once() -> None:
     compileall.compile_dir(bubblewrap.PACKAGE, quiet=2)  # where it may not write either, it goes on
 
 
-def _exchange(
-    process: subprocess.Popen[bytes] | Fork, stdin: bytes, time_limit: float, stop: threading.Event
+def exchange(
+    process: subprocess.Popen[bytes] | Fork, stdin: bytes, time_limit: float, stop: threading.Event | None = None
 ) -> OuterRun:
+    """Feed a process and take what it writes, until it ends, writes too much, or its time is over.
+
+    Args:
+        process: with pipes for its three streams; whoever started it ends it.
+        stdin: what it reads.
+        time_limit: seconds.
+        stop: gives up soon after this is set.
+
+    Raises:
+        Stopped: by `stop`.
+    """
     assert process.stdin is not None and process.stdout is not None and process.stderr is not None
     deadline = time.monotonic() + time_limit
     taken: dict[str, bytearray] = {"stdout": bytearray(), "stderr": bytearray()}
@@ -185,7 +196,7 @@ def _exchange(
                 timed_out = left <= 0
                 process.kill()
                 break
-            if stop.is_set():
+            if stop is not None and stop.is_set():
                 raise Stopped
             for key, _ in selector.select(min(left, _STOP_POLL)):
                 name, stream = key.data

@@ -49,6 +49,10 @@ def take_files(lab: Lab, submission: Submission) -> None:
                 f"The cells `{owners[file.file_name]}` and `{grade_id}` both name {file.file_name}: the later counts."
             )
             submission.problems.append(problem("same-file", title, because, f"Begin the cell with `{wanted}`."))
+        if _is_in_the_way(file.file_name, {*submission.files, *lab.given}):
+            because = f"`{file.file_name}` is a file of one cell and a folder of another."
+            submission.problems.append(problem("bad-file-name", title, because, f"Begin the cell with `{wanted}`."))
+            continue
         owners[file.file_name] = grade_id
         submission.files[file.file_name] = file.text
     submission.files.update(lab.given)
@@ -92,6 +96,10 @@ def take_own_files(cells: list[dict[str, Any]], lab: Lab, submission: Submission
                 problem("bad-file-name", f"`%%{file.magic} {file.name}` can be a file", f"{error} The cell is ignored.")
             )
             continue
+        if _is_in_the_way(file.file_name, {*taken, *own}):
+            because = f"`{file.file_name}` is a file of one cell and a folder of another. The cell is ignored."
+            submission.problems.append(problem("bad-file-name", f"`%%{file.magic} {file.name}` can be a file", because))
+            continue
         own[file.file_name] = file.text
     if len(own) > OWN_FILES:
         because = f"There are {len(own)} cells of your own that name files; the first {OWN_FILES} are taken along."
@@ -99,6 +107,11 @@ def take_own_files(cells: list[dict[str, Any]], lab: Lab, submission: Submission
         own = dict(list(own.items())[:OWN_FILES])
     submission.files.update(own)
     return own
+
+
+def _is_in_the_way(name: str, others: set[str]) -> bool:
+    """Whether a file would lie where another one needs a folder, or the other way round."""
+    return any(other.startswith(f"{name}/") or name.startswith(f"{other}/") for other in others)
 
 
 def _ignored(file: CellFile, answer: str, lab: Lab, submission: Submission) -> Outcome:

@@ -168,6 +168,7 @@ def check_api() -> str:
     """The page of the check API: what `autograder.checks` offers, then what `ros` does, group by group."""
     from autograder import checks
     from autograder.checks.answers import Answers
+    from autograder.checks.building import Package
     from autograder.checks.forms import seal
     from autograder.checks.launch import Launch
 
@@ -191,6 +192,9 @@ def check_api() -> str:
     lines += ["## A table of answers", "", "`answers` gives a table, which a check looks at in a block of its own.", ""]
     for name, _ in offered(Answers):
         lines += _entry(name, getattr(Answers, name), with_failures=False, of="table")
+    lines += ["## A package", "", "`build` gives a package, which a check looks at in a block of its own.", ""]
+    for name, _ in offered(Package):
+        lines += _entry(name, getattr(Package, name), with_failures=False, of="package")
     lines += [*_entry("seal", seal, with_failures=False, of="forms"), "## What these calls give", ""]
     for thing in _given_back(Launch):
         lines += [f"### {thing.__name__}", "", documented(thing).text, ""]

@@ -2,6 +2,7 @@
 
 import builtins
 import contextlib
+import ctypes
 import faulthandler
 import fcntl
 import importlib
@@ -39,7 +40,7 @@ def become(start: Start) -> None:
         os.sched_getaffinity = lambda _pid: pretended
     os.environ.clear()
     os.environ.update(start.env)
-    os.chdir(os.path.dirname(start.path))
+    os.chdir(start.folder)
     for name, value in start.limits.items():
         limit(name, value)
     sys.stdin = open(0, closefd=False)
@@ -66,10 +67,10 @@ def _take_descriptors(start: Start) -> None:
 
 def run(start: Start) -> None:
     """Run the program as `python NAME.py` would: its own `__main__`, its own frames in a traceback."""
-    folder = os.path.dirname(start.path)
     sys.argv = [start.path, *start.args]
     sys.orig_argv = [sys.executable, *sys.argv]
-    sys.path.insert(0, folder)  # not before: what the launcher loads is never one of a student's files
+    # Not before: what the launcher loads is never one of a student's files.
+    sys.path.insert(0, os.path.dirname(start.path))
     linecache.clearcache()
     importlib.invalidate_caches()
     sys.excepthook = _print_own_frames
@@ -78,10 +79,34 @@ def run(start: Start) -> None:
     main.__builtins__ = builtins  # type: ignore[attr-defined]
     sys.modules["__main__"] = main
     with contextlib.suppress(Exception):
-        attach.begin(_EVENTS, folder)
+        attach.begin(_EVENTS, start.folder)
+    for prefix in filter(None, os.environ.get("AMENT_PREFIX_PATH", "").split(":")):
+        _use_package(prefix)
     with open(start.path, "rb") as file:
         source = file.read()
     exec(compile(source, start.path, "exec", dont_inherit=True), main.__dict__)
+
+
+def _use_package(prefix: str) -> None:
+    """Make an installed ROS package usable, as sourcing its workspace would have before the start.
+
+    Its libraries are loaded at once: the loader reads its search path when a process begins, and this one is a fork.
+    """
+    version = f"python{sys.version_info.major}.{sys.version_info.minor}"
+    sys.path.insert(1, os.path.join(prefix, "lib", version, "site-packages"))
+    folder = os.path.join(prefix, "lib")
+    libraries = sorted(name for name in os.listdir(folder) if name.endswith(".so")) if os.path.isdir(folder) else []
+    waiting = [os.path.join(folder, name) for name in libraries]
+    for _ in libraries:  # one needs another, so they are tried until no more of them loads
+        waiting = [path for path in waiting if not _loads(path)]
+
+
+def _loads(library: str) -> bool:
+    try:
+        ctypes.CDLL(library, mode=os.RTLD_NOW | os.RTLD_GLOBAL)
+    except OSError:
+        return False
+    return True
 
 
 def _print_own_frames(kind: type[BaseException], error: BaseException, trace: types.TracebackType | None) -> None:

@@ -3,7 +3,7 @@
 To the launcher, with one end of a further SOCK_SEQPACKET pair, on which the first process of the new launch answers:
     {"namespaces", "disk", "inodes", "limits", "filter", "program_filter"}
 To a first process, with the descriptors (output, events, stacks):
-    {"id", "path", "args", "env", "cpus", "cores"}
+    {"id", "path", "folder", "args", "env", "cpus", "cores"}
 Its answers: {"first": true} with its pidfd, {"ready": true} or {"broken": why}, {"started": id} with a pidfd,
     {"failed": id, "why"}, {"ended": id, "status"}.
 """
@@ -46,6 +46,7 @@ class Start:
         request = json.loads(packet)
         self.id: int = request["id"]
         self.path: str = request["path"]
+        self.folder: str = request["folder"]
         self.args: list[str] = request["args"]
         self.env: dict[str, str] = request["env"]
         self.cpus: list[int] = request["cpus"]

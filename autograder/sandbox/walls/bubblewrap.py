@@ -9,13 +9,15 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 from autograder.sandbox.environment import HERE, INSIDE, SYSTEM_FILES, SYSTEM_FOLDERS, python_places
-from autograder.sandbox.limits import Limits
+from autograder.sandbox.limits import MIB, Limits
 
 PACKAGE = HERE.parent
 """The folder of the `autograder` package itself: it alone is shown, never the repository around it."""
 
 STUDENT_FOLDER = "/home/student"
 KIT_FOLDER = "/run/kit"
+BUILD_DISK = 128 * MIB
+"""Bytes that a build may write; interfaces take 15 MiB."""
 
 _NAMESPACES = ["--unshare-user", "--unshare-pid", "--unshare-ipc", "--unshare-uts", "--cap-drop", "ALL"]
 _LIFE = ["--die-with-parent", "--new-session"]
@@ -107,6 +109,20 @@ def inner_options(folder: Path, limits: Limits, variables: Mapping[str, str]) ->
         *system_options(), *_python(), *kit, "--ro-bind", str(folder), STUDENT_FOLDER,
         "--proc", "/proc", "--dev", "/dev", "--size", size, "--perms", "1777", "--tmpfs", "/dev/shm",
         "--remount-ro", "/dev", "--remount-ro", "/", "--chdir", STUDENT_FOLDER,
+        *_environment(variables),
+    ]  # fmt: skip
+
+
+def build_options(source: Path, variables: Mapping[str, str]) -> list[str]:
+    """The build sandbox: Python and ROS with their headers, the system's compiler, and the packages' sources.
+
+    A /tmp of its own of limited size is all that can be written to.
+    """
+    return [
+        *_NAMESPACES, "--unshare-net", "--disable-userns", *_LIFE,
+        "--size", str(BUILD_DISK), "--perms", "1777", "--tmpfs", "/tmp",
+        *system_options(), *_python(), "--ro-bind", str(INSIDE), KIT_FOLDER, "--ro-bind", str(source), STUDENT_FOLDER,
+        "--proc", "/proc", "--dev", "/dev", "--remount-ro", "/dev", "--remount-ro", "/", "--chdir", "/tmp",
         *_environment(variables),
     ]  # fmt: skip
 

@@ -1,0 +1,253 @@
+"""`build`: builds a package of the student's, and what a check expects of it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from contextlib import AbstractContextManager
+from typing import NoReturn
+
+from autograder.checks import findings, outcomes, runtime
+from autograder.checks.parts import part
+from autograder.checks.scoring import Score, score
+from autograder.diagnosis import Diagnosis
+from autograder.graph.names import nearest
+from autograder.packages.explain import why_not_built
+from autograder.packages.interfaces import InterfaceError, interface_parts
+from autograder.packages.workspace import Built
+
+
+class Package:
+    """One package and what building it came to; `with build("car_sensors") as package:` like a launch."""
+
+    def __init__(self, name: str) -> None:
+        """Name the package; it is built when the first expectation asks for it."""
+        self.name = name
+        self._built: Built | None = None
+
+    def __enter__(self) -> Package:
+        findings.current.begin_block()
+        runtime.current.use_package(self.name)
+        return self
+
+    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> bool:
+        return outcomes.ends_block(error)
+
+    def part(self, title: str) -> AbstractContextManager[None]:
+        """A block whose expectations give points of their own; see `autograder.checks.parts`.
+
+        Args:
+            title: what the part is called in the score and in the report.
+
+        Example:
+            `with package.part("it builds"): package.expect_built()`
+        """
+        return part(title)
+
+    def score(self, points: float | Mapping[str, float]) -> Score:
+        """The score of the cell.
+
+        Args:
+            points: of the cell, all or nothing; or of each part, by its title.
+
+        Example:
+            `package.score({"it builds": 1, "what is installed": 1})`
+        """
+        return score(points)
+
+    @property
+    def log(self) -> str:
+        """What the build printed."""
+        return self._build().log
+
+    def expect_built(self, hint: str = "") -> None:
+        """`colcon build` builds the package.
+
+        Args:
+            hint: a pointer for the student.
+
+        Example:
+            `package.expect_built()`
+
+        Codes:
+            those of builds.
+        """
+        self._ready(f"`{self.name}` is built", hint)
+        outcomes.passed(f"`{self.name}` is built")
+
+    def expect_executable(self, name: str, hint: str = "") -> None:
+        """`ros2 run` finds an executable of this name: it lies in `lib/PACKAGE`, and leads to a function.
+
+        Args:
+            name: of the executable.
+            hint: a pointer for the student.
+
+        Example:
+            `package.expect_executable("speed_sensor")`
+
+        Codes:
+            `executable-place`, `entry-point`, `entry-point-target`.
+        """
+        title = f"`ros2 run {self.name} {name}` finds its program"
+        built = self._ready(title, hint)
+        if name in built.executables:
+            lost = _lost_target(built, _entry_points(built).get(name, ""))
+            if lost:
+                self._fail(title, Diagnosis(lost, "entry-point-target"), hint)
+            outcomes.passed(title, observed=f"lib/{self.name}/{name}")
+            return
+        self._fail(title, _no_executable(built, name), hint)
+
+    def expect_installed(self, *paths: str, hint: str = "") -> None:
+        """Files are installed, such as `share/car_sensors/package.xml`.
+
+        Args:
+            paths: below the package's folder in `install`.
+            hint: a pointer for the student.
+
+        Example:
+            `package.expect_installed("share/car_sensors/launch/sensors.launch.yaml")`
+
+        Codes:
+            `not-installed`.
+        """
+        for path in paths:
+            title = f"`{path}` is installed"
+            built = self._ready(title, hint)
+            if path not in built.files:
+                same = [other for other in sorted(built.files) if other.rsplit("/", 1)[-1] == path.rsplit("/", 1)[-1]]
+                because = f"The build installs no `{path}`."
+                because += f" A file of that name lies at `{same[0]}`." if same else ""
+                self._fail(title, Diagnosis(because, "not-installed"), hint)
+            outcomes.passed(title)
+
+    def expect_interface(self, name: str, *parts: Mapping[str, str], hint: str = "") -> None:
+        """The package has an interface with these fields, in any order.
+
+        Args:
+            name: such as `msg/DetectedObject`.
+            parts: for a message its fields, for a service those of request and response, for an action those of goal,
+                result and feedback: type by name, as `{"header": "std_msgs/Header"}`.
+            hint: a pointer for the student.
+
+        Example:
+            `package.expect_interface("srv/Count", {"label": "string"}, {"count": "int32"})`
+
+        Codes:
+            `no-interface`, `interface-fields`.
+        """
+        title = f"`{self.name}/{name}` has the fields that it should"
+        built = self._ready(title, hint)
+        installed = built.text(f"share/{self.name}/{name}.{name.split('/')[0]}")
+        if not installed:
+            has = [path.removeprefix(f"share/{self.name}/") for path in sorted(built.files)]
+            has = [path for path in has if re.fullmatch(r"(msg/\w+\.msg|srv/\w+\.srv|action/\w+\.action)", path)]
+            because = f"The package installs no interface `{name}`; it has: {', '.join(has) or 'none'}."
+            near = "rosidl_generate_interfaces in CMakeLists.txt has to name each file."
+            self._fail(title, Diagnosis(because, "no-interface", near), hint)
+        try:
+            found = interface_parts(self.name, name, installed)
+        except InterfaceError as error:
+            self._fail(title, Diagnosis(str(error), "interface-fields"), hint)
+        for place, (wanted, have) in enumerate(zip(parts, found, strict=False)):
+            wrong = _difference(wanted, have)
+            if wrong:
+                names = {2: ("request", "response"), 3: ("goal", "result", "feedback")}.get(len(parts), ("",))
+                where = f"Its {names[place]}" if names[place] else f"`{name}`"
+                self._fail(title, Diagnosis(f"{where} {wrong}", "interface-fields"), hint)
+        outcomes.passed(title)
+
+    def _build(self) -> Built:
+        if self._built is None:
+            self._built = runtime.current.workspace.build(self.name)
+        return self._built
+
+    def _ready(self, title: str, hint: str) -> Built:
+        """The built package; fails the check, or the part, if it was not built."""
+        reason = missing_package(self.name)
+        if reason is None:
+            built = self._build()
+            reason = why_not_built(built, runtime.current.workspace.source(self.name))
+            if reason is None:
+                return built
+        self._fail(title, reason, hint)
+
+    def _fail(self, title: str, reason: Diagnosis, hint: str) -> NoReturn:
+        outcomes.failed(title, because=reason.because, hint=hint or reason.hint, code=reason.code)
+
+
+def missing_package(name: str) -> Diagnosis | None:
+    """Why a package cannot be built at all; None if it can be tried."""
+    if runtime.current.workspace.source(name).is_dir():
+        return None
+    first = f"%%file src/{name}/package.xml"
+    because = f"There is no package `{name}`: no cell that begins with `{first}` or the like has been run."
+    return Diagnosis(because, "package-xml", "Run the cells of the package first.")
+
+
+def why_no_package(name: str) -> Diagnosis | None:
+    """Build a package; None if that went well, or why not."""
+    runtime.current.use_package(name)
+    space = runtime.current.workspace
+    return missing_package(name) or why_not_built(space.build(name), space.source(name))
+
+
+def why_no_executable(package: str, name: str) -> Diagnosis | None:
+    """Why a package that is built has no executable of a name; None if it has."""
+    built = runtime.current.workspace.build(package)
+    return None if name in built.executables else _no_executable(built, name)
+
+
+def _no_executable(built: Built, name: str) -> Diagnosis:
+    if f"bin/{name}" in built.files:
+        because = f"`{name}` is installed in `bin`. `ros2 run` looks in `lib/{built.name}` only."
+        wanted = f"setup.cfg says where scripts go: `install_scripts=$base/lib/{built.name}`."
+        return Diagnosis(because, "executable-place", wanted)
+    points = _entry_points(built)
+    near = nearest(name, points)
+    has = ", ".join(f"`{one}`" for one in sorted(points)) or "none"
+    because = f"setup.py has no entry point of the name `{name}`; its console_scripts are: {has}."
+    return Diagnosis(because + (f" Is `{near}` meant to be it?" if near else ""), "entry-point")
+
+
+def build(package: str) -> Package:
+    """Build a package of the student's with colcon, as far as its sources have changed since.
+
+    Args:
+        package: the name of its folder below `src`.
+    """
+    return Package(package)
+
+
+def _entry_points(built: Built) -> dict[str, str]:
+    """The console scripts that setup.py names, as `module:function` by name."""
+    for path in built.files:
+        if path.endswith("/entry_points.txt"):
+            section = built.text(path).partition("[console_scripts]")[2].partition("\n[")[0]
+            pairs = (line.partition("=") for line in section.splitlines() if "=" in line)
+            return {name.strip(): target.strip() for name, _, target in pairs}
+    return {}
+
+
+def _lost_target(built: Built, target: str) -> str:
+    """Why an entry point leads nowhere; empty if it leads to a function, or to something that is made at run time."""
+    module, _, function = target.partition(":")
+    path = next((one for one in built.files if one.endswith(f"/site-packages/{module.replace('.', '/')}.py")), "")
+    if not path:
+        return f"The entry point names the module `{module}`, and no such module is installed."
+    name = re.escape(function)
+    if not re.search(rf"^(def {name}\b|{name}\s*=|.*\bimport\b.*\b{name}\b)", built.text(path), re.MULTILINE):
+        return f"The entry point names `{function}`, and the module `{module}` has no function of that name."
+    return ""
+
+
+def _difference(wanted: Mapping[str, str], have: Mapping[str, str]) -> str:
+    """What is wrong with the fields of one part; empty if nothing is."""
+    for name, kind in wanted.items():
+        if name not in have:
+            near = nearest(name, have)
+            return f"has no field `{name}`" + (f"; is `{near}` meant to be it?" if near else ".")
+        if have[name] != kind:
+            return f"has the field `{name}` as `{have[name]}`, not as `{kind}`."
+    more = sorted(have.keys() - wanted.keys())
+    return f"has one field more than it should: `{more[0]}`." if more else ""

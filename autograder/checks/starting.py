@@ -1,0 +1,30 @@
+"""What a program is started with: its file, and words that it would refuse."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from autograder.arguments import params_file, remap_rules
+from autograder.checks import runtime
+from autograder.checks.program import Program
+from autograder.diagnosis import Diagnosis
+from autograder.packages.workspace import INSTALLED
+
+
+def file_of(node: Program) -> str:
+    """Where a program's file is, below the folder of the programs."""
+    if node.package:
+        return f"{INSTALLED}/{node.package}/lib/{node.package}/{node.program}"
+    return f"{node.program}.py"
+
+
+def refused_words(words: Sequence[str]) -> Diagnosis | None:
+    """Why a program would not start with these words; None if it would."""
+    refused = remap_rules.refused_parameter(words)
+    if refused:
+        return Diagnosis(*refused)
+    unreadable = params_file.unreadable(words, runtime.current.folder)
+    if unreadable is not None:
+        hint = "Look at the indentation there, and at brackets and quotation marks."
+        return Diagnosis(unreadable.because, "params-file", hint)
+    return None

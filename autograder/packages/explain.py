@@ -1,0 +1,203 @@
+"""Why a package was not built: read from its files where they say so, and else from what the build printed.
+
+Each reason needs words of the tool that only this mistake brings about; where none of them is found, the reason is the
+first error that the build printed, word for word.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+from autograder.diagnosis.reason import Diagnosis
+from autograder.packages.workspace import Built
+
+CODES = {
+    "package-xml": "package.xml is missing, or is no package description that ROS's tools accept",
+    "package-name": "package.xml gives the package another name than its folder has",
+    "build-type": "package.xml exports no build type that fits: colcon does not know how to build the package",
+    "setup-py": "setup.py ended with an error, which is quoted",
+    "package-file": "setup.py names a file or folder that is not in the package",
+    "cmake": "CMake stopped at a line of CMakeLists.txt with the error that is quoted",
+    "cmake-package": "CMakeLists.txt uses a package that it has not looked up with find_package",
+    "interface-line": "a line of an interface file is no field, or its name or type is not allowed",
+    "interface-parts": "a service or action file does not have the parts that `---` separates",
+    "interface-file": "CMakeLists.txt names an interface file that is not there",
+    "interface-type": "an interface file uses a message type that the package does not have",
+    "interface-dependency": "an interface file uses a package that DEPENDENCIES does not name",
+    "interface-group": "package.xml does not make the package a member of the group of interface packages",
+    "build-failed": "the build failed in another way; its first error is quoted",
+    "build-time": "the build took too long and was ended",
+}
+"""The reason codes of builds, with what must have been seen for each."""
+
+_Reason = Callable[[re.Match[str]], Diagnosis]
+
+
+def why_not_built(built: Built, sources: Path) -> Diagnosis | None:
+    """Return why a build failed; None if it did not.
+
+    Args:
+        built: what came of it.
+        sources: the package's folder below `src`.
+    """
+    wrong = _package_xml(sources, built.name)
+    if wrong is not None:
+        return wrong
+    if built.timed_out:
+        hint = "Does a build file wait for something?"
+        return Diagnosis("The build took too long and was ended.", "build-time", hint)
+    if built.status == 0:
+        return None
+    log = " ".join(built.log.split())
+    for pattern, reason in _REASONS:
+        match = re.search(pattern, log)
+        if match:
+            return reason(match)
+    return _quoted(built.log)
+
+
+def _package_xml(sources: Path, name: str) -> Diagnosis | None:
+    """What in package.xml keeps colcon from building the package, or from building it under its name."""
+    from catkin_pkg.package import InvalidPackage, parse_package
+
+    path = sources / "package.xml"
+    if not path.is_file():
+        return Diagnosis(f"There is no `src/{name}/package.xml`: without it, no folder is a package.", "package-xml")
+    try:
+        package = parse_package(str(path))
+    except InvalidPackage as error:
+        words = str(error).replace(str(path), "package.xml").split("\n")
+        lines = [line for line in words if line and not line.startswith("Error(s)")]
+        said = "; ".join(lines[:2]).rstrip(".")
+        return Diagnosis(f"`src/{name}/package.xml` is not accepted: {said}.", "package-xml")
+    except Exception as error:  # what it cannot parse comes as errors of several libraries
+        return Diagnosis(f"`src/{name}/package.xml` cannot be read as XML: {error}.", "package-xml")
+    if package.name != name:
+        because = f"package.xml names the package `{package.name}`; its folder, and this task, name it `{name}`."
+        return Diagnosis(because, "package-name")
+    exported = [export.content for export in package.exports if export.tagname == "build_type"]
+    wanted = "ament_cmake" if (sources / "CMakeLists.txt").is_file() else "ament_python"
+    if exported != [wanted]:
+        has = f"exports the build type `{exported[0]}`" if exported else "exports no build type"
+        because = f"package.xml {has}, so colcon does not build the package as an `{wanted}` package."
+        hint = f"It needs `<export><build_type>{wanted}</build_type></export>`."
+        return Diagnosis(because, "build-type", hint)
+    return None
+
+
+def _interface_line(match: re.Match[str]) -> Diagnosis:
+    line, name, said = match.groups()
+    because = f"The line `{line}` of the interface `{name}` is not accepted: {said.strip()}."
+    hint = (
+        "A line is a type and a name. Types are built in (`string`, `int32`, `float32`, `bool`, …) or messages; names"
+        " of fields are written in small letters."
+    )
+    return Diagnosis(because, "interface-line", hint)
+
+
+def _unknown_type(match: re.Match[str]) -> Diagnosis:
+    because = f"An interface uses the message `{match[1]}/{match[2]}`, and the package does not have it."
+    hint = "A message of another package is written with that package: `std_msgs/Header`."
+    return Diagnosis(because, "interface-type", hint)
+
+
+_REASONS: list[tuple[str, _Reason]] = [
+    (
+        r"error: can't copy '([^']+)': doesn't exist",
+        lambda m: Diagnosis(f"setup.py installs `{m[1]}`, and the package has no such file.", "package-file"),
+    ),
+    (
+        r"error: package directory '([^']+)' does not exist",
+        lambda m: Diagnosis(f"setup.py names the Python package `{m[1]}`; there is no such folder.", "package-file"),
+    ),
+    (
+        r"Error processing '([^']*)' of '([^']*)': '?('.*?)'? Traceback",
+        _interface_line,
+    ),
+    (
+        r"InvalidServiceSpecification: Could not find separator '---'",
+        lambda m: Diagnosis("A service file has no line `---` between request and response.", "interface-parts"),
+    ),
+    (
+        r"InvalidActionSpecification: Number of '---' separators",
+        lambda m: Diagnosis(
+            "An action file has not just two lines `---`: they stand between goal, result and feedback.",
+            "interface-parts",
+        ),
+    ),
+    (
+        r"passed file '([^']+)' doesn't exist",
+        lambda m: Diagnosis(f"CMakeLists.txt names `{m[1]}`; the package has no such file.", "interface-file"),
+    ),
+    (
+        r"include_map\[pkg\].*?KeyError: '([^']+)'",
+        lambda m: Diagnosis(
+            f"An interface uses a message of `{m[1]}`, which rosidl_generate_interfaces is not told of.",
+            "interface-dependency",
+            f"Its last line names the packages whose messages are used: `DEPENDENCIES {m[1]}`.",
+        ),
+    ),
+    (
+        r"No such file or directory: '[^']*/rosidl_generator_type_description/(\w+)/msg/(\w+)\.json'",
+        _unknown_type,
+    ),
+    (
+        r"the passed dependency '([^']+)' has not been found before",
+        lambda m: Diagnosis(
+            f"CMakeLists.txt uses `{m[1]}` before it has looked it up.",
+            "cmake-package",
+            f"`find_package({m[1]} REQUIRED)` has to stand above.",
+        ),
+    ),
+    (
+        r'Unknown CMake command "rosidl_generate_interfaces"',
+        lambda m: Diagnosis(
+            "CMake does not know `rosidl_generate_interfaces`: the package that brings it was not looked up.",
+            "cmake-package",
+            "`find_package(rosidl_default_generators REQUIRED)` has to stand above.",
+        ),
+    ),
+    (
+        r'Unknown CMake command "ament_(\w+)"',
+        lambda m: Diagnosis(
+            f"CMake does not know `ament_{m[1]}`: the package that brings it was not looked up.",
+            "cmake-package",
+            "`find_package(ament_cmake REQUIRED)` has to stand above.",
+        ),
+    ),
+    (
+        r"Packages installing interfaces must include",
+        lambda m: Diagnosis(
+            "package.xml does not say that this is a package of interfaces.",
+            "interface-group",
+            "It needs `<member_of_group>rosidl_interface_packages</member_of_group>`.",
+        ),
+    ),
+]
+
+
+def _quoted(log: str) -> Diagnosis:
+    """The first error that the build printed, as the reason."""
+    error = re.search(r"CMake Error at (\S+):(\d+) \((\w+)\):\n((?:  .*\n?)+)(Call Stack.*\n(?:  .*\n?)*)?", log)
+    if error:
+        own = re.search(r"CMakeLists\.txt:(\d+) \((\w+)\)", f"{error[1]}:{error[2]} ({error[3]}) {error[5] or ''}")
+        where = f"line {own[1]} of CMakeLists.txt, `{own[2]}`" if own else f"`{error[3]}`"
+        said = " ".join(error[4].split()).rstrip(".")[:300]
+        return Diagnosis(f"CMake stops at {where}: {said}.", "cmake")
+    if "setup.py" in log:
+        wrong = next(_python_errors(log), "")
+        if wrong:
+            return Diagnosis(f"setup.py ends with an error: {wrong}.", "setup-py")
+    first = next((line for line in log.splitlines() if re.search(r"\berror\b|Error", line)), "")
+    return Diagnosis(f"The build fails: {first.strip()[:300]}", "build-failed", "The whole log is below.")
+
+
+def _python_errors(log: str) -> Iterator[str]:
+    """The last lines of tracebacks, with the line of setup.py where one is named."""
+    for match in re.finditer(r"^(\w+(?:Error|Exception|Warning)?): (.+)$", log, re.MULTILINE):
+        place = re.findall(r'File "[^"]*setup\.py", line (\d+)', log[: match.start()])
+        where = f" (line {place[-1]})" if place else ""
+        if match[1].endswith(("Error", "Exception")):
+            yield f"{match[1]}: {match[2].rstrip('.')}{where}"

@@ -1,0 +1,114 @@
+"""A colcon workspace: the packages below `src`, and what building them puts below `install`."""
+
+from __future__ import annotations
+
+import hashlib
+import shutil
+import sysconfig
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from autograder.core.errors import KitError
+from autograder.core.results import Isolation
+from autograder.sandbox.build import BuildRun, build_packages
+
+SOURCES, INSTALLED = "src", "install"
+INSTALL = "Debian, Ubuntu: sudo apt-get install g++ cmake make python3-dev"
+"""How to get what interfaces are built with."""
+
+
+@dataclass(frozen=True)
+class Built:
+    """What came of building a package."""
+
+    name: str
+    status: int
+    """Of colcon."""
+    log: str
+    timed_out: bool
+    files: frozenset[str] = field(default_factory=frozenset)
+    """What is installed, as paths below the package's folder in `install`."""
+    folder: Path = Path()
+    """That folder."""
+
+    @property
+    def executables(self) -> list[str]:
+        """Names that `ros2 run` finds: it looks for files in `lib/PACKAGE`."""
+        where = f"lib/{self.name}"
+        return sorted(Path(path).name for path in self.files if str(Path(path).parent) == where)
+
+    def shared(self, name: str) -> str:
+        """Where below `share/PACKAGE` a file of this name is, as `ros2 launch` looks for it; the name if nowhere."""
+        where = f"share/{self.name}/"
+        found = sorted(path for path in self.files if path.startswith(where) and Path(path).name == name)
+        return found[0].removeprefix(where) if found else name
+
+    def text(self, path: str) -> str:
+        """Return an installed file as text; empty if there is none."""
+        return (self.folder / path).read_text("utf-8", "replace") if path in self.files else ""
+
+
+class Workspace:
+    """The packages of one folder. What has been built is built again only after a change of its sources.
+
+    Args:
+        folder: with the folder `src` in it.
+        isolation: for what the packages' own build files run.
+    """
+
+    def __init__(self, folder: Path, isolation: Isolation) -> None:
+        """Begin with nothing built."""
+        self._folder = folder
+        self._isolation = isolation
+        self._built: dict[str, tuple[str, Built]] = {}
+
+    def source(self, package: str) -> Path:
+        """The folder of a package's sources."""
+        return self._folder / SOURCES / package
+
+    def build(self, package: str) -> Built:
+        """Build a package, alone.
+
+        Raises:
+            KitError: the package has interfaces, and this machine has nothing to compile them with.
+            OSError: the sandbox cannot be started, or what was built cannot be written.
+        """
+        lacking = missing_tools()
+        if lacking and (self.source(package) / "CMakeLists.txt").is_file():
+            raise KitError(
+                f"Building `{package}` needs {', '.join(lacking)}, which this machine does not have.", INSTALL
+            )
+        digest = _digest(self.source(package))
+        known, built = self._built.get(package, ("", None))
+        if built is None or known != digest:
+            built = self._install(package, build_packages(self._folder / SOURCES, [package], self._isolation))
+            self._built[package] = (digest, built)
+        return built
+
+    def _install(self, package: str, run: BuildRun) -> Built:
+        """Write what a build has installed, in place of what an earlier one had."""
+        place = self._folder / INSTALLED / package
+        shutil.rmtree(place, ignore_errors=True)
+        prefix = f"{package}/"
+        installed = {path.removeprefix(prefix): data for path, data in run.installed.items() if path.startswith(prefix)}
+        for path, content in installed.items():
+            (place / path).parent.mkdir(parents=True, exist_ok=True)
+            (place / path).write_bytes(content)
+        return Built(package, run.status, run.log, run.timed_out, frozenset(installed), place)
+
+
+def missing_tools() -> list[str]:
+    """What a package with interfaces is built with and this machine does not have."""
+    programs = {"a C compiler": "cc", "a C++ compiler": "c++", "CMake": "cmake", "make": "make"}
+    lacking = [what for what, program in programs.items() if shutil.which(program) is None]
+    headers = Path(sysconfig.get_path("include")) / "Python.h"
+    return lacking + ([] if headers.is_file() else ["the headers of Python"])
+
+
+def _digest(folder: Path) -> str:
+    """A word for all that a package's files hold."""
+    found = hashlib.sha256()
+    for path in sorted(path for path in folder.rglob("*") if path.is_file()):
+        content = path.read_bytes()
+        found.update(f"{path.relative_to(folder)}\0{len(content)}\0".encode() + content)
+    return found.hexdigest()

@@ -1,0 +1,358 @@
+"""Packages: built by colcon in the sandbox, run from where they are installed, and explained where they are not."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import pytest
+from boxes import ROOT
+
+from autograder.core.results import CheckResult, Isolation
+from autograder.course.lab import Cell
+from autograder.grading.job import Job
+from autograder.grading.supervisor import run_in_workers
+from autograder.packages.explain import CODES
+from autograder.sandbox.isolation import preflight
+
+SENSORS = {
+    "package.xml": """<?xml version="1.0"?>
+<package format="3">
+  <name>NAME</name>
+  <version>0.1.0</version>
+  <description>Sensors.</description>
+  <maintainer email="student@example.org">student</maintainer>
+  <license>Apache-2.0</license>
+  <exec_depend>rclpy</exec_depend>
+  <export><build_type>ament_python</build_type></export>
+</package>
+""",
+    "setup.py": """from setuptools import setup
+
+setup(
+    name="NAME",
+    version="0.1.0",
+    packages=["NAME"],
+    data_files=[
+        ("share/ament_index/resource_index/packages", ["resource/NAME"]),
+        ("share/NAME", ["package.xml"]),
+        ("share/NAME/launch", ["launch/car.launch.yaml"]),
+    ],
+    entry_points={"console_scripts": ["speed_sensor = NAME.sensor:main"]},
+)
+""",
+    "setup.cfg": "[develop]\nscript_dir=$base/lib/NAME\n[install]\ninstall_scripts=$base/lib/NAME\n",
+    "resource/NAME": "",
+    "launch/car.launch.yaml": "launch:\n- node:\n    pkg: NAME\n    exec: speed_sensor\n    name: front\n",
+    "NAME/__init__.py": "",
+    "NAME/sensor.py": """import rclpy
+from std_msgs.msg import Int64
+
+
+def main():
+    rclpy.init()
+    node = rclpy.create_node("sensor")
+    publisher = node.create_publisher(Int64, "speed", 10)
+    node.create_timer(0.05, lambda: publisher.publish(Int64(data=7)))
+    rclpy.spin(node)
+""",
+}
+INTERFACES = {
+    "package.xml": """<?xml version="1.0"?>
+<package format="3">
+  <name>NAME</name>
+  <version>0.1.0</version>
+  <description>Interfaces.</description>
+  <maintainer email="student@example.org">student</maintainer>
+  <license>Apache-2.0</license>
+  <buildtool_depend>ament_cmake</buildtool_depend>
+  <buildtool_depend>rosidl_default_generators</buildtool_depend>
+  <depend>std_msgs</depend>
+  <exec_depend>rosidl_default_runtime</exec_depend>
+  <member_of_group>rosidl_interface_packages</member_of_group>
+  <export><build_type>ament_cmake</build_type></export>
+</package>
+""",
+    "CMakeLists.txt": """cmake_minimum_required(VERSION 3.8)
+project(NAME)
+find_package(ament_cmake REQUIRED)
+find_package(rosidl_default_generators REQUIRED)
+find_package(std_msgs REQUIRED)
+rosidl_generate_interfaces(NAME
+  "msg/Thing.msg"
+  "msg/Things.msg"
+  "srv/Count.srv"
+  DEPENDENCIES std_msgs)
+ament_package()
+""",
+    "msg/Thing.msg": "string label\nfloat32 x\n",
+    "msg/Things.msg": "std_msgs/Header header\nThing[] things\n",
+    "srv/Count.srv": "string label\n---\nint32 count\n",
+}
+
+
+def changed(files: Mapping[str, str], file: str, old: str, new: str) -> dict[str, str]:
+    """The files with one thing changed in one of them, which has to be there."""
+    assert old in files[file]
+    return {**files, file: files[file].replace(old, new)}
+
+
+def without(files: Mapping[str, str], file: str) -> dict[str, str]:
+    return {name: text for name, text in files.items() if name != file}
+
+
+EXPECT = "expect_built()"
+RUNS = 'expect_executable("speed_sensor")'
+CASES: dict[str, tuple[dict[str, str], str, str, str]] = {
+    # name: (files, expectation, code, words of the reason)
+    "not_xml": (changed(SENSORS, "package.xml", "</package>", ""), EXPECT, "package-xml", "package.xml"),
+    "no_license": (
+        changed(SENSORS, "package.xml", "<license>Apache-2.0</license>", ""),
+        EXPECT,
+        "package-xml",
+        "license",
+    ),
+    "other_name": (changed(SENSORS, "package.xml", "<name>NAME", "<name>other"), EXPECT, "package-name", "`other`"),
+    "no_build_type": (
+        changed(SENSORS, "package.xml", "<build_type>ament_python</build_type>", ""),
+        EXPECT,
+        "build-type",
+        "no build type",
+    ),
+    "no_marker": (without(SENSORS, "resource/NAME"), EXPECT, "package-file", "resource/"),
+    "no_module_folder": (
+        changed(SENSORS, "setup.py", 'packages=["NAME"]', 'packages=["nme"]'),
+        EXPECT,
+        "package-file",
+        "`nme`",
+    ),
+    "error_in_setup": (
+        changed(SENSORS, "setup.py", 'version="0.1.0",', "version=VERSION,"),
+        EXPECT,
+        "setup-py",
+        "VERSION",
+    ),
+    "no_setup_cfg": (without(SENSORS, "setup.cfg"), RUNS, "executable-place", "`bin`"),
+    "misspelt_entry": (
+        changed(SENSORS, "setup.py", "speed_sensor =", "speed_senser ="),
+        RUNS,
+        "entry-point",
+        "speed_senser",
+    ),
+    "lost_module": (
+        changed(SENSORS, "setup.py", ".sensor:main", ".sensors:main"),
+        RUNS,
+        "entry-point-target",
+        ".sensors`",
+    ),
+    "lost_function": (changed(SENSORS, "setup.py", ":main", ":run"), RUNS, "entry-point-target", "`run`"),
+    "launch_left_out": (
+        changed(SENSORS, "setup.py", '("share/NAME/launch", ["launch/car.launch.yaml"]),', ""),
+        'expect_installed("share/launch_left_out/launch/car.launch.yaml")',
+        "not-installed",
+        "car.launch.yaml",
+    ),
+    "float": (changed(INTERFACES, "msg/Thing.msg", "float32", "float"), EXPECT, "interface-line", "float x"),
+    "capital": (changed(INTERFACES, "msg/Thing.msg", "label", "Label"), EXPECT, "interface-line", "string Label"),
+    "one_part": (changed(INTERFACES, "srv/Count.srv", "---\n", ""), EXPECT, "interface-parts", "---"),
+    "no_such_file": (
+        changed(INTERFACES, "CMakeLists.txt", "msg/Thing.msg", "msg/Thin.msg"),
+        EXPECT,
+        "interface-file",
+        "Thin",
+    ),
+    "header_alone": (changed(INTERFACES, "msg/Things.msg", "std_msgs/", ""), EXPECT, "interface-type", "Header"),
+    "no_dependency": (
+        changed(INTERFACES, "CMakeLists.txt", "  DEPENDENCIES std_msgs)", ")"),
+        EXPECT,
+        "interface-dependency",
+        "std_msgs",
+    ),
+    "not_found": (
+        changed(INTERFACES, "CMakeLists.txt", "find_package(std_msgs REQUIRED)\n", ""),
+        EXPECT,
+        "cmake-package",
+        "std_msgs",
+    ),
+    "no_generators": (
+        changed(INTERFACES, "CMakeLists.txt", "find_package(rosidl_default_generators REQUIRED)\n", ""),
+        EXPECT,
+        "cmake-package",
+        "rosidl_generate_interfaces",
+    ),
+    "no_group": (
+        changed(INTERFACES, "package.xml", "<member_of_group>rosidl_interface_packages</member_of_group>", ""),
+        EXPECT,
+        "interface-group",
+        "package of interfaces",
+    ),
+    "no_project_name": (
+        changed(INTERFACES, "CMakeLists.txt", "rosidl_generate_interfaces(NAME", "rosidl_generate_interfaces(${NAM}"),
+        EXPECT,
+        "cmake",
+        "line 6",
+    ),
+    "typo_in_cmake": (changed(INTERFACES, "CMakeLists.txt", "project(", "projekt("), EXPECT, "cmake", "line 2"),
+}
+
+SET_UP = "from autograder.checks import Program, build, launch, launch_file\nfrom std_msgs.msg import Int64, String\n"
+GOOD = {
+    "sensors": """with build("good_sensors") as package:
+    package.expect_built()
+    package.expect_executable("speed_sensor")
+    package.expect_installed("share/good_sensors/package.xml")
+with launch(Program("speed_sensor", package="good_sensors"), listen=[("/speed", Int64)]) as ros:
+    ros.expect_node("/sensor")
+    ros.expect_messages("/speed", Int64, at_least=3)
+with launch_file("car.launch.yaml", package="good_sensors") as ros:
+    ros.expect_node("/front")
+ros.score(1)""",
+    "interfaces": """with build("good_interfaces") as package:
+    package.expect_interface("msg/Things", {"header": "std_msgs/Header", "things": "Thing[]"})
+    package.expect_interface("srv/Count", {"label": "string"}, {"count": "int32"})
+with launch("counter", packages=["good_interfaces"], listen=[("/counted", String)]) as ros:
+    ros.expect_messages("/counted", String, at_least=1, where=lambda m: m.data == "2 of car")
+ros.score(1)""",
+    "fields": """with build("good_interfaces") as package:
+    package.expect_interface("msg/Thing", {"label": "string", "x": "float64"})
+package.score(1)""",
+    "not there": 'with build("nothing") as package:\n    package.expect_built()\npackage.score(1)',
+}
+COUNTER = """import rclpy
+from good_interfaces.msg import Thing, Things
+from good_interfaces.srv import Count
+from std_msgs.msg import String
+
+rclpy.init()
+node = rclpy.create_node("counter")
+publisher = node.create_publisher(String, "counted", 10)
+
+
+def count(request, response):
+    things = Things(things=[Thing(label="car"), Thing(label="car"), Thing(label="tree")])
+    response.count = sum(thing.label == request.label for thing in things.things)
+    return response
+
+
+node.create_service(Count, "count", count)
+client = node.create_client(Count, "count")
+client.wait_for_service()
+
+
+def ask():
+    answer = client.call_async(Count.Request(label="car"))
+    answer.add_done_callback(lambda done: publisher.publish(String(data=f"{done.result().count} of car")))
+
+
+node.create_timer(0.2, ask)
+rclpy.spin(node)
+"""
+HOSTILE = {
+    "looks_around": """import os, socket, sys
+got = []
+for name, do in {
+    "network": lambda: socket.create_connection(("127.0.0.1", 22), 1),
+    "datagram": lambda: socket.socket(socket.AF_INET, socket.SOCK_DGRAM).connect(("192.0.2.1", 9)),
+    "sources": lambda: open("/home/student/written", "w"),
+    "answers": lambda: os.listdir("/home/student/../../ROOT/solutions"),
+    "kit": lambda: os.listdir("ROOT/autograder"),
+    "namespace": lambda: os.unshare(0x10000000) if hasattr(os, "unshare") else int("x"),
+}.items():
+    try:
+        do()
+    except Exception:
+        continue
+    got.append(name)
+print("GOT", got, file=sys.stderr)
+""",
+    "forks": "import os\nwhile True:\n    os.fork()\n",
+    "fills_memory": "hoard = []\nwhile True:\n    hoard.append(bytearray(1 << 24))\n",
+    "fills_disk": "f = open('/tmp/x', 'wb')\nwhile True:\n    f.write(bytes(1 << 20))\n",
+    "prints": "while True:\n    print('x' * 1000)\n",
+    "false_archive": """import os, sys, tarfile, io
+for descriptor in range(1, 20):
+    try:
+        with tarfile.open(fileobj=os.fdopen(os.dup(descriptor), "wb"), mode="w|") as tar:
+            for name in ("false_archive/../../written", "/tmp/written", "false_archive/share/x"):
+                info = tarfile.TarInfo(name)
+                info.size = 1
+                tar.addfile(info, io.BytesIO(b"x"))
+    except Exception:
+        pass
+""",
+}
+"""By name, a setup.py."""
+HOSTILE_CHECK = """with build("NAME") as package:
+    package.expect_built()
+import os, re
+from autograder.checks import outcomes
+written = [name for name in os.listdir("/tmp") if name == "written"]
+outcomes.passed(f"WRITTEN {written} {re.findall('GOT .*', package.log)[:1]}")
+package.score(1)"""
+
+
+def package(name: str, files: Mapping[str, str]) -> dict[str, str]:
+    """The files of a package as a submission has them."""
+    return {f"src/{name}/{path.replace('NAME', name)}": text.replace("NAME", name) for path, text in files.items()}
+
+
+@pytest.fixture(scope="module")
+def found() -> dict[str, CheckResult]:
+    """What each case came to; all of them in one submission, since no package knows of another."""
+    files = {"counter.py": COUNTER}
+    checks = {}
+    for name, (case, expectation, _, _) in CASES.items():
+        files |= package(name, case)
+        checks[name] = f'with build("{name}") as package:\n    package.{expectation}\npackage.score(1)'
+    files |= package("good_sensors", SENSORS) | package("good_interfaces", INTERFACES)
+    for name, setup in HOSTILE.items():
+        files |= package(name, {**SENSORS, "setup.py": setup.replace("ROOT", str(ROOT))})
+        checks[name] = HOSTILE_CHECK.replace("NAME", name)
+    checks |= GOOD
+    cells = [Cell(grade_id=name, points=1, source=source) for name, source in checks.items()]
+    what: dict[str, Any] = {"files": files, "cells": [Cell(grade_id="set_up", source=SET_UP), *cells]}
+    isolation = Isolation.FULL if preflight().full else Isolation.NONE
+    job = Job(student="ann", lab="lab", digest="0", isolation=isolation, seed=1, **what)
+    return {check.grade_id: check for check in run_in_workers(job, 2).checks}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_a_package_that_is_not_as_it_should_be_is_told_why(found: dict[str, CheckResult], name: str) -> None:
+    _, _, code, words = CASES[name]
+    first = next(one for one in found[name].outcomes if one.because)
+    assert found[name].points == 0
+    assert first.code == code, first
+    assert words in first.because, first
+
+
+def test_a_package_is_built_and_run_and_launched_from_where_it_is_installed(found: dict[str, CheckResult]) -> None:
+    assert found["sensors"].points == 1, found["sensors"]
+
+
+def test_interfaces_are_built_and_a_program_uses_them(found: dict[str, CheckResult]) -> None:
+    assert found["interfaces"].points == 1, found["interfaces"]
+
+
+def test_a_field_of_another_type_is_named(found: dict[str, CheckResult]) -> None:
+    first = found["fields"].outcomes[0]
+    assert (first.code, found["fields"].points) == ("interface-fields", 0)
+    assert "`x` as `float32`, not as `float64`" in first.because
+
+
+def test_a_package_that_nobody_wrote_is_said_to_be_missing(found: dict[str, CheckResult]) -> None:
+    assert "no package `nothing`" in found["not there"].outcomes[0].because
+
+
+def test_every_code_of_a_build_has_a_case() -> None:
+    seen = {code for _, _, code, _ in CASES.values()}
+    assert CODES.keys() - seen <= {"build-failed", "build-time"}
+
+
+@pytest.mark.skipif(not preflight().full, reason="without full isolation a build is a plain process")
+@pytest.mark.parametrize("name", HOSTILE)
+def test_a_hostile_build_is_ended_and_reaches_nothing(found: dict[str, CheckResult], name: str) -> None:
+    check = found[name]
+    assert check.points == 0, check
+    told = check.outcomes[-1].title
+    assert "WRITTEN []" in told
+    assert name != "looks_around" or "GOT []" in told, told
