@@ -37,7 +37,8 @@ class Endpoint:
         return said
 
 
-_ROW = 84.0
+_ROW, _LOW_ROW, _FEW = 84.0, 62.0, 4
+"""Height of a row; of one where there are more than a few."""
 Mismatch = Callable[[Endpoint, Endpoint], str | None]
 
 
@@ -62,13 +63,13 @@ def graph(
     for thing, layer in layers.items():
         columns.setdefault(layer, []).append(thing)
     rows = max((len(column) for column in columns.values()), default=1)
-    height = max(rows * _ROW, _ROW) + 30
+    height = max(rows, 1) * (_ROW if rows <= _FEW else _LOW_ROW) + 30
     canvas = Canvas(height, WIDTH)
     places = _places(columns, height)
     for (kind, name), (x, y, width) in places.items():
         draw = canvas.oval if kind == "node" else canvas.box
         draw(x - width / 2, y - 21, width, 42)
-        canvas.words(x, y + 6, shortened(name, width - 14, TEXT - 2), size=TEXT - 2, anchor="middle")
+        canvas.words(x, y + 6, shortened(name, width - 14), size=TEXT, anchor="middle")
     for one in ends:
         own = [end for end in everyone if (end.node, end.topic, end.publishes) == one]
         _arrow(canvas, places, own, everyone, mismatch)
@@ -100,7 +101,7 @@ def _places(
     room = WIDTH / count
     for layer, things in columns.items():
         for number, thing in enumerate(things):
-            width = min(max(width_of(thing[1], TEXT - 2) + 34, 90), room * (0.78 if count < 4 else 0.62))
+            width = min(max(width_of(thing[1]) + 34, 90), room * (0.78 if count < 4 else 0.62))
             y = height * (number + 0.5) / len(things)
             left, right = width / 2 + 6, WIDTH - width / 2 - 6
             x = left if layer == 0 else right if layer == count - 1 else room * (layer + 0.5)
@@ -129,10 +130,10 @@ def _arrow(
     pieces = [*(["best effort"] if end.policies.get("reliability") == "best_effort" else []), *end.unusual()]
     pieces += [f"{len(own)} times"] if len(own) > 1 else []
     for number, piece in enumerate(pieces):
-        canvas.words(x, y - 10 - SMALL * (len(pieces) - 1 - number), piece, size=SMALL - 2, anchor="middle", halo=True)
+        canvas.words(x, y - 10 - SMALL * (len(pieces) - 1 - number), piece, size=SMALL, anchor="middle", halo=True)
     if broken:
         canvas.words(x, y + 11, "✗", size=26, anchor="middle", bold=True, halo=True)
-        canvas.words(x, y + 28, broken, size=SMALL - 2, anchor="middle", halo=True)
+        canvas.words(x, y + 28, broken, size=SMALL, anchor="middle", halo=True)
 
 
 def _refused(end: Endpoint, everyone: Sequence[Endpoint], mismatch: Mismatch) -> str:
