@@ -10,6 +10,7 @@ from rclpy.duration import Duration
 from rclpy.qos import DurabilityPolicy, LivelinessPolicy, QoSProfile
 from std_msgs.msg import Int64, String
 from std_srvs.srv import Trigger
+from test_msgs.action import Fibonacci, NestedMessage
 
 from autograder import diagnosis
 from autograder.diagnosis import Diagnosis, Scene
@@ -19,6 +20,7 @@ from autograder.graph.recording import quiet_profile
 PRELUDE = """
 import threading, time
 import rclpy
+from rclpy.action import ActionClient, ActionServer, CancelResponse, GoalResponse
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup as Exclusive, ReentrantCallbackGroup as Reentrant
 from rclpy.executors import MultiThreadedExecutor, SingleThreadedExecutor
 from rclpy.lifecycle import LifecycleNode, TransitionCallbackReturn
@@ -27,6 +29,7 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, LivelinessPolicy, QoSProfile, ReliabilityPolicy
 from std_msgs.msg import Int64, String
 from std_srvs.srv import Trigger
+from test_msgs.action import Fibonacci, NestedMessage
 """
 
 Ask = Callable[[Scene, str], Diagnosis | None]
@@ -58,6 +61,10 @@ def kept_waiting(scene: Scene, name: str) -> Diagnosis | None:
 
 def trouble(scene: Scene, name: str) -> Diagnosis | None:
     return diagnosis.program_trouble(scene)
+
+
+def of_goal(ask: str) -> Ask:
+    return lambda scene, name: getattr(diagnosis, ask)(scene, f"/{name}/count")
 
 
 @dataclass
@@ -169,7 +176,190 @@ LATER = "def {}(self, state):\n    self.more = self.create_publisher(String, '~/
 SUCCESS = "    return TransitionCallbackReturn.SUCCESS\n"
 ANSWERED = lambda it: any(thing.kind == "service" and thing.done >= 2 for thing in it.callbacks)  # noqa: E731
 
+AGREE = ", cancel_callback=lambda goal: CancelResponse.ACCEPT"
+COUNTS = (
+    "self.server = ActionServer(self, Fibonacci, '~/count', self.execute{})\n"
+    "self.client = ActionClient(self, Fibonacci, '~/count')\n"
+    "self.asked = self.create_timer(0.05, self.ask, callback_group=Reentrant())\n"
+)
+EXECUTE = """
+def ask(self):
+    if self.client.server_is_ready():
+        self.asked.cancel()
+        self.client.send_goal_async(Fibonacci.Goal(order=3)).add_done_callback(self.accepted)
+
+def accepted(self, future):
+    future.result().get_result_async()
+
+def execute(self, goal):
+"""
+FEEDBACK = "    goal.publish_feedback(Fibonacci.Feedback(sequence=[1]))\n"
+SUCCEED = "    goal.succeed()\n    return Fibonacci.Result()\n"
+EXECUTED = lambda it: any(thing.kind == "execute" and thing.done for thing in it.things.values())  # noqa: E731
+ASKED = lambda it: any(thing.kind == "goal" and thing.done for thing in it.things.values())  # noqa: E731
+
 CASES = {
+    # Goals of an action.
+    "execute_raises": Case(
+        COUNTS.format(AGREE),
+        EXECUTE + FEEDBACK + "    raise ValueError('too far')\n",
+        says="execute-exception",
+        because="too far",
+        never=("no-succeed", "execute-return"),
+        ask=of_goal("why_not_finished"),
+    ),
+    "execute_raises_and_the_node_goes_on": Case(
+        TALK + COUNTS.format(AGREE),
+        EXECUTE + "    raise ValueError('too far')\n",
+        says="silent",
+        never=("execute-exception", "callback-exception"),
+        ready=EXECUTED,
+    ),
+    "execute_returns_nothing": Case(
+        COUNTS.format(AGREE),
+        EXECUTE + "    goal.succeed()\n",
+        THREADS.format(2),
+        says="execute-return",
+        because="None instead of Fibonacci_Result",
+        never=("no-succeed", "execute-exception"),
+        ask=of_goal("why_not_finished"),
+    ),
+    "execute_returns_the_feedback": Case(
+        COUNTS.format(AGREE),
+        EXECUTE + "    goal.succeed()\n    return Fibonacci.Feedback()\n",
+        THREADS.format(2),
+        says="execute-return",
+        because="Fibonacci_Feedback instead of Fibonacci_Result",
+        ask=of_goal("why_not_finished"),
+    ),
+    "result_of_whole_numbers": Case(
+        COUNTS.format(AGREE).replace("Fibonacci", "NestedMessage"),
+        EXECUTE.replace("Fibonacci.Goal(order=3)", "NestedMessage.Goal()")
+        + "    goal.succeed()\n    result = NestedMessage.Result()\n    result.nested_field.float64_value = 5\n"
+        "    return result\n",
+        THREADS.format(2),
+        says="message-field",
+        because="a wrong number in its result on `/result_of_whole_numbers/count`: the field `nested_field.float64",
+        never=("execute-return",),
+        ask=of_goal("why_not_finished"),
+    ),
+    "feedback_is_a_list": Case(
+        COUNTS.format(AGREE),
+        EXECUTE + "    goal.publish_feedback([1, 2])\n" + SUCCEED,
+        says="message-type",
+        because="Fibonacci_Feedback",
+        never=("execute-exception", "no-feedback"),
+        ask=of_goal("why_no_feedback"),
+    ),
+    "does_not_succeed": Case(
+        COUNTS.format(AGREE),
+        EXECUTE + "    return Fibonacci.Result()\n",
+        says="no-succeed",
+        ask=of_goal("why_not_finished"),
+    ),
+    "aborts_by_itself": Case(
+        COUNTS.format(AGREE),
+        EXECUTE + "    goal.abort()\n    return Fibonacci.Result()\n",
+        never=("no-succeed", "execute-return", "execute-exception"),
+        ask=of_goal("why_not_finished"),
+        ready=EXECUTED,
+    ),
+    "decides_nothing": Case(
+        COUNTS.format(", goal_callback=lambda goal: None"),
+        EXECUTE + SUCCEED,
+        says="goal-return",
+        because="None instead of GoalResponse",
+        ask=of_goal("why_rejected"),
+    ),
+    "rejects": Case(
+        COUNTS.format(", goal_callback=lambda goal: GoalResponse.REJECT"),
+        EXECUTE + SUCCEED,
+        never=("goal-return",),
+        ask=of_goal("why_rejected"),
+        ready=ASKED,
+    ),
+    "no_feedback": Case(
+        COUNTS.format(AGREE),
+        EXECUTE + SUCCEED,
+        says="no-feedback",
+        ask=of_goal("why_no_feedback"),
+    ),
+    "some_feedback": Case(
+        COUNTS.format(AGREE),
+        EXECUTE + FEEDBACK + SUCCEED,
+        never=("no-feedback",),
+        ask=of_goal("why_no_feedback"),
+        ready=EXECUTED,
+    ),
+    "cannot_be_canceled": Case(
+        COUNTS.format(""),
+        EXECUTE + SUCCEED,
+        says="no-cancel-callback",
+        ask=of_goal("why_not_canceled"),
+    ),
+    "cancels_nothing": Case(
+        COUNTS.format(", cancel_callback=lambda goal: None"),
+        EXECUTE.replace("future.result().get_result_async()", "future.result().cancel_goal_async()")
+        + "    time.sleep(0.2)\n"
+        + SUCCEED,
+        THREADS.format(2),
+        says="cancel-return",
+        never=("no-cancel-callback",),
+        ask=of_goal("why_not_canceled"),
+    ),
+    "holds_the_thread": Case(
+        COUNTS.format(AGREE),
+        EXECUTE.replace("def execute", "async def execute") + "    time.sleep(0.5)\n" + SUCCEED,
+        says="goal-holds-thread",
+        because="only an `await` gives the thread back",
+        never=("cancel-return", "goal-holds-group"),
+        ask=of_goal("why_not_canceled"),
+    ),
+    "has_two_threads": Case(
+        COUNTS.format(AGREE),
+        EXECUTE + "    time.sleep(0.5)\n" + SUCCEED,
+        THREADS.format(2),
+        never=("goal-holds-thread", "goal-holds-group", "no-cancel-callback", "cancel-return"),
+        ask=of_goal("why_not_canceled"),
+        ready=EXECUTED,
+    ),
+    "awaits_its_goal": Case(
+        "self.later = rclpy.task.Future()\nself.create_timer(0.6, lambda: self.later.set_result(None))\n"
+        + COUNTS.format(AGREE),
+        EXECUTE.replace("def execute", "async def execute") + "    await self.later\n" + SUCCEED,
+        never=("goal-holds-thread",),
+        ask=of_goal("why_not_canceled"),
+        ready=EXECUTED,
+    ),
+    "holds_the_group": Case(
+        COUNTS.format(AGREE + ", handle_accepted_callback=self.take"),
+        EXECUTE + SUCCEED + "\ndef take(self, goal):\n    time.sleep(0.5)\n    goal.execute()\n",
+        THREADS.format(3),
+        says="goal-holds-group",
+        never=("goal-holds-thread",),
+        ask=of_goal("why_waits_for_a_goal"),
+    ),
+    "other_action": Case(
+        COUNTS.format(AGREE),
+        EXECUTE + SUCCEED,
+        says="action-name",
+        because="`/other_action/count` (`~/count` in the code)",
+        never=("no-action",),
+        ask=lambda scene, name: diagnosis.why_no_action(scene, f"/{name}/cuont", Fibonacci),
+    ),
+    "other_action_type": Case(
+        COUNTS.format(AGREE),
+        EXECUTE + SUCCEED,
+        says="wrong-type",
+        because="test_msgs/action/Fibonacci, not test_msgs/action/NestedMessage",
+        never=("action-name", "no-action"),
+        ask=lambda scene, name: diagnosis.why_no_action(scene, f"/{name}/count", NestedMessage),
+    ),
+    "no_action": Case(
+        says="no-action",
+        never=("action-name",),
+        ask=lambda scene, name: diagnosis.why_no_action(scene, "/zzz", Fibonacci),
+    ),
     # Ends that the code makes later.
     "makes_it_in_activate": Case(
         methods=LATER.format("on_activate", SUCCESS),

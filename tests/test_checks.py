@@ -488,7 +488,7 @@ def test_an_action_is_followed_from_the_goal_to_its_end(grade: Grade) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "code"),
     [
-        ('"count"', '"cuont"', "no-action"),
+        ('"count"', '"cuont"', "action-name"),
         ("executor.spin()", "__import__('threading').Event().wait()", "not-spinning"),
     ],
 )

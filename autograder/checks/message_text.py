@@ -26,6 +26,12 @@ def in_words(message: Any, looked_at_by: Callable[..., object] | None = None) ->
     return ", ".join(f"{path}={_value(value)}" for path, value in fields)
 
 
+def set_fields(message: Any) -> str:
+    """The fields of a message that were given a value, as `order=5`; those that are 0, empty or false are left out."""
+    said = [f"{path}={_value(value)}" for path, value in _fields(message, "") if value not in (0, b"\x00", "", [])]
+    return ", ".join(said) or "every field is 0 or empty"
+
+
 def shorten(text: str, length: int = 200) -> str:
     """At most `length` characters; what is left out is marked."""
     return text if len(text) <= length else text[: length - 3] + "..."

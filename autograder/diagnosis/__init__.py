@@ -13,6 +13,15 @@ has ended, what was seen before stands where its probe tells that the check's ow
 
 from autograder.diagnosis.callbacks import called_from_outside, failed_in_a_callback
 from autograder.diagnosis.chain import inside_reason
+from autograder.diagnosis.goals import (
+    why_no_action,
+    why_no_feedback,
+    why_not_canceled,
+    why_not_finished,
+    why_rejected,
+    why_waits_for_a_goal,
+    why_wrong_feedback,
+)
 from autograder.diagnosis.matching import why_not_matched
 from autograder.diagnosis.names import why_doubled, why_no_endpoint, why_no_node, why_no_service, why_topic_present
 from autograder.diagnosis.programs import program_trouble, shut_down_inside
@@ -41,13 +50,20 @@ __all__ = [
     "waits_for_its_group",
     "why_doubled",
     "why_kept_waiting",
+    "why_no_action",
     "why_no_answer",
     "why_no_endpoint",
+    "why_no_feedback",
     "why_no_node",
     "why_no_service",
+    "why_not_canceled",
+    "why_not_finished",
     "why_not_matched",
     "why_not_together",
+    "why_rejected",
     "why_silent",
     "why_starved",
     "why_topic_present",
+    "why_waits_for_a_goal",
+    "why_wrong_feedback",
 ]

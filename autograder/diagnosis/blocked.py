@@ -215,9 +215,11 @@ def stuck(inside: Inside) -> Diagnosis | None:
 
 
 def _stuck(inside: Inside) -> list[tuple[Thing, float, Place]]:
-    """Runs that last, with their age and their place."""
+    """Runs that last, with their age and their place. To execute a goal may take its time."""
     found = []
     for thing in inside.things.values():
+        if thing.kind == "execute":
+            continue
         for began, thread in thing.running:
             age = inside.now - began
             if age < STUCK_AFTER or thing.awaits.line:

@@ -11,14 +11,18 @@ from autograder.diagnosis.traces import KNOWN_ERRORS, quoted
 _AFTER = {
     "service": "The client gets no answer and the node no longer spins.",
     "lifecycle": "rclpy swallows it without a log line and treats the transition as ERROR.",
+    "execute": "rclpy aborts the goal with an empty result; the node goes on.",
 }
-_CODES = {"service": "service-exception", "lifecycle": "lifecycle-exception"}
+_CODES = {"service": "service-exception", "lifecycle": "lifecycle-exception", "execute": "execute-exception"}
 
 
 def failed(inside: Inside) -> Diagnosis | None:
-    """Must have seen: an exception leave a callback, a return value of the wrong type, or a message refused."""
+    """Must have seen: an exception leave a callback, a return value of the wrong type, or a message refused.
+
+    What goes wrong with one goal of an action, and leaves the node as it is, is told by `goals`.
+    """
     for event in inside.events:
-        found = _of(inside, event)
+        found = None if _outlived(event) else of_event(inside, event)
         if found:
             return found
     return None
@@ -45,6 +49,8 @@ def failed_in_a_callback(scene: Scene) -> DiagnosedProgram | None:
     """
     for program in scene.programs:
         for event in read(program.events()):
+            if _outlived(event):
+                continue
             if isinstance(event, CallbackError) and event.kind != "lifecycle":
                 return program
             if isinstance(event, BadReturn) and event.kind not in ("lifecycle", "parameter"):
@@ -57,14 +63,23 @@ def called_from_outside(program: DiagnosedProgram) -> tuple[str, float] | None:
 
     Must have seen: that such a callback was the first thing that went wrong. A timer's fails at a moment of its own.
     """
-    errors = [event for event in read(program.events()) if isinstance(event, CallbackError | BadReturn)]
+    said = [event for event in read(program.events()) if not _outlived(event)]
+    errors = [event for event in said if isinstance(event, CallbackError | BadReturn)]
     first = errors[0] if errors else None
     if not isinstance(first, CallbackError) or first.kind not in ("subscription", "service", "parameter"):
         return None
     return (first.kind if first.kind == "parameter" else first.name), first.when
 
 
-def _of(inside: Inside, event: Event) -> Diagnosis | None:
+def _outlived(event: Event) -> bool:
+    """Whether rclpy goes on after it: it aborts the goal, rejects it, or does not cancel it."""
+    if isinstance(event, CallbackError):
+        return event.kind == "execute"
+    return isinstance(event, BadReturn) and event.kind in ("goal", "cancel")
+
+
+def of_event(inside: Inside, event: Event) -> Diagnosis | None:
+    """What one event says, if it is an error."""
     if isinstance(event, BadMessage):
         return _bad_message(inside.name, event)
     if isinstance(event, BadReturn):
@@ -97,6 +112,14 @@ def _bad_message(program: str, event: BadMessage) -> Diagnosis:
             "message-type",
             "The message class must be the one that the publisher, client or service was made with.",
         )
+    if event.kind in ("feedback", "result") and event.expected in ("float", "double"):
+        return Diagnosis(
+            f"`{program}` sends a wrong number in its {event.kind} on `{event.name}`{at}: the field `{event.field}` is "
+            f"of type {event.expected}, and its value is {event.value} ({event.given}), which rclpy does not convert.",
+            "message-field",
+            "Give it a float: `float(...)`, or a number with a point. What is sent of anything else is another number, "
+            "without an error.",
+        )
     return Diagnosis(
         f"`{program}` cannot send its {event.kind} on `{event.name}`{at}: the field `{event.field}` is of type "
         f"{event.expected}, and its value is {event.value} ({event.given}).",
@@ -121,6 +144,26 @@ def _bad_return(program: str, event: BadReturn) -> Diagnosis:
             "lifecycle-return",
             "Return TransitionCallbackReturn.SUCCESS, FAILURE or ERROR from every path.",
         )
+    of_action = f"The {event.kind} callback of `{program}`{at} returned {event.text or 'the wrong type'}:"
+    if event.kind == "execute":
+        return Diagnosis(
+            f"{of_action} rclpy cannot send that as a result, the error ends the spinning, and the client never gets "
+            "a result.",
+            "execute-return",
+            "Every path of an execute callback returns a result of the action, also after `canceled()` and `abort()`.",
+        )
+    if event.kind == "goal":
+        return Diagnosis(
+            f"{of_action} rclpy takes whatever is no GoalResponse as a refusal.",
+            "goal-return",
+            "Return GoalResponse.ACCEPT or GoalResponse.REJECT from every path.",
+        )
+    if event.kind == "cancel":
+        return Diagnosis(
+            f"{of_action} rclpy takes whatever is no CancelResponse as a refusal.",
+            "cancel-return",
+            "Return CancelResponse.ACCEPT, or CancelResponse.REJECT, from every path.",
+        )
     return Diagnosis(
         f"A {event.kind} callback of `{program}`{at} returned {event.text or 'the wrong type'}.",
         "bad-return",
@@ -132,7 +175,8 @@ def _error(program: str, event: CallbackError) -> Diagnosis:
     error = f"{event.type}: {event.text}".strip(": ")
     at = f" ({event.line})" if event.line else ""
     kind = "done" if event.kind == "task" else event.kind  # rclpy runs done callbacks as tasks
-    callback = f"A {kind} callback of `{program}`{at}" if kind else f"A callback of `{program}`{at}"
+    article = "An" if kind[:1] in ("a", "e") else "A"  # of the kinds that there are
+    callback = f"{article} {kind} callback of `{program}`{at}" if kind else f"A callback of `{program}`{at}"
     source = quoted(event.code, error)
     if "no running event loop" in error:
         return Diagnosis(

@@ -29,6 +29,18 @@ CODES = {
     "bad-return": "another callback returned something of the wrong type",
     "message-field": "a message was refused, and a field's value is not of its type",
     "message-type": "a message was refused, and it is of another class",
+    # Goals of an action.
+    "no-action": "no such action, and none similar",
+    "action-name": "an action with a similar name is offered",
+    "execute-exception": "an exception left an execute callback",
+    "execute-return": "an execute callback returned something else than its action's result",
+    "no-succeed": "an execute callback returned while its goal was still under way, so rclpy aborted that",
+    "goal-return": "a goal callback returned something else than a GoalResponse",
+    "cancel-return": "a cancel callback returned something else than a CancelResponse",
+    "no-cancel-callback": "the action server has no cancel callback of its own",
+    "no-feedback": "an execute callback ran, and feedback was never published",
+    "goal-holds-thread": "an execute callback that never awaited took its time on the only thread of its executor",
+    "goal-holds-group": "an accepted or goal callback took its time in the action server's exclusive group",
     # Blocked callbacks.
     "call-same-group": "call() in a callback has not come back; client and callback share an exclusive group",
     "call-in-callback": "call() in a callback has not come back; every thread of the executor is taken",

@@ -92,6 +92,13 @@ class Ran(_Event):
     """Number of the thing, when it began and ended, and on which thread; a message is sent in no time."""
 
 
+class GoalLeft(_AtLine):
+    """An execute callback has returned, and its goal has neither succeeded nor been aborted or canceled."""
+
+    e: Literal["goal_left"]
+    name: str
+
+
 class Awaits(_AtLine):
     """Where a coroutine callback waits."""
 
@@ -120,7 +127,7 @@ class Thing(_AtLine):
     cancelled: bool = False
     destroyed: bool = False
     runs: int = 0
-    """How often its callback began; of a publisher: messages, of a client: requests."""
+    """How often its callback began; of a publisher: messages, of a client: requests, of an action server: feedback."""
     done: int = 0
     """How often its callback ended; of a client: answers taken."""
     raised: int = 0
@@ -230,6 +237,7 @@ Event = (
     | BadMessage
     | LifecyclePublishOff
     | Ran
+    | GoalLeft
     | Thing
     | Call
     | ExecutorSeen

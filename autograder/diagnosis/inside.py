@@ -94,6 +94,8 @@ def called(thing: Thing) -> str:
     if thing.kind == "timer":
         of = f" of `{function[1]}`" if function else ""
         return f"the timer{of} (line {thing.made.rpartition(':')[2]}, every {thing.period:g} s)"
+    if thing.kind in ("execute", "goal", "cancel", "accepted"):
+        return f"the {thing.kind} callback of the action `{thing.name}`"
     if thing.name:
         return f"the {thing.kind} `{thing.name}`"
     return f"the {thing.kind or 'other'} callback{f' in {thing.line}' if thing.line else ''}"

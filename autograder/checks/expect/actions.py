@@ -2,29 +2,59 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from autograder import diagnosis
 from autograder.checks import outcomes
+from autograder.checks.expect import rates
 from autograder.checks.expect.expectations import WITHIN
 from autograder.checks.expect.meeting import Meeting
+from autograder.checks.message_text import set_fields
+from autograder.checks.misuse import Misuse
 from autograder.diagnosis import Diagnosis
 from autograder.graph.services import ServiceMissing
 
 if TYPE_CHECKING:
-    from autograder.graph.actions import Goal
+    from autograder.graph.actions import ActionSeen, Goal
+
+_STEPS = 3
+"""Feedback messages after which a server that has agreed to cancel must have ended the goal: 0.3 s at 10 Hz."""
 
 
 class ActionExpectations(Meeting):
-    """What decides about goals."""
+    """What decides about goals, and what becomes of them."""
 
-    def send_goal(self, name: str, action_type: type, goal: Any, *, within: float = WITHIN, hint: str = "") -> Goal:
+    @cached_property
+    def _actions(self) -> dict[str, ActionSeen]:
+        return {}
+
+    def _action(self, name: str, action_type: type) -> ActionSeen:
+        # Actions load numpy, a quarter of a second of CPU that most labs do not need.
+        from autograder.graph.actions import ActionSeen
+
+        if name not in self._actions:
+            self._actions[name] = ActionSeen(self._observer, name, action_type)
+        return self._actions[name]
+
+    def send_goal(
+        self,
+        name: str,
+        action_type: type,
+        goal: Any,
+        *,
+        accepted: bool | None = None,
+        within: float = WITHIN,
+        hint: str = "",
+    ) -> Goal:
         """Send a goal and wait for the server's decision; a missing server or decision is a failed outcome.
 
         Args:
             name: full name of the action.
             action_type: action class.
             goal: of that class.
+            accepted: how the server must decide; by default it may do either.
             within: seconds until it must be accepted or rejected.
             hint: a pointer for the student.
 
@@ -32,27 +62,236 @@ class ActionExpectations(Meeting):
             the goal, to be followed: feedback, status, result.
 
         Example:
-            `goal = ros.send_goal("/dock", Fibonacci, Fibonacci.Goal(order=5))`
+            `goal = ros.send_goal("/dock", Fibonacci, Fibonacci.Goal(order=5), accepted=True)`
 
         Codes:
-            `no-action`, `no-answer`, and what blocks a callback.
+            `no-action`, `action-name`, `wrong-type`, `no-answer`, `goal-return`, `goal-rejected`, `goal-accepted`, and
+            what blocks a callback.
         """
-        # Actions load numpy, a quarter of a second of CPU that most labs do not need.
-        from autograder.graph import actions
+        from autograder.graph.actions import send_goal
 
         title = f"The action `{name}` decides about a goal"
-        self._meet(lambda: f"{name}/_action/send_goal" in self._observer.services(), within)
+        action = self._action(name, action_type)  # what it listens to is there before the nodes are asked
+        self._meet(lambda: self._offered_action(name), within)
         try:
-            sent = actions.send_goal(self._observer, name, action_type, goal, within, self._running.all_ended)
+            gone = self._running.hopeless_without(lambda: self._offered_action(name))
+            sent = send_goal(self._observer, action, goal, within, gone)
         except ServiceMissing:
-            self._fail(
-                title,
-                diagnosis.program_trouble(self._scene())
-                or Diagnosis(f"No node offers the action `{name}`.", "no-action"),
-                expected=name,
-                hint=hint,
-            )
+            self._fail(title, diagnosis.why_no_action(self._scene(), name, action_type), expected=name, hint=hint)
         if sent.accepted is None:
-            self._fail(title, diagnosis.why_no_answer(self._scene(), name), expected="accepted or rejected", hint=hint)
-        outcomes.passed(title, observed="accepted" if sent.accepted else "rejected")
-        return sent
+            scene = self._scene()
+            waits = diagnosis.program_trouble(scene) or diagnosis.why_waits_for_a_goal(scene, name)
+            waits = waits or diagnosis.why_no_answer(scene, name)
+            self._fail(title, waits, expected="accepted or rejected", observed="no answer", hint=hint)
+        observed = "accepted" if sent.accepted else "rejected"
+        if accepted is None or accepted == sent.accepted:
+            outcomes.passed(title, observed=observed)
+            return sent
+        if accepted:
+            found = diagnosis.why_rejected(self._scene(), name)
+            reason = found or Diagnosis(
+                f"The server rejected a goal that it should accept: {set_fields(goal)}.", "goal-rejected"
+            )
+            self._fail(
+                f"The action `{name}` accepts the goal", reason, expected="accepted", observed=observed, hint=hint
+            )
+        reason = Diagnosis(f"The server accepted a goal that it should reject: {set_fields(goal)}.", "goal-accepted")
+        self._fail(f"The action `{name}` rejects the goal", reason, expected="rejected", observed=observed, hint=hint)
+
+    def _offered_action(self, name: str) -> bool:
+        return f"{name}/_action/send_goal" in self._observer.services()
+
+    def expect_feedback(
+        self,
+        goal: Goal,
+        *,
+        at_least: int = 1,
+        at_most: int | None = None,
+        exactly: int | None = None,
+        rate: float | None = None,
+        tolerance: float = 0.3,
+        values: Callable[[list[Any]], object] | None = None,
+        within: float = WITHIN,
+        hint: str = "",
+    ) -> list[Any]:
+        """Feedback about a goal arrives. What is counted is what has come when the goal ends, or in `within` seconds.
+
+        Args:
+            goal: what `send_goal` returned.
+            at_least: so many messages; the wait ends with them unless `at_most` is given.
+            at_most: not more, once the goal has ended.
+            exactly: both at once.
+            rate: hertz; judged by the median gap of the server's own stamps.
+            tolerance: allowed deviation of the rate, as a share.
+            values: looks at all feedback messages; a sentence that says what is wrong fails, and so does what is false.
+            within: seconds until they must have come.
+            hint: a pointer for the student.
+
+        Returns:
+            the feedback messages.
+
+        Example:
+            `ros.expect_feedback(goal, at_least=5, rate=10)`
+
+        Codes:
+            `no-feedback`, `goal-feedback`, `rate`, `content`, and those of `expect_result`.
+        """
+        if exactly is not None and (at_least != 1 or at_most is not None):
+            raise Misuse("expect_feedback: exactly=… already says at_least=… and at_most=….")
+        least, most = (at_least, at_most) if exactly is None else (exactly, exactly)
+        number = f"at least {least}" if most is None else f"{least}" if least == most else f"{least} to {most}"
+        title = f"Feedback of `{goal.name}` arrives ({number})"
+
+        def came() -> bool:
+            return goal.result is not None or (most is None and len(goal.heard) >= least)
+
+        self.wait(came, within)
+        self._observer.wait(lambda: len(goal.heard) >= least, 0.3)  # the last may be under way when the result is there
+        heard = goal.heard
+        if len(heard) < least or (most is not None and len(heard) > most):
+            scene = self._scene()
+            said = f"{len(heard)} feedback message{'s' * (len(heard) != 1)} came; the goal is `{self._state(goal)}`."
+            reason = (
+                (diagnosis.why_no_feedback(scene, goal.name) if len(heard) < least else None)
+                or (diagnosis.inside_reason(scene) if goal.result is None else None)
+                or Diagnosis(said, "goal-feedback")
+            )
+            self._fail(title, reason, expected=number, observed=str(len(heard)), hint=hint)
+        if rate is not None and not rates.at_rate(heard, rate, tolerance):
+            measured = rates.in_words(heard)
+            reason = Diagnosis(f"Most of the gaps between feedback messages are those of {measured}.", "rate")
+            title = f"Feedback of `{goal.name}` comes at {rate:.3g} Hz"
+            self._fail(title, reason, expected=f"{rate:.3g} Hz", observed=measured, hint=hint)
+        said_of = values(goal.feedback) if values is not None else True
+        if said_of is not True and (isinstance(said_of, str) or not said_of):
+            because = said_of if isinstance(said_of, str) else "What the feedback says is not what was asked for."
+            reason = diagnosis.why_wrong_feedback(self._scene(), goal.name) or Diagnosis(because, "content")
+            self._fail(f"The feedback of `{goal.name}` says what it should", reason, observed=because, hint=hint)
+        outcomes.passed(title, observed=str(len(heard)))
+        return goal.feedback
+
+    def expect_result(self, goal: Goal, *, status: str = "succeeded", within: float = WITHIN, hint: str = "") -> Any:
+        """A goal ends, with this status.
+
+        Args:
+            goal: what `send_goal` returned.
+            status: `succeeded`, `aborted` or `canceled`.
+            within: seconds until it must have ended.
+            hint: a pointer for the student.
+
+        Returns:
+            the result message.
+
+        Example:
+            `sequence = ros.expect_result(goal).sequence`
+
+        Codes:
+            `execute-exception`, `no-succeed`, `execute-return`, `message-field`, `goal-status`, `goal-unfinished`, and
+            what blocks a callback.
+        """
+        title = f"The goal of `{goal.name}` ends as `{status}`"
+        goal.wait_for_result(within)
+        scene = self._scene() if goal.status != status or goal.result is None else None
+        if scene is not None and goal.result is None:
+            because = f"The goal is `{self._state(goal)}`; it has not ended within {within:g} s."
+            if self._state(goal) in ("succeeded", "canceled", "aborted"):
+                because = f"The goal is `{self._state(goal)}`, but its execute callback has not returned a result."
+            reason = (
+                diagnosis.why_not_finished(scene, goal.name)
+                or diagnosis.program_trouble(scene)
+                or diagnosis.inside_reason(scene)
+                or Diagnosis(because, "goal-unfinished")
+            )
+            self._fail(title, reason, expected=status, observed="no end", hint=hint)
+        if scene is not None:
+            found = diagnosis.why_not_finished(scene, goal.name) if goal.status == "aborted" else None
+            reason = found or Diagnosis(f"It ended as `{goal.status}`.", "goal-status")
+            self._fail(title, reason, expected=status, observed=goal.status, hint=hint)
+        outcomes.passed(title, observed=goal.status)
+        return goal.result
+
+    def expect_canceled(self, goal: Goal, *, within: float = 3.0, hint: str = "") -> Any:
+        """Ask the server to cancel a goal: it agrees, and soon ends the goal as `canceled`.
+
+        How soon is counted in the server's own steps, so that a slow machine makes no difference: after its status
+        message that says `canceling`, at most three more feedback messages may come. For a server that gives feedback
+        ten times a second that is 0.3 s.
+
+        Args:
+            goal: what `send_goal` returned.
+            within: seconds until it must have agreed, and again until the goal must have ended. The goal must take
+                longer than that by itself.
+            hint: a pointer for the student.
+
+        Returns:
+            the result message.
+
+        Example:
+            `where = ros.expect_canceled(goal).sequence`
+
+        Codes:
+            `cancel-refused`, `no-cancel-callback`, `cancel-return`, `goal-holds-thread`, `goal-holds-group`,
+            `cancel-late`, and those of `expect_result`.
+        """
+        title = f"`{goal.name}` agrees to cancel the goal"
+        goal.cancel(within)
+        if not goal.agreed:
+            scene = self._scene()
+            said = "It refused." if goal.agreed is False else f"No answer came within {within:g} s."
+            if goal.result is not None:
+                said += f" The goal had ended as `{goal.status}` meanwhile."
+            reason = (
+                diagnosis.why_not_canceled(scene, goal.name)
+                or (diagnosis.why_not_finished(scene, goal.name) if goal.status == "aborted" else None)
+                or diagnosis.program_trouble(scene)
+                or diagnosis.inside_reason(scene)
+                or Diagnosis(said, "cancel-refused")
+            )
+            self._fail(title, reason, expected="agreed", observed=said, hint=hint)
+        outcomes.passed(title, observed="agreed")
+        result = self.expect_result(goal, status="canceled", within=within, hint=hint)
+        when = {change.status: change.stamp for change in goal.changes}
+        began, ended = when.get("canceling"), when.get("canceled")
+        after = [heard for heard in goal.heard if began is not None and heard.stamp > began]
+        taken = f" ({ended - began:.2f} s)" if began is not None and ended is not None else ""
+        because = f"After it had agreed, the server went on for {len(after)} feedback messages{taken}."
+        self._expect_that(
+            len(after) <= _STEPS,
+            f"`{goal.name}` ends a goal soon after it has agreed to cancel it",
+            lambda: Diagnosis(because, "cancel-late"),
+            expected=f"at most {_STEPS} more feedback messages",
+            observed=f"{len(after)}{taken}",
+            hint=hint,
+        )
+        return result
+
+    def expect_one_at_a_time(self, name: str, *, hint: str = "") -> None:
+        """The server never executed two goals at once, by all status messages that it has published so far.
+
+        Args:
+            name: full name of an action to which goals were sent.
+            hint: a pointer for the student.
+
+        Example:
+            `ros.expect_one_at_a_time("/dock")`
+
+        Codes:
+            `goals-together`.
+        """
+        if name not in self._actions:
+            raise Misuse(f"expect_one_at_a_time: no goal was sent to {name!r} before.")
+        most = self._actions[name].most_at_once()
+        because = f"A status message of `{name}` shows {most} goals that are being executed."
+        self._expect_that(
+            most <= 1,
+            f"`{name}` never executes two goals at once",
+            lambda: Diagnosis(because, "goals-together"),
+            expected="1",
+            observed=str(most),
+            hint=hint,
+        )
+
+    def _state(self, goal: Goal) -> str:
+        """The goal's status by the last that is known of it."""
+        changes = goal.changes
+        return goal.status if goal.result is not None or not changes else changes[-1].status

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from autograder import diagnosis
 from autograder.checks import outcomes
@@ -13,14 +14,26 @@ from autograder.checks.expect.offering import Offering
 from autograder.checks.expect.sources import SourceExpectations
 from autograder.diagnosis import Diagnosis
 
+if TYPE_CHECKING:
+    from autograder.graph.actions import Goal
+
 
 class MeanwhileExpectations(ConcurrencyExpectations, SourceExpectations, Offering):
     """What must go on meanwhile."""
 
     def messages_during(
-        self, topic: str, msg_type: type, *, callback: str = "", activity: str = "", service: str = ""
+        self,
+        topic: str,
+        msg_type: type,
+        *,
+        callback: str = "",
+        activity: str = "",
+        service: str = "",
+        goal: Goal | None = None,
     ) -> list[int]:
         """How many messages on `topic` were published during each run of a callback or each call of a service so far.
+
+        Or while a goal of an action was executed.
 
         Args:
             topic: full name of the topic whose messages are counted, by the publisher's stamps.
@@ -28,11 +41,15 @@ class MeanwhileExpectations(ConcurrencyExpectations, SourceExpectations, Offerin
             callback: a callback that publishes `NAME begin` and `NAME end` (`std_msgs/String`) ...
             activity: ... on this topic.
             service: or a service that the check offers (`serve`): from a request's arrival to its answer.
+            goal: or a goal that has ended: from the status `executing` to its last one.
 
         Example:
             `counts = ros.messages_during("/heartbeat", Int64, callback="slow", activity="/activity")`
         """
-        if service:
+        if goal is not None:
+            when = {change.status: change.stamp for change in goal.changes}
+            spans = [(when["executing"], max(when.values()))] if "executing" in when and goal.result is not None else []
+        elif service:
             spans = self.served(service)
         else:
             spans = [(span.begin, span.end) for span in self.concurrency(activity).spans() if span.name == callback]
@@ -47,12 +64,13 @@ class MeanwhileExpectations(ConcurrencyExpectations, SourceExpectations, Offerin
         callback: str = "",
         activity: str = "",
         service: str = "",
+        goal: Goal | None = None,
         at_least: int = 1,
         runs: int = 3,
         within: float = WITHIN,
         hint: str = "",
     ) -> None:
-        """Messages go on while a slow callback runs, or while the node waits for a service.
+        """Messages go on while a slow callback runs, while the node waits for a service or while it executes a goal.
 
         One run with enough messages is enough: a busy machine may have stopped the whole node during another.
 
@@ -62,6 +80,7 @@ class MeanwhileExpectations(ConcurrencyExpectations, SourceExpectations, Offerin
             callback: name in `activity`.
             activity: topic of begins and ends.
             service: full name of an offered service, instead of a callback.
+            goal: a goal that `send_goal` returned, instead of a callback.
             at_least: messages in one run.
             runs: complete runs (or answered calls) to look at before giving up.
             within: seconds until these must have come.
@@ -74,9 +93,13 @@ class MeanwhileExpectations(ConcurrencyExpectations, SourceExpectations, Offerin
             `paused` or the cause of it, `extra-publisher`, and those of `expect_runs`.
         """
         title = f"`{topic}` goes on while " + (f"`{service}` is being called" if service else f"`{callback}` runs")
+        if goal is not None:
+            title, runs = f"`{topic}` goes on while a goal of `{goal.name}` is executed", 1
 
         def counts() -> list[int]:
-            return self.messages_during(topic, msg_type, callback=callback, activity=activity, service=service)
+            return self.messages_during(
+                topic, msg_type, callback=callback, activity=activity, service=service, goal=goal
+            )
 
         def enough() -> bool:
             return max(counts(), default=0) >= at_least
@@ -85,11 +108,11 @@ class MeanwhileExpectations(ConcurrencyExpectations, SourceExpectations, Offerin
         self._observer.wait(enough, 0.2)  # the last messages may come after the end that lies behind them
         seen = counts()
         if not enough():
-            if not service and not seen:
+            if callback and not seen:
                 self._wait_for_runs(activity, [callback], 1, title, 0.0, hint)
             if callback:
                 self._too_short(title, topic, msg_type, activity, callback, at_least, hint)
-            self._paused(title, topic, activity or topic, seen, at_least, hint)
+            self._paused(title, topic, activity or topic, seen, at_least, goal, hint)
         self._one_source(title, topic, msg_type, "", 1, self._observer.record(topic, msg_type).messages)
         outcomes.passed(title, observed=", ".join(str(count) for count in seen))
 
@@ -112,13 +135,17 @@ class MeanwhileExpectations(ConcurrencyExpectations, SourceExpectations, Offerin
                 hint=hint,
             )
 
-    def _paused(self, title: str, topic: str, activity: str, seen: Sequence[int], at_least: int, hint: str) -> None:
+    def _paused(
+        self, title: str, topic: str, activity: str, seen: Sequence[int], at_least: int, goal: Goal | None, hint: str
+    ) -> None:
         scene = self._scene()
         most = f"The most that came on `{topic}` in one run is {max(seen, default=0)}."
         self._fail(
             title,
             diagnosis.program_trouble(scene)
             or diagnosis.inside_reason(scene)
+            or (diagnosis.why_not_finished(scene, goal.name) if goal and goal.status == "aborted" else None)
+            or (diagnosis.why_waits_for_a_goal(scene, goal.name) if goal else None)
             or diagnosis.waits_for_its_group(scene)
             or diagnosis.why_not_together(scene, activity)
             or Diagnosis(f"{most} {diagnosis.layout(scene, activity)}", "paused"),

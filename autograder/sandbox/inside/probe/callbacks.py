@@ -5,17 +5,28 @@ import inspect
 import time
 import weakref
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 from . import forms
 from .executor import Executor
 from .own_lines import awaited_line, callback_line, error_line
 from .thing import Thing
 from .thread_state import here
+from .watch_messages import note_misfit
 from .writing import PAUSE, emit, emit_once, ledger, quiet
 
-must_return: dict[Any, type] = {}
-"""Callback of an action server -> what it must return."""
+
+class ActionCallback(NamedTuple):
+    """What is known of a callback of an action server."""
+
+    thing: Thing
+    expected: type | None
+    """What it must return."""
+    node: "weakref.ref[Any]"
+
+
+action_callbacks: dict[Any, ActionCallback] = {}
+"""Callback of an action server -> what is known of it."""
 
 asked_by: "weakref.WeakKeyDictionary[Any, int]" = weakref.WeakKeyDictionary()
 """Future of a service call -> number of the client."""
@@ -91,7 +102,7 @@ class _Steps:
 async def await_or_execute(callback: Any, *args: Any) -> Any:
     """As rclpy's own function of this name, with a note of what goes on."""
     taken, here.taken = here.taken, None
-    thing, executor = taken or (_unknown(callback), None)
+    thing, executor = taken or _of_an_action(callback)
     run = thing.begin()
     raised = True
     try:
@@ -110,22 +121,31 @@ async def await_or_execute(callback: Any, *args: Any) -> Any:
     return result
 
 
-def _unknown(callback: Any) -> Thing:
-    """A callback of something that rclpy does not let us see: it is not written down, only used on this thread."""
+def _of_an_action(callback: Any) -> tuple[Thing, Executor | None]:
+    """A callback of an action server, and its executor; or of something that rclpy does not let us see.
+
+    The latter is not written down, only used on this thread.
+    """
     with quiet():
-        return Thing({"kind": "action" if callback in must_return else ""})
-    return Thing({"kind": ""})
+        known = action_callbacks[callback]
+        return known.thing, ledger.known.get(getattr(known.node(), "executor", None))
+    return Thing({"kind": ""}), None
 
 
 def _check_return(callback: Any, kind: str, args: tuple[Any, ...], result: Any) -> None:
     if kind == "service" and len(args) == 2:
         expected: Any = type(args[1])
-    elif kind == "action":
-        expected = must_return.get(callback)
     else:
-        return
+        expected = action_callbacks[callback].expected if callback in action_callbacks else None
     if isinstance(expected, type) and not isinstance(result, expected):
         _bad_return(kind, callback, result, expected)
+    if kind == "execute" and len(args) == 1:
+        name = action_callbacks[callback].thing.about["name"]
+        if isinstance(expected, type) and isinstance(result, expected):
+            note_misfit("result", name, result, expected)
+        if args[0].is_active:
+            left: forms.GoalLeft = {"e": "goal_left", "name": name, **callback_line(callback)}
+            emit_once(left)
 
 
 def _bad_return(kind: str, callback: Any, result: Any, expected: type) -> None:

@@ -83,6 +83,13 @@ class Ran(TypedDict):
     runs: list[tuple[int, float, float, int]]
 
 
+class GoalLeft(Where):
+    """An execute callback has returned, and its goal has neither succeeded nor been aborted or canceled."""
+
+    e: Literal["goal_left"]
+    name: str
+
+
 Event = (
     Attached
     | ProbeFailed
@@ -93,6 +100,7 @@ Event = (
     | BadMessage
     | LifecyclePublishOff
     | Ran
+    | GoalLeft
 )
 
 

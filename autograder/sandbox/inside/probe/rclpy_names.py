@@ -38,9 +38,19 @@ def is_of_a_rate(group: Any, node: Any) -> bool:
     return group is not None and group is getattr(node, "_rate_group", None)
 
 
-def action_callbacks(server: Any) -> tuple[Any, Any, Any]:
-    """Return what runs a goal of an action server, what accepts one, and what cancels one."""
-    return server._execute_callback, server._goal_callback, server._cancel_callback
+def action_callbacks(server: Any) -> tuple[Any, Any, Any, Any]:
+    """Return what runs a goal of an action server, what decides about one, what cancels one, what has accepted one."""
+    return server._execute_callback, server._goal_callback, server._cancel_callback, server._handle_accepted_callback
+
+
+def server_parts(server: Any) -> tuple[Any, Any]:
+    """Return the node of an action server, and its action class."""
+    return server._node, server.action_type
+
+
+def server_of(goal: Any) -> Any:
+    """Return the action server of a goal."""
+    return goal._action_server
 
 
 def lifecycle_state(node: Any) -> str:
@@ -81,6 +91,9 @@ def _differences(rclpy: Any) -> Iterator[tuple[str, str]]:
         (rclpy.action.ActionServer, "register_execute_callback", "_execute_callback"),
         (rclpy.action.ActionServer, "register_goal_callback", "_goal_callback"),
         (rclpy.action.ActionServer, "register_cancel_callback", "_cancel_callback"),
+        (rclpy.action.ActionServer, "register_handle_accepted_callback", "_handle_accepted_callback"),
+        (rclpy.action.ActionServer, "__init__", "_node"),
+        (rclpy.action.server.ServerGoalHandle, "__init__", "_action_server"),
         (rclpy.lifecycle.LifecycleNodeMixin, "__init__", "_state_machine"),
     ):
         code = getattr(getattr(owner, method, None), "__code__", None)

@@ -1,23 +1,91 @@
-"""Action servers, and what their callbacks must return."""
+"""Action servers: their callbacks, the feedback they publish, and goals that are left without an end."""
 
+import functools
+import weakref
 from typing import Any
 
 from . import forms, rclpy_names
-from .callbacks import must_return
-from .thing import Thing, node_name
+from .callbacks import ActionCallback, action_callbacks
+from .own_lines import callback_line, own_line
+from .thing import Thing, node_name, thing_of
+from .watch_messages import note_misfit
 from .wrapping import wrap
-from .writing import ledger
+from .writing import ledger, quiet
+
+KINDS = ("execute", "goal", "cancel", "accepted")
+"""The callbacks of an action server, in the order of `rclpy_names.action_callbacks`."""
 
 
 def watch_actions(rclpy: Any) -> None:
-    """Wrap how action servers are made."""
+    """Wrap how action servers are made, and what is done with their goals."""
+    server_class, goal_class = rclpy.action.ActionServer, rclpy.action.server.ServerGoalHandle
 
-    def made(_: None, server: Any, node: Any, action_type: Any, *args: Any, **_kwargs: Any) -> None:
-        name = str(args[0]) if args else ""
-        about: forms.ThingMade = {"kind": "action_server", "name": name, "given": name, "node": node_name(node)}
+    def made(_: None, server: Any, node: Any, action_type: Any, *args: Any, **kwargs: Any) -> None:
+        given = kwargs.get("action_name", args[0] if args else "")
+        about: forms.ThingMade = {
+            "kind": "action_server",
+            "name": _full_name(node, given),
+            "given": given if isinstance(given, str) else "",
+            "node": node_name(node),
+            "made": own_line()["line"],
+        }
         ledger.add(Thing(about), server)
-        results = (action_type.Result, rclpy.action.GoalResponse, rclpy.action.CancelResponse)
-        for callback, result in zip(rclpy_names.action_callbacks(server), results, strict=True):
-            must_return[callback] = result
+        returned = (action_type.Result, rclpy.action.GoalResponse, rclpy.action.CancelResponse, None)
+        callbacks = rclpy_names.action_callbacks(server)
+        for kind, callback, expected in zip(KINDS, callbacks, returned, strict=True):
+            if not getattr(callback, "__module__", "").startswith("rclpy."):
+                _add(kind, callback, expected, server, node)
 
-    wrap(rclpy.action.ActionServer, "__init__", after=made)
+    def scheduled(server: Any, _goal: Any, callback: Any = None) -> None:
+        # A goal may be executed by another callback than the one that the server was made with.
+        if callback is not None and callback not in action_callbacks:
+            node, action_type = rclpy_names.server_parts(server)
+            _add("execute", callback, action_type.Result, server, node)
+
+    wrap(server_class, "__init__", after=made)
+    wrap(server_class, "notify_execute", before=scheduled)
+    publish = goal_class.publish_feedback
+
+    @functools.wraps(publish)
+    def publish_noted(self: Any, feedback: Any) -> None:
+        server = rclpy_names.server_of(self)
+        thing = thing_of(server)
+        try:
+            publish(self, feedback)
+        except Exception:
+            with quiet():
+                name = thing.about["name"] if thing is not None else ""
+                note_misfit("feedback", name, feedback, server.action_type.Feedback)
+            raise
+        if thing is not None:
+            thing.count()
+            if thing.runs == 1:  # a number of the wrong type is sent as another one, without an error
+                with quiet():
+                    note_misfit("feedback", thing.about["name"], feedback, server.action_type.Feedback)
+
+    goal_class.publish_feedback = publish_noted
+
+
+def _full_name(node: Any, given: Any) -> str:
+    """An action's name on the graph: the one of its services, without their ending."""
+    with quiet():
+        return str(node.resolve_service_name(f"{given}/_action/send_goal")).removesuffix("/_action/send_goal")
+    return ""
+
+
+def _add(kind: str, callback: Any, expected: type | None, server: Any, node: Any) -> None:
+    where, group = callback_line(callback), server.callback_group
+    server_thing = thing_of(server)
+    about: forms.ThingMade = {
+        "kind": kind,
+        "name": server_thing.about["name"] if server_thing is not None else "",
+        "node": node_name(node),
+        "line": where["line"],
+        "code": where["code"],
+    }
+    if kind != "execute":  # rclpy runs that as a task, outside of any group
+        about |= {"group": type(group).__name__, "group_id": id(group)}
+        about["default_group"] = group is node.default_callback_group
+    thing = Thing(about)
+    ledger.add(thing)
+    action_callbacks[callback] = ActionCallback(thing, expected, weakref.ref(node))

@@ -19,7 +19,7 @@ def watch_messages(rclpy: Any) -> None:
             publish(self, msg)
         except Exception:
             with quiet():
-                _note_misfit("message", self.topic_name, msg, self.msg_type)
+                note_misfit("message", self.topic_name, msg, self.msg_type)
             raise
         with quiet():
             thing = thing_of(self)
@@ -36,7 +36,7 @@ def watch_messages(rclpy: Any) -> None:
             respond(self, response, header)
         except Exception:
             with quiet():
-                _note_misfit("response", self.srv_name, response, self.srv_type.Response)
+                note_misfit("response", self.srv_name, response, self.srv_type.Response)
             raise
 
     rclpy.service.Service.send_response = respond_noted
@@ -49,13 +49,14 @@ def watch_messages(rclpy: Any) -> None:
             return ask(self, request)
         except Exception:
             with quiet():
-                _note_misfit("request", self.srv_name, request, self.srv_type.Request)
+                note_misfit("request", self.srv_name, request, self.srv_type.Request)
             raise
 
     rclpy.client.Client.call_async = ask_noted
 
 
-def _note_misfit(kind: str, name: str, message: Any, expected: type) -> None:
+def note_misfit(kind: str, name: str, message: Any, expected: type) -> None:
+    """Write which field of a message is not of its type, or that the whole message is none of `expected`."""
     if isinstance(message, expected):
         found = _misfit(message, "")
     else:
@@ -93,7 +94,9 @@ _RANGES = {f"{sign}int{bits}": (bits, sign == "") for sign in ("", "u") for bits
 
 def _fits(value: Any, kind: str) -> bool:
     if kind.startswith("sequence<") or "[" in kind:
-        return hasattr(value, "__len__") and not isinstance(value, str)
+        of = kind.removeprefix("sequence<").removesuffix(">").partition(",")[0].partition("[")[0]
+        fits = hasattr(value, "__len__") and not isinstance(value, str)
+        return fits and (not isinstance(value, (list, tuple)) or all(_fits(one, of) for one in value))
     if kind in _RANGES:
         bits, signed = _RANGES[kind]
         low = -(1 << (bits - 1)) if signed else 0

@@ -1,0 +1,175 @@
+"""What became of an action's goals: why there is no such action, and why a goal did not go as it should.
+
+What is said here leaves the node as it is, so it is a reason for that action's goals only, and is asked for them alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from autograder.diagnosis.callbacks import of_event
+from autograder.diagnosis.chain import inside_reason
+from autograder.diagnosis.events import BadMessage, BadReturn, CallbackError, Event, GoalLeft, Thing
+from autograder.diagnosis.inside import Inside, called
+from autograder.diagnosis.programs import program_trouble
+from autograder.diagnosis.reason import Diagnosis
+from autograder.diagnosis.scene import Scene
+from autograder.graph.names import nearest, type_name
+
+SEND_GOAL = "/_action/send_goal"
+"""How the name of the service ends that takes an action's goals."""
+
+KEPT = 0.3
+"""Seconds that a run must have taken to count as one that keeps requests waiting."""
+
+
+def why_no_action(scene: Scene, name: str, action_type: type) -> Diagnosis:
+    """Why there is no server for an action."""
+    trouble = program_trouble(scene)
+    if trouble:
+        return trouble
+    services = scene.observer.services()
+    offered = {one.removesuffix(SEND_GOAL): types for one, types in services.items() if one.endswith(SEND_GOAL)}
+    wanted = type_name(action_type)
+    if name in offered:
+        has = offered[name][0].removesuffix("_SendGoal")
+        return Diagnosis(f"The action `{name}` has the type {has}, not {wanted}.", "wrong-type")
+    close = nearest(name, offered)
+    if close:
+        made = [thing for _, thing in _of_action(scene, close) if thing.kind == "action_server"]
+        given = f" (`{made[0].given}` in the code)" if made and made[0].given not in ("", close) else ""
+        hint = "A name that begins with a slash stays as it is; without one it follows the node's namespace."
+        return Diagnosis(
+            f"There is no action `{name}`; the nearest name on the graph is `{close}`{given}.", "action-name", hint
+        )
+    return inside_reason(scene) or Diagnosis(f"No node offers the action `{name}`.", "no-action")
+
+
+def why_rejected(scene: Scene, name: str) -> Diagnosis | None:
+    """Why a goal was rejected. Must have seen: the goal callback return something else than a GoalResponse."""
+    return _said(scene, name, "goal")
+
+
+def why_not_finished(scene: Scene, name: str) -> Diagnosis | None:
+    """Why a goal ended as it should not, or not at all.
+
+    Must have seen: an error leave the execute callback, its result refused, or a return without an end of the goal.
+    """
+    found = _said(scene, name, "execute")
+    if found:
+        return found
+    for inside, _ in _of_action(scene, name):
+        for event in inside.all(GoalLeft):
+            if event.name == name:
+                return Diagnosis(
+                    f"The execute callback of `{inside.name}` ({event.line}) returned without saying how the goal has "
+                    "ended, so rclpy aborts it.",
+                    "no-succeed",
+                    "Call `goal_handle.succeed()` before `return` (or `canceled()`, or `abort()`): a result alone does "
+                    "not say that the goal was reached.",
+                )
+    return None
+
+
+def why_no_feedback(scene: Scene, name: str) -> Diagnosis | None:
+    """Why no feedback came. Must have seen: an execute callback that ran, and no call of `publish_feedback`."""
+    found = _said(scene, name, "execute")
+    if found:
+        return found
+    things = list(_of_action(scene, name))
+    servers = [thing for _, thing in things if thing.kind == "action_server"]
+    for inside, thing in things:
+        if thing.kind == "execute" and thing.runs and servers and not any(server.runs for server in servers):
+            return Diagnosis(
+                f"`{inside.name}`: {called(thing)} {'runs' if thing.running else 'has run'}, and no feedback was "
+                "published.",
+                "no-feedback",
+                "`goal_handle.publish_feedback(...)` sends one feedback message; it belongs into the loop.",
+            )
+    return None
+
+
+def why_wrong_feedback(scene: Scene, name: str) -> Diagnosis | None:
+    """Why feedback says something else. Must have seen: a field of it whose value is not of its type."""
+    for inside in dict.fromkeys(inside for inside, _ in _of_action(scene, name)):
+        for event in inside.all(BadMessage):
+            if event.kind == "feedback" and event.name == name:
+                return of_event(inside, event)
+    return None
+
+
+def why_not_canceled(scene: Scene, name: str) -> Diagnosis | None:
+    """Why a server did not agree to cancel, or did so too late."""
+    return _said(scene, name, "cancel") or _no_cancel_callback(scene, name) or why_waits_for_a_goal(scene, name)
+
+
+def _no_cancel_callback(scene: Scene, name: str) -> Diagnosis | None:
+    """Must have seen: the action's server, and no cancel callback of its own."""
+    things = list(_of_action(scene, name))
+    kinds = {thing.kind for _, thing in things}
+    if not things or "action_server" not in kinds or "cancel" in kinds or not things[0][0].attached:
+        return None
+    return Diagnosis(
+        f"`{things[0][0].name}`: the action server of `{name}` was made without a cancel callback, and rclpy's own "
+        "refuses every request to cancel.",
+        "no-cancel-callback",
+        "Hand one over: `ActionServer(..., cancel_callback=...)`. It returns CancelResponse.ACCEPT.",
+    )
+
+
+def why_waits_for_a_goal(scene: Scene, name: str) -> Diagnosis | None:
+    """Why a request or a timer waits while a goal is executed.
+
+    Must have seen: a run of the execute callback that took its time without awaiting anything, and an executor with
+    one thread; or a run of the accepted or goal callback that took its time, in the server's exclusive group.
+    """
+    for inside, thing in _of_action(scene, name):
+        if not inside.attached or not _lasts(inside, thing):
+            continue
+        executor = inside.executor_of(thing.node)
+        if thing.kind == "execute" and executor and executor.size == 1 and not thing.awaited:
+            alone = " `async` alone changes nothing: only an `await` gives the thread back." * ("async " in thing.code)
+            return Diagnosis(
+                f"`{inside.name}`: {called(thing)} holds the only thread of its {executor.type} until it returns, so "
+                f"nothing else of the node runs meanwhile: no timer, no new goal, no request to cancel.{alone}",
+                "goal-holds-thread",
+                "Add the node to a MultiThreadedExecutor(num_threads=...) and spin that.",
+            )
+        if thing.kind in ("accepted", "goal") and thing.exclusive:
+            return Diagnosis(
+                f"`{inside.name}`: {called(thing)} takes its time, and the action server is in a mutually exclusive "
+                "group: until it returns, no other goal and no request to cancel is taken.",
+                "goal-holds-group",
+                "Let it return at once: `goal_handle.execute()` starts the execute callback, which may take its time.",
+            )
+    return None
+
+
+def _lasts(inside: Inside, thing: Thing) -> bool:
+    return any(inside.now - began > KEPT for began, _ in thing.running) or thing.spent > KEPT * max(thing.done, 1)
+
+
+def _of_action(scene: Scene, name: str) -> Iterator[tuple[Inside, Thing]]:
+    """What the probes know of an action's servers and of their callbacks."""
+    for inside in scene.insides:
+        for thing in inside.things.values():
+            if thing.name == name and thing.kind in ("action_server", "execute", "goal", "cancel", "accepted"):
+                yield inside, thing
+
+
+def _said(scene: Scene, name: str, kind: str) -> Diagnosis | None:
+    """What a program says of an error in one of the action's callbacks."""
+    for inside in dict.fromkeys(inside for inside, _ in _of_action(scene, name)):
+        for event in inside.events:
+            found = of_event(inside, event) if _about(event, kind, name) else None
+            if found:
+                return found
+    return None
+
+
+def _about(event: Event, kind: str, name: str) -> bool:
+    if isinstance(event, BadMessage):
+        return kind == "execute" and event.kind in ("feedback", "result") and event.name == name
+    if isinstance(event, CallbackError):
+        return event.kind == kind and event.name == name
+    return isinstance(event, BadReturn) and event.kind == kind
