@@ -67,7 +67,7 @@ class Navigator(Node):
             remaining = abs(target - self.position)
             goal_handle.publish_feedback(feedback_of(remaining, 100.0 * (way - remaining) / way))
         goal_handle.succeed()
-        return result_of(self.position)
+        return NestedMessage.Result()
 
 
 def spin(node):
