@@ -17,9 +17,9 @@ LABS = sorted((Path(__file__).parent.parent / "solutions").glob("*/*.ipynb"))
 EXPECTATIONS = """
     expect_argument_needed expect_canceled expect_clean_end expect_exit expect_feedback expect_log expect_match
     expect_messages expect_messages_during expect_no_node expect_no_overlap expect_no_publisher expect_no_subscription
-    expect_no_topic expect_node expect_one_at_a_time expect_overlap expect_parameter expect_parameter_refused expect_period
-    expect_publisher expect_qos expect_result expect_running expect_runs expect_service expect_silence expect_state
-    expect_subscription expect_topic expect_transitions require require_equal
+    expect_no_topic expect_node expect_one_at_a_time expect_overlap expect_parameter expect_parameter_refused
+    expect_period expect_publisher expect_qos expect_result expect_running expect_runs expect_service expect_silence
+    expect_state expect_subscription expect_topic expect_transitions require require_equal
 """
 WAITING = "wait wait_for_graph pause"
 SENDING = """
