@@ -8,8 +8,6 @@ unprotected. Both must give the same points for every check.
 from __future__ import annotations
 
 import argparse
-import contextlib
-import functools
 import json
 import os
 import shutil
@@ -17,17 +15,26 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
 import sample_class
+from boxes import RUN_STDIN
+from cpu_meter import cpu_meter, shares_of_cpu
+from matplotlib.figure import Figure
 from rich.console import Console
 from rich.table import Table
 
-from autograder.core.results import SubmissionResult
-from autograder.course.lab import grade_id_of, load_lab
+from autograder.core.results import Isolation, SubmissionResult
+from autograder.course.lab import grade_id_of, lab_names, load_lab
+from autograder.gradebook.preparation import prepare_nbgrader
 from autograder.grading.store import ResultStore
+from autograder.sandbox.outer import run_in_sandbox
+
+prepare_nbgrader()
+from nbgrader.api import Gradebook  # noqa: E402
 
 LAB = "lab2_executors"
 SET_UP = "setup"
@@ -131,54 +138,6 @@ def timed(command: list[str | Path], course: Path) -> tuple[float, float]:
     return seconds, cpu
 
 
-@contextlib.contextmanager
-def cpu_meter() -> Iterator[tuple[list[str], Callable[[], float]]]:
-    """Give the words to put before a command, and what tells the CPU seconds of it and its descendants.
-
-    A control group counts them all. Where none can be made (it takes root), the machine's own count is taken, which is
-    right only if nothing else runs: the kernel forgets the time of processes that end with their process namespace.
-    """
-    for hierarchy in (Path("/sys/fs/cgroup/cpuacct"), Path("/sys/fs/cgroup")):
-        group = hierarchy / f"bench-{os.getpid()}"
-        if not (hierarchy / "cgroup.procs").exists():
-            continue
-        try:
-            group.mkdir()
-        except OSError:
-            continue
-        join = ["/bin/sh", "-c", f'echo $$ > {group}/cgroup.procs; exec "$@"', "join"]
-        try:
-            yield join, functools.partial(_group_seconds, group)
-        finally:
-            wait_until_empty(group)
-            group.rmdir()
-        return
-    before = machine_seconds()
-    yield [], lambda: machine_seconds() - before
-
-
-def _group_seconds(group: Path) -> float:
-    nanoseconds = group / "cpuacct.usage"
-    if nanoseconds.exists():
-        return int(nanoseconds.read_text()) / 1e9
-    return int((group / "cpu.stat").read_text().split("usage_usec ")[1].split()[0]) / 1e6
-
-
-def wait_until_empty(group: Path) -> None:
-    """Wait, at most 30 s, until no process is left in the group: only then can it be removed."""
-    deadline = time.monotonic() + 30
-    while (group / "cgroup.procs").read_text() and time.monotonic() < deadline:
-        time.sleep(0.05)
-
-
-def machine_seconds() -> float:
-    """CPU seconds since the machine started, of all that ran on it."""
-    user, nice, system, _idle, _iowait, *interrupts = map(
-        int, Path("/proc/stat").read_text().splitlines()[0].split()[1:]
-    )
-    return (user + nice + system + sum(interrupts[:2])) / os.sysconf("SC_CLK_TCK")
-
-
 def course(folder: Path, *, plain: bool) -> Path:
     """Make a course with lab 2 alone; a plain one starts programs by subprocess."""
     source = folder / "solutions" / LAB / f"{LAB}.ipynb"
@@ -205,29 +164,64 @@ def ours(folder: Path, students: list[str]) -> Measured:
     )
 
 
-def stock(folder: Path, students: list[str]) -> Measured:
-    """Grade by nbgrader's own pipeline."""
-    root = course(folder, plain=True)
-    lab = load_lab(root, LAB)
-    for student in students:
-        sample_class.build_student(lab, student, root / "handed_in")
-        (root / "submitted" / student).mkdir(parents=True)
-        (root / "handed_in" / student).rename(root / "submitted" / student / LAB)
+def stock(folder: Path, students: list[str], at_once: int) -> Measured:
+    """Grade by nbgrader's own pipeline, in as many courses side by side as are asked for: one gradebook takes one."""
+    shares = [students[number::at_once] for number in range(at_once) if students[number::at_once]]
+    roots = [course(folder / str(number), plain=True) for number in range(len(shares))]
+    lab = load_lab(roots[0], LAB)
     source = "--CourseDirectory.source_directory=solutions"
-    timed([BIN / "nbgrader", "generate_assignment", LAB, source], root)
-    seconds, cpu = timed([BIN / "nbgrader", "autograde", LAB, source], root)
-    from nbgrader.api import Gradebook
+    for root, share in zip(roots, shares, strict=True):
+        for student in share:
+            sample_class.build_student(lab, student, root / "handed_in")
+            (root / "submitted" / student).mkdir(parents=True)
+            (root / "handed_in" / student).rename(root / "submitted" / student / LAB)
+        timed([BIN / "nbgrader", "generate_assignment", LAB, source], root)
+    began = time.monotonic()
+    with ThreadPoolExecutor(len(roots)) as pool:
+        took = list(pool.map(lambda root: timed([BIN / "nbgrader", "autograde", LAB, source], root), roots))
+    seconds = time.monotonic() - began
+    points: dict[str, dict[str, float | None]] = {}
+    for root, share in zip(roots, shares, strict=True):
+        with Gradebook(f"sqlite:///{root / 'gradebook.db'}") as gradebook:
+            for student in share:
+                notebooks = gradebook.find_submission(LAB, student).notebooks
+                points[student] = {grade.name: grade.auto_score for book in notebooks for grade in book.grades}
+    return Measured(seconds, sum(cpu for _, cpu in took), points)
 
-    with Gradebook(f"sqlite:///{root / 'gradebook.db'}") as gradebook:
-        points = {
-            student: {
-                grade.name: grade.auto_score
-                for notebook in gradebook.find_submission(LAB, student).notebooks
-                for grade in notebook.grades
-            }
-            for student in students
-        }
-    return Measured(seconds, cpu, points)
+
+def recording(root: Path, students: list[str]) -> Measured:
+    """Record results that are there already, as after a gradebook was lost: nbgrader's stage and the feedback."""
+    shutil.rmtree(root / "build" / "autograded")
+    (root / "build" / "gradebook.db").unlink()
+    seconds, cpu = timed([BIN / "autograder", "grade", LAB, root / "handed_in"], root)
+    return Measured(seconds, cpu, {student: {} for student in students})
+
+
+def alone(folder: Path, lab_name: str) -> Measured:
+    """Check one complete solution, as a student or an instructor does who waits for it."""
+    lab = load_lab(sample_class.ROOT, lab_name)
+    path = sample_class.build_student(lab, "solution", folder) / f"{lab_name}.ipynb"
+    seconds, cpu = timed([BIN / "autograder", "check", path, "--course", sample_class.ROOT], sample_class.ROOT)
+    return Measured(seconds, cpu, {})
+
+
+def observers(launches: int, seconds: float) -> float:
+    """CPU seconds of the observers of so many launches, each of which sees nothing for so long."""
+    watch = (
+        "import time\nfrom autograder.checks import runtime\nfrom autograder.graph.observer import Observer\n"
+        f"began = time.process_time()\nfor _ in range({launches}):\n"
+        f"    one = Observer(7)\n    one.pause({seconds})\n    one.close()\nprint(time.process_time() - began)\n"
+    )
+    run = run_in_sandbox([*RUN_STDIN], watch.encode(), Isolation.FULL, 60.0 + 2 * launches * seconds)
+    return float(run.stdout.split()[0])
+
+
+def rows(mine: Measured, recorded: Measured, one: Measured, many: Measured, size: int) -> Iterator[tuple[str, ...]]:
+    """The figures that the project aims at, with what was measured."""
+    yield "throughput, stock one after another", f"{one.seconds / mine.seconds:.1f} x", "25 x"
+    yield "throughput, stock as many at once as fill the machine", f"{many.seconds / mine.seconds:.1f} x", "5 x"
+    yield "CPU seconds a submission", f"{mine.cpu / size:.2f} (stock {one.cpu / size:.2f})", "2.0"
+    yield "nbgrader's stage with feedback, CPU seconds a submission", f"{recorded.cpu / size:.2f}", "0.2"
 
 
 def main() -> int:
@@ -238,31 +232,57 @@ def main() -> int:
     tame = [name for name in sample_class.students(LAB) if name.startswith(("solution", "correct", "blank", "e", "m"))]
     count = options.students or len(tame)
     students = [tame[index * len(tame) // count] for index in range(min(count, len(tame)))]
-    with tempfile.TemporaryDirectory(prefix="bench-") as folder:
-        mine = ours(Path(folder, "ours"), students)
-        theirs = stock(Path(folder, "stock"), students)
+    size, cores = len(students), len(os.sched_getaffinity(0))
     console = Console(width=None if sys.stdout.isatty() else 120, highlight=False)
-    table = Table("", "this kit", "stock nbgrader", "ratio", box=None)
-    size = len(students)
-    rows = (
-        ("submissions a minute", 60 * size / mine.seconds, 60 * size / theirs.seconds, theirs.seconds / mine.seconds),
-        ("CPU seconds a submission", mine.cpu / size, theirs.cpu / size, theirs.cpu / mine.cpu),
-        ("seconds in all", mine.seconds, theirs.seconds, theirs.seconds / mine.seconds),
+    with tempfile.TemporaryDirectory(prefix="bench-") as name:
+        folder = Path(name)
+        with shares_of_cpu() as parts:
+            mine = ours(folder / "ours", students)
+        recorded = recording(folder / "ours", students)
+        one = stock(folder / "stock", students, 1)
+        many = stock(folder / "many", students, min(size, 2 * cores))
+        solutions = {lab: alone(folder, lab) for lab in lab_names(sample_class.ROOT)}
+    parts["not seen: ended between two looks"] = max(0.0, mine.cpu - sum(parts.values()))
+    table = Table("", "measured", "aim", box=None)
+    for row in rows(mine, recorded, one, many, size):
+        table.add_row(*row)
+    for lab, measured in solutions.items():
+        table.add_row(f"complete solution alone, {lab}", f"{measured.seconds:.1f} s, {measured.cpu:.1f} CPU s", "7 s")
+    floor = parts["students' programs"] / size + observers(9, 1.2)
+    over = mine.cpu / size / floor
+    table.add_row(
+        "CPU over the floor: programs, and the observers of nine launches", f"{over:.1f} x of {floor:.2f} s", "1.5 x"
     )
-    for name, a, b, ratio in rows:
-        table.add_row(name, f"{a:.2f}", f"{b:.2f}", f"{ratio:.1f}x")
-    console.print(f"{size} submissions of {LAB}, {len(os.sched_getaffinity(0))} cores: {', '.join(students)}")
+    load = os.getloadavg()[1]
+    console.print(f"{size} submissions of {LAB}, {cores} cores, load {load:.0f}: {', '.join(students)}")
     console.print(table)
-    cores = len(os.sched_getaffinity(0))
-    console.print(f"Floor by CPU alone: {60 * cores * size / mine.cpu:.1f} submissions a minute on {cores} cores.")
+    console.print("CPU seconds a submission by part: " + ", ".join(f"{n} {s / size:.2f}" for n, s in parts.items()))
+    console.print(
+        f"By CPU alone: {60 * cores * size / mine.cpu:.1f} submissions a minute. Picture: {plot(parts, size)}"
+    )
     different = [
         f"{student}: {check}: {points} here, {theirs.points[student].get(check)} there"
+        for theirs in (one, many)
         for student, checks in mine.points.items()
         for check, points in checks.items()
         if points != theirs.points[student].get(check)
     ]
     console.print("The points are the same everywhere." if not different else "\n".join(different))
     return 1 if different else 0
+
+
+def plot(parts: dict[str, float], size: int) -> Path:
+    """Draw where the CPU seconds of a submission go; return where the picture is."""
+    figure = Figure(figsize=(8, 0.5 * len(parts) + 1), layout="constrained")
+    axes = figure.subplots()
+    bars = axes.barh(list(parts), [seconds / size for seconds in parts.values()], color="#0072B2")
+    axes.bar_label(bars, fmt="%.2f", padding=3)
+    axes.invert_yaxis()
+    axes.set_xlabel("CPU seconds a submission")
+    path = sample_class.ROOT / "build" / "bench.svg"
+    path.parent.mkdir(exist_ok=True)
+    figure.savefig(path)
+    return path
 
 
 if __name__ == "__main__":
