@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from typing import Any
+from typing import Any, ClassVar
 
 from jinja2.bccache import Bucket, BytecodeCache
 from nbconvert.filters import Highlight2HTML
@@ -45,11 +45,27 @@ _TOO_LONG_TO_COLOUR = re.compile(r"\s{200}|\S{400}")
 """No program looks like that, and the time that Pygments takes for it grows with the square of its length."""
 
 
+_LONGEST_KEPT, _MOST_KEPT = 10_000, 1000
+"""Characters of a cell, and cells, that are kept coloured."""
+
+
 class ColouredCode(Highlight2HTML):  # type: ignore[misc]
     """nbconvert's colouring of code, for what a person wrote; the rest is shown as plain text."""
 
+    _coloured: ClassVar[dict[tuple[str, str | None, str], Any]] = {}
+
     def __call__(self, source: str, language: str | None = None, metadata: Any = None) -> Any:
-        """Return the HTML of a code cell."""
+        """Return the HTML of a code cell; most cells of a class's notebooks are the lab's, and coloured once."""
+        if len(source) > _LONGEST_KEPT:
+            return self._colour(source, language, metadata)
+        cell = source, language, repr(metadata)
+        if cell not in self._coloured:
+            if len(self._coloured) >= _MOST_KEPT:
+                self._coloured.clear()
+            self._coloured[cell] = self._colour(source, language, metadata)
+        return self._coloured[cell]
+
+    def _colour(self, source: str, language: str | None, metadata: Any) -> Any:
         return super().__call__(source, "text" if _TOO_LONG_TO_COLOUR.search(source) else language, metadata)
 
 
