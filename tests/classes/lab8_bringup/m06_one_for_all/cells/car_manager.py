@@ -37,7 +37,7 @@ class CarManager(Node):
         """Take the steps that are left; return whether the node is active."""
         answer = self.ask(self.get[name], GetState.Request())
         state = answer.current_state.label if answer else ""
-        for label in {"unconfigured": ["configure", "activate"], "inactive": ["activate"]}.get(state, []):
+        for label in {"unconfigured": ["configure", "activate"]}.get(state, []):
             answer = self.ask(self.change[name], ChangeState.Request(transition=Transition(label=label)))
             if answer is None or not answer.success:
                 return False

@@ -23,7 +23,7 @@ class CarManager(Node):
 
     def ask(self, client, request):
         """The answer, or None if none comes in time."""
-        patience = self.get_parameter("patience").value
+        patience = 1.0
         if not client.wait_for_service(patience):
             return None
         future = client.call_async(request)
