@@ -48,7 +48,9 @@ class CarManager(Node):
         optional = self.get_parameter("optional").value
         missing = []
         for layer in self.layers:
-            missing += [name for name in layer if not self.bring_up(name, ["configure"])]
+            for name in layer:
+                if self.get[name].service_is_ready():
+                    self.bring_up(name, ["configure"])
         missing = []
         for layer in self.layers:
             missing += [name for name in layer if not self.bring_up(name, ["configure", "activate"])]
