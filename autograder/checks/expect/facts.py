@@ -38,8 +38,8 @@ class Facts(Expectations):
             because: what is wrong if it does not hold.
             hint: a pointer for the student.
             code: of that reason.
-            evident: anything; if true, the check has seen that this is the reason, so what callbacks wait for is none: in
-                a launch where something is missing on purpose, a right program waits as well.
+            evident: anything; if true, the check has seen that this is the reason, and what callbacks wait for is none:
+                in a launch where something is missing on purpose, a right program waits as well.
 
         Example:
             `ros.require(reply.success, "The order is accepted", because=reply.message)`
