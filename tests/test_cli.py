@@ -65,6 +65,16 @@ def test_check_passes_with_status_0(root: Path) -> None:
     assert status == 0 and "toy: 5 of 5 points" in out
 
 
+def test_cells_that_look_around_are_no_part_of_the_check(root: Path, tmp_path: Path) -> None:
+    notebook = json.loads((root / "class" / "ann" / "toy.ipynb").read_text(encoding="utf-8"))
+    looks = 'robot = launch("nonsense").start()\n%ros2 topic echo /nonsense\nrobot.stop()'
+    notebook["cells"].insert(1, {"cell_type": "code", "source": looks, "metadata": {}, "outputs": []})
+    notebook["cells"][1]["execution_count"] = None
+    (tmp_path / "toy.ipynb").write_text(json.dumps(notebook), encoding="utf-8")
+    status, out, _ = run(root, "check", "--course", ".", str(tmp_path / "toy.ipynb"))
+    assert status == 0 and "toy: 5 of 5 points" in out
+
+
 def test_check_fails_with_status_1_and_the_reason(root: Path) -> None:
     junit = root / "build" / "junit.xml"
     status, out, _ = run(root, "check", "--course", ".", "class/bob/toy.ipynb", "--json", "--junit", str(junit))

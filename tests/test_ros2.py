@@ -259,3 +259,16 @@ def test_the_page_of_the_book_names_every_verb() -> None:
             assert run([command, "--help"]) == 0
         verbs = re.findall(r"^    (\w+)", helped.getvalue(), re.MULTILINE)
         assert set(verbs) == set(re.findall(r"`(\w+)`", row.partition(" | ")[2])), command
+
+
+def test_a_node_that_nothing_spins_is_told(notebook: Notebook) -> None:
+    stuck = "import threading\nimport rclpy\nrclpy.init()\nnode = rclpy.create_node('stuck')\nthreading.Event().wait()"
+    notebook.run(f"%%node stuck\n{stuck}", "stuck")
+    notebook.run('robot = launch("stuck", "talker").start()')
+    notebook.run("from autograder.notebook import ros2_magic\nros2_magic._ENDLESS = 10.0")
+    shown = notebook.run("%ros2 param list").text
+    assert "/stuck:\nException while calling service of node '/stuck': None\n/talker:\n  start" in shown
+    notebook.run("ros2_magic._ENDLESS = 1.0")
+    shown = notebook.run("%ros2 param get /stuck use_sim_time").text
+    assert "a node answers only while something spins it" in shown
+    notebook.run("robot.stop()")

@@ -30,8 +30,8 @@ would go on until Ctrl-C ends after 10 seconds. The exit status is in `_exit_cod
 
 _ENDLESS = 10.0
 """Seconds after which a verb is ended that goes on until Ctrl-C: a cell has to end."""
-_LONGEST = 60.0
-"""Seconds that any other verb may take, such as a call that is not answered."""
+_LONGEST = {"service": 60.0, "action": 60.0}
+"""Seconds that the other verbs of a command may take: a call or a goal longer than a question about the graph."""
 
 _ACTION = "/_action/send_goal"
 """How the name of a service ends that takes an action's goals."""
@@ -70,14 +70,16 @@ def _run(kernel: Kernel, line: str) -> int:
             return run(words)
     for sentence in running.news() if looks else ():
         print(sentence)
-    seconds = _ENDLESS if _is_endless(words) else _LONGEST
+    endless = _is_endless(words)
+    seconds = _ENDLESS if endless else _LONGEST.get("".join(words[:1]), _ENDLESS)
     try:
         with redirect_stderr(sys.stdout):  # what cannot be done is no alarm, and keeps its place
             status = run(words, running.observer.domain_id, running.observer, seconds)
     except TimeIsUp:
         status = 2
         because = "since a cell has to end; in a terminal it goes on until Ctrl-C"
-        print(f"(stopped after {seconds:g} s, {because if seconds == _ENDLESS else 'for no answer came'})")
+        silent = "for no answer came: a node answers only while something spins it"
+        print(f"(stopped after {seconds:g} s, {because if endless else silent})")
     if status and looks:
         _help_on(words[2:], running.observer)
     return status

@@ -63,7 +63,7 @@ def above_zero(text: str) -> float:
 
 def qos(parser: Parser, default: str) -> None:
     """Add the options for each policy."""
-    presets = [preset.lower() for preset in QoSPresetProfiles.__members__]
+    presets = [name.lower() for name in QoSPresetProfiles.__members__ if name != "UNKNOWN"]
     parser.add_argument("--qos-profile", choices=presets, help=f"preset (default: {default})")
     parser.add_argument("--qos-depth", type=int, metavar="N", help="queue size, with keep_last")
     parser.add_argument("--qos-history", choices=_words(QoSHistoryPolicy))

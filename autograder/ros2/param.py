@@ -17,6 +17,9 @@ from autograder.ros2.node import absolute, find_node
 from autograder.ros2.options import joins
 from autograder.ros2.session import Session
 
+_ANSWER_WITHIN = 5.0
+"""Seconds that a node may take to list its parameters; the real tool gives it one."""
+
 _KINDS = {
     ParameterType.PARAMETER_NOT_SET: "not set",
     ParameterType.PARAMETER_BOOL: "boolean",
@@ -70,7 +73,10 @@ def _found(session: Session, options: Any) -> str:
 
 def _names(session: Session, node: str, prefixes: list[str]) -> list[str]:
     request = ListParameters.Request(prefixes=prefixes)
-    return sorted(ask(session, node, "list_parameters", ListParameters, request).result.names)
+    answer = ask(session, node, "list_parameters", ListParameters, request, _ANSWER_WITHIN)
+    if answer is None:
+        raise Failure(f"Exception while calling service of node '{node}': None")
+    return sorted(answer.result.names)
 
 
 def _values(session: Session, node: str, names: list[str]) -> list[ParameterValue]:
@@ -92,7 +98,11 @@ def _list(session: Session, options: Any) -> None:
     for node in nodes:
         if not options.node_name:
             print(f"{node}:")
-        names = _names(session, node, options.param_prefixes)
+        try:
+            names = _names(session, node, options.param_prefixes)
+        except Failure as failure:  # the other nodes may answer
+            print(failure, file=sys.stderr)
+            continue
         kinds = {}
         if options.param_type:
             kinds = {one.name: f" (type: {_KINDS[one.type]})" for one in _descriptors(session, node, names)}
