@@ -734,6 +734,13 @@ CASES = {
     "undeclared": Case(
         "self.get_parameter('rate')\n", says="parameter-not-declared", ask=trouble, never=("parameter-type", "crashed")
     ),
+    "no_response": Case(
+        "self.create_service(Trigger, '~/gate', self.answer)\n" + CLIENT.format("") + ONCE,
+        "def answer(self, request):\n    return Trigger.Response()\n",
+        says="service-exception",
+        because="It could not be called: the function takes another number of arguments",
+        ask=inside,
+    ),
     "builtin_callback": Case(
         "from collections import deque\nself.create_subscription(String, '~/in', deque().append, 10)\n",
         says="builtin-callback",

@@ -198,6 +198,8 @@ def _error(program: str, event: CallbackError) -> Diagnosis:
             "A value that cannot be used is refused: what `add_on_set_parameters_callback` was given returns "
             "SetParametersResult(successful=False, reason=…). An exception ends the node."
         )
+    if not event.line and "positional argument" in error:
+        hint = "It could not be called: the function takes another number of arguments than it is given here."
     if event.kind == "task" and not event.line:
         hint = "What `add_done_callback` is given is called with one argument, the future."
     for exception, word, advice in KNOWN_ERRORS:
