@@ -5,6 +5,7 @@ The browser is Debian's chromium. Where there is none the test is skipped, excep
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import re
@@ -42,8 +43,13 @@ PROMPTS = "() => [...document.querySelectorAll('.jp-CodeCell .jp-InputArea-promp
 
 @pytest.fixture(scope="module")
 def jupyter(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Path, str]]:
+    with jupyter_lab(tmp_path_factory.mktemp("jupyter")) as started:
+        yield started
+
+
+@contextlib.contextmanager
+def jupyter_lab(tmp_path: Path) -> Iterator[tuple[Path, str]]:
     """Start JupyterLab as `make jupyter` does, untouched by this user's own settings; gives its folder and address."""
-    tmp_path = tmp_path_factory.mktemp("jupyter")
     work, home = tmp_path / "labs", tmp_path / "home"
     work.mkdir()
     shutil.copy(ROOT / "labs" / "README.md", work)
@@ -100,7 +106,7 @@ def kernel_is_idle(kernels: list[dict[str, Any]]) -> bool:
     return any(kernel["execution_state"] == "idle" and kernel["connections"] for kernel in kernels)
 
 
-def _run_all(window: Any, address: str, name: str) -> tuple[Any, list[dict[str, Any]]]:
+def run_all(window: Any, address: str, name: str) -> tuple[Any, list[dict[str, Any]]]:
     """Open a notebook, choose Run > Run All Cells, and give the page and its code cells once the last has been run."""
     page = window.new_page()
     outside: list[str] = []
@@ -116,7 +122,7 @@ def _run_all(window: Any, address: str, name: str) -> tuple[Any, list[dict[str, 
         assert time.monotonic() < deadline, "Run All Cells runs no cell"
         if page.locator(".jp-Dialog").count():
             page.keyboard.press("Escape")
-        elif kernel_is_idle(_kernels(page, address, name)):
+        elif kernel_is_idle(kernels(page, address, name)):
             page.click("text=Run >> nth=0")
             page.click("text='Run All Cells'")
         page.wait_for_timeout(2000)
@@ -129,7 +135,7 @@ def _run_all(window: Any, address: str, name: str) -> tuple[Any, list[dict[str, 
     return page, cells
 
 
-def _kernels(page: Any, address: str, name: str) -> list[dict[str, Any]]:
+def kernels(page: Any, address: str, name: str) -> list[dict[str, Any]]:
     """The kernel of a notebook, as the server describes it."""
     sessions = page.request.get(f"{address}api/sessions?token=lab").json()
     return [session["kernel"] for session in sessions if session["path"] == f"{name}.ipynb"]
@@ -137,7 +143,7 @@ def _kernels(page: Any, address: str, name: str) -> list[dict[str, Any]]:
 
 def _close(page: Any, address: str, name: str) -> None:
     """Close a page and end the kernel of its notebook, which others would have to share the machine with."""
-    for kernel in _kernels(page, address, name):
+    for kernel in kernels(page, address, name):
         page.request.delete(f"{address}api/kernels/{kernel['id']}?token=lab")
     page.close()
 
@@ -163,7 +169,7 @@ def test_the_lab_runs_top_to_bottom_with_the_verdicts_of_grading(
     expected = sample_class.expected(lab, student)
     sources = [cell for cell in json.loads(handed_in.read_text())["cells"] if cell["cell_type"] == "code"]
 
-    page, cells = _run_all(window, address, name)
+    page, cells = run_all(window, address, name)
     _picture(page, name)
     _close(page, address, name)
 
@@ -305,7 +311,7 @@ def test_reports_can_be_read_in_every_theme_and_in_a_narrow_window(
     settings.parent.mkdir(parents=True, exist_ok=True)
     settings.write_text(json.dumps({"theme": theme}))
 
-    page, shown = _run_all(window, address, name)
+    page, shown = run_all(window, address, name)
 
     for number, words in enumerate(("", "written", "failed", "holds so far", "partly passed", "talker | tick")):
         assert words in shown[number]["output"]

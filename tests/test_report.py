@@ -199,6 +199,12 @@ def test_thirty_students_are_readable_at_120_columns() -> None:
     assert all("27/30" in row and "✗ failed" in row and "It waits for ever" in row for row in rows)
 
 
+def test_the_class_table_tells_part_of_the_points_from_none() -> None:
+    checks = [check(points, outcome(Status.FAILED), grade_id=f"c{points}") for points in (1, 0)]
+    (row,) = [line for line in text_of(class_view([result(*checks, student="ann")])).split("\n") if "ann" in line]
+    assert "◑✗" in row
+
+
 def test_undecided_checks_are_listed_for_the_instructor() -> None:
     decided = result(check(3, outcome(Status.PASSED)))
     undecided = result(check(None, outcome(Status.UNKNOWN, because="The observer died.")), student="bob")

@@ -184,7 +184,8 @@ def _marks(checks: Sequence[CheckResult]) -> Text:
     marks = Text()
     for number, check in enumerate(checks):
         marks.append(" " if number and number % 5 == 0 else "")
-        marks.append(SYMBOL[check.status], STYLE[check.status])
+        verdict = words.verdict(check)
+        marks.append(words.SYMBOL[verdict], _VERDICT_STYLE[verdict])
     return marks
 
 
