@@ -218,6 +218,20 @@ def test_a_program_that_does_not_end_cleanly_is_told_what_it_did(
     assert (outcome.code, because in outcome.because) == (code, True), outcome
 
 
+def test_what_rclpy_raises_by_chance_at_a_signal_is_no_mistake_of_the_program(grade: Grade) -> None:
+    raced = '        raise RuntimeError("failed to initialize wait set: the given context is not valid, at rcl")'
+    result = grade(
+        """\
+        with launch("talker", parameters={"period": 60.0}) as ros:
+            ros.expect_node("/talker")
+            ros.expect_clean_end("talker", by="SIGTERM")
+        ros.score(2)
+        """,
+        talker__py=CAREFUL.replace("        pass", raced),
+    )
+    assert result.points == 2, result
+
+
 @pytest.mark.parametrize(("shuts_down", "points"), [("try_shutdown()", 2), ("shutdown()", 0)])
 def test_ctrl_c_finds_rclpy_shut_down_each_time(grade: Grade, shuts_down: str, points: int) -> None:
     # In the middle of a callback is where Python and rclpy's own thread would be in a race.
