@@ -10,7 +10,7 @@ class Wheel(Node):
         super().__init__(f"{side}_wheel")
         self.count = 0
         self.publisher = self.create_publisher(Int64, f"{side}/ticks", 10)
-        self.create_timer(0.5, self.turn)
+        self.create_timer(0.2, self.turn)
 
     def turn(self):
         self.publisher.publish(Int64(data=self.count))
