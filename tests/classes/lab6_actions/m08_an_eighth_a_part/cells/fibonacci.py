@@ -33,7 +33,7 @@ class FibonacciServer(Node):
         sequence = [0, 1]
         while len(sequence) <= goal_handle.request.order:
             time.sleep(self.step)
-            if goal_handle.is_cancel_requested:
+            if goal_handle.is_cancel_requested and len(sequence) % 12 == 0:
                 goal_handle.canceled()
                 return Fibonacci.Result(sequence=sequence)
             sequence.append(sequence[-1] + sequence[-2])
