@@ -50,38 +50,32 @@ def unreadable(words: Sequence[str], folder: Path) -> StudentFileError | None:
 
 def node_keys(text: str) -> list[str]:
     """The node names that the file's values are for, as full names; wildcards are kept. Empty if it is no such file."""
-    try:
-        content = load(text)
-    except StudentFileError:
-        return []
-    found: list[str] = []
-
-    def walk(part: Any, path: str, depth: int) -> None:
-        if not isinstance(part, dict) or depth > 10:
-            return
-        for key, below in part.items():
-            if key == "ros__parameters":
-                found.append(path or "/")
-            else:
-                walk(below, f"{path}/{str(key).strip('/')}", depth + 1)
-
-    walk(content, "", 0)
-    return found
+    return [node for node, _ in _sections(text)]
 
 
 def names_for(text: str, node: str) -> list[str]:
     """The names of the parameters that the file has values for, as far as they are for this node."""
+    return [
+        str(name)
+        for key, values in _sections(text)
+        if is_for(key, node) and isinstance(values, dict)
+        for name in values
+    ]
+
+
+def _sections(text: str) -> list[tuple[str, Any]]:
+    """Each `ros__parameters` of a file: the full name of the node that it is for, and what stands below it."""
     try:
         content = load(text)
     except StudentFileError:
         return []
-    found: list[str] = []
+    found: list[tuple[str, Any]] = []
 
     def walk(part: Any, path: str, depth: int) -> None:
         for key, below in part.items() if isinstance(part, dict) and depth <= 10 else ():
-            if key == "ros__parameters" and is_for(path or "/", node) and isinstance(below, dict):
-                found.extend(map(str, below))
-            elif key != "ros__parameters":
+            if key == "ros__parameters":
+                found.append((path or "/", below))
+            else:
                 walk(below, f"{path}/{str(key).strip('/')}", depth + 1)
 
     walk(content, "", 0)

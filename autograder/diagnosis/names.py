@@ -244,16 +244,12 @@ def _idle_rule(scene: Scene, topic: str, node: str) -> Diagnosis | None:
         own = [name for name in observer.nodes() if name in inside.nodes] or observer.nodes()
         nodes = [name for name in own if name == node] if node else own
         found = remap_rules.without_effect(rules, topic, nodes, users)
-        if found and (
-            found[1] != "absolute-name" or any(_is_absolute(scene, name) for name in users if name in found[0])
-        ):
+        named = [name for name in users if found and name in found[0]]
+        absolute = any(absolute_name(scene, kind, name) for name in named for kind in ("publisher", "subscription"))
+        if found and (found[1] != "absolute-name" or absolute):
             return Diagnosis(*found)
     given = _given_as_a_parameter(scene, scene.inside_of(node) if node else scene.insides, topic)
     return Diagnosis(*given) if given else None
-
-
-def _is_absolute(scene: Scene, name: str) -> bool:
-    return bool(absolute_name(scene, "publisher", name) or absolute_name(scene, "subscription", name))
 
 
 def _elsewhere(scene: Scene, topic: str, kind: str, names: list[str]) -> Diagnosis | None:
@@ -270,14 +266,16 @@ def _elsewhere(scene: Scene, topic: str, kind: str, names: list[str]) -> Diagnos
     close = nearest(topic, [name for name in names if name != topic])
     if not close:
         return None
+    said = f"There is no {kind} on `{topic}`; the nearest topic with one is"
+    return _misspelt(scene, kind, close, said, "topic-name")
+
+
+def _misspelt(scene: Scene, kind: str, close: str, said: str, code: str) -> Diagnosis:
+    """There is only something of a similar name; `said` is the sentence that the name ends."""
     made = _made_as(scene, kind, close)
     given = made[0].given if made else ""
-    return Diagnosis(
-        f"There is no {kind} on `{topic}`; the nearest topic with one is `{close}`"
-        + (f" (`{given}` in the code)." if given and given != close else "."),
-        "topic-name",
-        _LETTER_BY_LETTER,
-    )
+    in_code = f" (`{given}` in the code)" if given and given != close else ""
+    return Diagnosis(f"{said} `{close}`{in_code}.", code, _LETTER_BY_LETTER)
 
 
 def why_no_service(scene: Scene, name: str, srv_type: type) -> Diagnosis:
@@ -296,12 +294,6 @@ def why_no_service(scene: Scene, name: str, srv_type: type) -> Diagnosis:
     names = [n for n, types in services.items() if not types[0].startswith(("rcl_interfaces/", "type_description"))]
     close = nearest(name, [n for n in names if n not in elsewhere])
     if close and close != name:
-        made = _made_as(scene, "service", close)
-        given = made[0].given if made else ""
-        return Diagnosis(
-            f"There is no service `{name}`; the nearest name on the graph is `{close}`"
-            + (f" (`{given}` in the code)." if given and given != close else "."),
-            "service-name",
-            _LETTER_BY_LETTER,
-        )
+        said = f"There is no service `{name}`; the nearest name on the graph is"
+        return _misspelt(scene, "service", close, said, "service-name")
     return inside_reason(scene) or Diagnosis(f"No node offers the service `{name}`.", "no-service")
