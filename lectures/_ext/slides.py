@@ -253,6 +253,8 @@ def paginate(section: nodes.Element) -> None:
     section += title + result + subsections
     for subsection in subsections:
         paginate(subsection)
+        if len(subsection.children) == 1:  # its title: what it says is for the book only
+            section.remove(subsection)
 
 
 def leads(block: nodes.Element) -> bool:
