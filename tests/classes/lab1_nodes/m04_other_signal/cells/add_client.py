@@ -11,14 +11,14 @@ class AddClient(Node):
         super().__init__("add_client")
         self.a = self.declare_parameter("a", 5).value
         self.b = self.declare_parameter("b", 7).value
-        self.server_within = self.declare_parameter("server_within", 3.0).value  # seconds
-        self.answer_within = self.declare_parameter("answer_within", 1.0).value  # seconds
+        self.server_within = self.declare_parameter("server_within", 1.0).value  # seconds
+        self.answer_within = self.declare_parameter("answer_within", 0.5).value  # seconds
         self.client = self.create_client(BasicTypes, "add_two_ints")
 
 
 def ask(node):
     """Ask for the sum, log what came of it, and return the exit status."""
-    if not node.client.wait_for_service(timeout_sec=node.server_within):
+    if not node.client.wait_for_service(timeout_sec=1.0):
         node.get_logger().error("no server")
         return 1
     future = node.client.call_async(BasicTypes.Request(int32_value=node.a, int64_value=node.b))

@@ -11,8 +11,8 @@ class AddClient(Node):
         super().__init__("add_client")
         self.a = self.declare_parameter("a", 5).value
         self.b = self.declare_parameter("b", 7).value
-        self.server_within = self.declare_parameter("server_within", 3.0).value  # seconds
-        self.answer_within = self.declare_parameter("answer_within", 1.0).value  # seconds
+        self.server_within = self.declare_parameter("server_within", 1.0).value  # seconds
+        self.answer_within = self.declare_parameter("answer_within", 0.5).value  # seconds
         self.client = self.create_client(BasicTypes, "add_two_ints")
 
 
