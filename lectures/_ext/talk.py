@@ -14,6 +14,8 @@ from sphinx.application import Sphinx
 LECTURES = Path(__file__).resolve().parent.parent
 _FIGURE = re.compile(r'<img ([^>]*?)src="data:image/svg\+xml;base64,([A-Za-z0-9+/=]+)"([^>]*)>')
 
+_FILE = re.compile(r'(<a [^>]*>)?(<img [^>]*?src="([^":]+\.svg)"[^>]*>)')
+
 
 def on_page(app: Sphinx, pagename: str, template: str, context: dict[str, Any], doctree: nodes.document | None) -> None:
     """Tell the theme where the other form of a lecture is, and make each figure of the book a link to its file.
@@ -37,7 +39,9 @@ def on_page(app: Sphinx, pagename: str, template: str, context: dict[str, Any], 
         where = f"{above}_images/{name}"
         return f'<a class="figure" href="{where}"><img {found[1]}src="{where}"{found[3]}></a>'
 
-    context["body"] = _FIGURE.sub(linked, context["body"])
+    body = _FILE.sub(lambda found: found[0] if found[1] else f'<a class="figure" href="{found[3]}">{found[2]}</a>',
+                     context["body"])  # fmt: skip
+    context["body"] = _FIGURE.sub(linked, body)
 
 
 def setup(app: Sphinx) -> dict[str, Any]:
