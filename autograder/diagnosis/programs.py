@@ -25,7 +25,7 @@ def program_trouble(scene: Scene) -> Diagnosis | None:
         if program.running() or program in scene.stopped:
             continue
         refused = remap_rules.refused(scene.rules[number]) if number < len(scene.rules) else None
-        if refused and "arse remap rule" in program.output():
+        if refused and ("arse remap rule" in program.output() or "invalid node namespace" in program.output()):
             return Diagnosis(*refused)
         unread = params_file.why_refused(program.output(), scene.folder)
         return Diagnosis(*unread) if unread else _death(scene.inside(program))
