@@ -28,9 +28,9 @@ from autograder.core.results import Isolation, Status
 from autograder.course.lab import grade_id_of, load_lab
 from autograder.grading.job import Cell, Job
 from autograder.grading.worker import run_job
+from autograder.intake.collect import collect
 from autograder.launch_files import LaunchFileError, read_launch_file
 from autograder.report.terminal import plain
-from autograder.submission.intake import collect
 from autograder.submission.reader import read_submission
 
 CASES = {path.stem: yaml.safe_load(path.read_text(encoding="utf-8")) for path in
@@ -69,7 +69,7 @@ def hold(case: dict[str, Any], source: Path, course: Path) -> None:
         assert max(map(len, others)) <= case["most"]
     else:
         assert others == case.get("others", [])
-    told = "\n".join(collected.refused)
+    told = "\n".join([*collected.refused, *collected.notes])
     for words in case["said"]:
         assert words in told
     assert bool(told) == bool(case["said"]) and len(told) < 3000 and plain(told) == told

@@ -346,7 +346,7 @@ def test_who_is_late_has_the_same_score_everywhere(tmp_path: Path, monkeypatch: 
     with Gradebook(address) as gradebook:
         gradebook.add_assignment(toy.LAB, duedate="2026-11-02 12:00 UTC")
     run = grade_class(late.root, toy.LAB, tmp_path / "class", Settings(isolation=Isolation.NONE))
-    assert run.unrecorded == {} and run.refused == []
+    assert run.unrecorded == {} and run.collected.refused == []
     assert run.grades.read_text().splitlines()[1:] == ["ann,toy,5,9,1", "bob,toy,4,9,1"]
     assert "(Score: 5.0 / 9.0)" in late.feedback("ann") and "(Score: 4.0 / 9.0)" in late.feedback("bob")
     assert "Late submission penalty (Score: -1.0)" in late.feedback("bob")

@@ -19,7 +19,7 @@ import toy
 
 from autograder.course.lab import load_lab
 from autograder.gradebook.preparation import prepare_nbgrader
-from autograder.submission.intake import collect
+from autograder.intake.collect import collect
 
 KIT = Path(__file__).resolve().parent.parent
 

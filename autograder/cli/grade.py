@@ -16,12 +16,19 @@ from autograder.course.paths import CoursePaths
 if TYPE_CHECKING:
     from autograder.gradebook.class_run import ClassRun
 
+LEFT_OUT = 3
+"""The exit status when something that was handed in could not be taken in."""
+
 
 @app.command()
 def grade(
     lab: Annotated[str, typer.Argument(help="The lab, such as lab2_executors.")],
     submissions: Annotated[
-        Path | None, typer.Argument(help="Folder or zip with a folder for each student; default: the sample class.")
+        Path | None,
+        typer.Argument(
+            help="Folder or zip, as your learning platform gives it out, or with a folder for each student;"
+            " default: the sample class."
+        ),
     ] = None,
     force: ForceOption = False,
     isolation: IsolationOption = Isolation.FULL,
@@ -29,7 +36,10 @@ def grade(
     seed: SeedOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Grade a class: gradebook, grades, feedback, and a table of who lost points why."""
+    """Grade a class: gradebook, grades, feedback, and a table of who lost points why.
+
+    Exit status: 0, or 3 if something that was handed in was left out, or 2 if the gradebook lacks a result.
+    """
     from autograder.course.folder import course_root
     from autograder.grading.runner import Settings
 
@@ -51,14 +61,14 @@ def grade(
 
     run = grade_class(root, lab, source, Settings(choose(isolation), seed, force, jobs))
     _show(run, paths, lab, as_json)
-    raise typer.Exit(2 if run.unrecorded else 0)
+    raise typer.Exit(2 if run.unrecorded else LEFT_OUT if run.collected.refused else 0)
 
 
 def _show(run: ClassRun, paths: CoursePaths, lab: str, as_json: bool) -> None:
     from autograder.gradebook.settings import gradebook_place
     from autograder.report.terminal import class_view, console, plain, undecided_view
 
-    left_out = [plain(sentence) for sentence in run.refused]
+    left_out = [plain(sentence) for sentence in (*run.collected.notes, *run.collected.refused)]
     left_out += [f"{plain(name)} is not in the gradebook: {plain(why)}" for name, why in run.unrecorded.items()]
     if as_json:
         print("[" + ",\n".join(result.model_dump_json() for result in run.results) + "]")
@@ -72,6 +82,8 @@ def _show(run: ClassRun, paths: CoursePaths, lab: str, as_json: bool) -> None:
         screen.print()
         screen.print(undecided)
     screen.print()
+    if run.collected.format:
+        screen.print(f"Taken as what {run.collected.format} gives out.", markup=False)
     for sentence in left_out:
         screen.print(sentence, markup=False)
     screen.print(

@@ -16,7 +16,7 @@ from autograder.gradebook.grades import write_grades
 from autograder.gradebook.recorder import Recorder
 from autograder.grading.class_runner import run_class
 from autograder.grading.runner import Settings
-from autograder.submission.intake import collect
+from autograder.intake.collect import Collected, collect
 
 
 @dataclass
@@ -24,8 +24,8 @@ class ClassRun:
     """What came of grading a class."""
 
     results: list[SubmissionResult]
-    refused: list[str]
-    """What was not taken in and why."""
+    collected: Collected
+    """What was taken in and what was not."""
     unrecorded: dict[str, str]
     """Why nbgrader has no grade, by student."""
     grades: Path
@@ -104,7 +104,7 @@ def grade_class(root: Path, lab_name: str, source: Path, settings: Settings) -> 
     grades = write_grades(root)
     return ClassRun(
         results=list(results.values()),
-        refused=collected.refused,
+        collected=collected,
         unrecorded=recorder.failures,
         grades=grades,
         seconds={"all": round(time.monotonic() - began, 2), "recording": round(recording, 2)},

@@ -21,6 +21,9 @@ from pathlib import Path, PurePosixPath
 from autograder.core.errors import KitError
 from autograder.core.files import read_plain, write_beside
 from autograder.course.paths import CoursePaths
+from autograder.intake.formats import Claim, recognise
+from autograder.intake.members import member_name, members
+from autograder.intake.roster import FILE_NAME, Roster, read_roster
 from autograder.submission import timestamp
 from autograder.submission.notebook_file import NOTEBOOK_BYTES
 
@@ -43,6 +46,10 @@ sys.exit("This folder is not a course: start nbgrader in the folder above it. No
 """
 
 
+class _NotUnderstood(Exception):
+    """Something was handed in, and not in a way that says which notebook counts. Nobody gets a zero for that."""
+
+
 @dataclass
 class _HandedIn:
     """What lies in a student's folder."""
@@ -57,28 +64,37 @@ class _HandedIn:
 class Collected:
     """What was taken in."""
 
+    format: str = ""
+    """The learning platform that the submissions came from; empty for a folder for each student."""
     notebooks: dict[str, Path] = field(default_factory=dict)
-    """The notebook under `build/submitted`, by student; an empty file where nothing usable was handed in."""
+    """The notebook under `build/submitted`, by student; an empty file where nothing was handed in."""
     refused: list[str] = field(default_factory=list)
-    """What was not taken in, or only under another name, and why, as sentences."""
+    """What was left out, and why, as sentences."""
+    notes: list[str] = field(default_factory=list)
+    """What replaced what, who was late, and who has another name here, as sentences."""
 
 
 def collect(source: Path, lab: str, root: Path) -> Collected:
     """Take in a class.
 
     Args:
-        source: a folder or a zip that holds `<student>/<lab>.ipynb` or `<student>/<lab>/<lab>.ipynb`; in a zip, one
-            more folder around them does no harm.
+        source: a folder or a zip, as a learning platform gives it out (`formats`), or with `<student>/<lab>.ipynb` or
+            `<student>/<lab>/<lab>.ipynb`; one more folder around them does no harm.
         lab: to take.
-        root: of the course.
+        root: of the course. A file `roster.csv` there joins the platforms' names to those of the gradebook.
 
     Raises:
         KitError: there is nothing to take in.
     """
     collected = Collected()
-    take = _from_folder if source.is_dir() else _from_zip
-    found = take(source, lab, collected.refused)
     paths = CoursePaths(root)
+    roster = read_roster(root / FILE_NAME) if (root / FILE_NAME).is_file() else None
+    found = _of_platform(source, lab, roster, collected)
+    if found is None:
+        take = _from_folder if source.is_dir() else _from_zip
+        found = take(source, lab, collected.refused)
+        if roster is not None:
+            found = _by_roster(found, roster, collected)
     if found and not (paths.build / "nbgrader_config.py").is_file():
         write_beside(paths.build / "nbgrader_config.py", _CLOSED)
     owners: dict[str, str] = {}
@@ -93,7 +109,7 @@ def collect(source: Path, lab: str, root: Path) -> Collected:
             continue
         owners[student] = folder
         if student != unicodedata.normalize("NFC", folder):
-            collected.refused.append(f"The name {folder[:80]!r} is too long; the student is called {student!r} here.")
+            collected.notes.append(f"The name {folder[:80]!r} is too long; the student is called {student!r} here.")
         path = paths.submitted_notebook(student, lab)
         # An unchanged file keeps its time: nbgrader and people can see that nothing new was handed in.
         if _read(paths.submitted, [student, lab, path.name]) != handed_in.notebook:
@@ -102,8 +118,67 @@ def collect(source: Path, lab: str, root: Path) -> Collected:
         _keep_timestamp(paths.submitted, student, lab, handed_in.timestamp, collected.refused)
         collected.notebooks[student] = path
     if not collected.notebooks:
-        raise KitError(f"There are no submissions in {source}.", f"Each student needs a folder that holds {lab}.ipynb.")
+        why = f" {collected.refused[0]}" if collected.refused else ""
+        raise KitError(
+            f"There are no submissions in {source}.{why}", f"Each student needs a folder that holds {lab}.ipynb."
+        )
     return collected
+
+
+def _of_platform(source: Path, lab: str, roster: Roster | None, collected: Collected) -> dict[str, _HandedIn] | None:
+    """What was handed in by student, if the source is what a learning platform gives out; None if not."""
+    try:
+        files = members(source)
+    except Exception:  # a damaged zip: the plain way says what is wrong with it
+        return None
+    recognised = recognise(files, lab)
+    if recognised is None:
+        return None
+    collected.format = recognised.format
+    collected.refused += [f"{sentence} It was left out." for sentence in recognised.strange]
+    by_student: dict[str, list[Claim]] = {}
+    for claim in recognised.claims:
+        student = roster.student(claim.owner) if roster is not None else _called(claim, recognised.claims)
+        if student is None:
+            who = ", ".join(claim.owner.values())[:100]
+            collected.refused.append(f"{who!r} is no student of the roster, or more than one; it was left out.")
+        else:
+            by_student.setdefault(student, []).append(claim)
+    found: dict[str, _HandedIn] = {}
+    for student, claims in by_student.items():
+        *earlier, last = sorted(claims, key=lambda claim: claim.turn)
+        try:
+            found[student] = _HandedIn(last.member.read(NOTEBOOK_BYTES + 1), last.handed_in.encode())
+        except Exception as error:  # each way of packing fails in its own way; the class goes on
+            collected.refused.append(
+                f"{last.member.name[:100]!r} of {student} cannot be read ({error}); it was left out."
+            )
+            continue
+        for claim in earlier:
+            collected.notes.append(f"{student}: {last.member.name[:100]!r} replaces {claim.member.name[:100]!r}.")
+        if last.late:
+            collected.notes.append(f"{student}: {recognised.format} has marked it as late.")
+    return found
+
+
+def _called(claim: Claim, claims: Sequence[Claim]) -> str:
+    """The name that a platform gives a student; with its number for them where two have one name."""
+    owner = claim.owner
+    name = next(owner[kind] for kind in ("id", "github", "name", "canvas", "email") if owner.get(kind))
+    number = owner.get("canvas_id") or owner.get("moodle_id") or ""
+    others = (other.owner for other in claims if other.owner != owner)
+    return f"{name}_{number}" if number and any(name in other.values() for other in others) else name
+
+
+def _by_roster(found: dict[str, _HandedIn], roster: Roster, collected: Collected) -> dict[str, _HandedIn]:
+    """A folder for each student: their names as the roster has them. Those that it does not have keep theirs."""
+    named: dict[str, _HandedIn] = {}
+    for folder, handed_in in found.items():
+        student = roster.student({"id": folder, "email": folder, "name": folder, "github": folder})
+        if student is None:
+            collected.notes.append(f"{folder[:100]!r} is no student of the roster, and keeps this name.")
+        named[student or folder] = handed_in
+    return named
 
 
 def _keep_timestamp(submitted: Path, student: str, lab: str, content: bytes, refused: list[str]) -> None:
@@ -158,13 +233,18 @@ def _from_folder(source: Path, lab: str, refused: list[str]) -> dict[str, _Hande
             continue
         if entry.is_symlink():
             refused.append(f"{_shown(entry)} is a link; links are not followed, so it was left out.")
+        elif entry.is_file() and entry.suffix.lower() == ".zip":
+            try:
+                found[entry.stem] = _HandedIn(_notebook_in_zip(entry, lab))
+            except _NotUnderstood as reason:
+                refused.append(f"{_shown(entry)} {reason}; it was left out.")
         elif entry.is_dir():
             try:
                 found[entry.name] = _HandedIn(_notebook_in(source, entry.name, lab), _stamp_in(source, entry.name, lab))
             except OSError as error:  # such as a folder that may not be entered: the class goes on
-                found[entry.name] = _HandedIn()
-                why = f"{_shown(entry)} cannot be read ({error.strerror})"
-                refused.append(f"{why}; it counts as handed in without a notebook.")
+                refused.append(f"{_shown(entry)} cannot be read ({error.strerror}); it was left out.")
+            except _NotUnderstood as reason:
+                refused.append(f"{_shown(entry)} {reason}; it was left out.")
     return found
 
 
@@ -173,23 +253,63 @@ def _shown(path: Path) -> str:
 
 
 def _notebook_in(source: Path, student: str, lab: str) -> bytes:
-    """Return a student's notebook: by its name, or the only notebook there is, for downloads get renamed.
+    """Return a student's notebook; empty if there is nothing at all.
 
     Raises:
         OSError: the folder or the notebook may not be read, or a part of the way is a link or something else.
+        _NotUnderstood: nothing says which notebook counts.
     """
     folder = source / student
-    entries = sorted(path.name for path in folder.iterdir())
     inner = folder / lab
-    below = sorted(path.name for path in inner.iterdir()) if inner.is_dir() and not inner.is_symlink() else []
-    for parts in ([f"{lab}.ipynb"], [lab, f"{lab}.ipynb"]):
-        if os.path.lexists(folder.joinpath(*parts)):
-            return read_plain(source, [student, *parts], NOTEBOOK_BYTES + 1)
-    others = [[name] for name in entries if name.endswith(".ipynb")]
-    others = others or [[lab, name] for name in below if name.endswith(".ipynb")]
-    if inner.is_symlink() and not others:
-        return read_plain(source, [student, lab, f"{lab}.ipynb"], 0)  # which says that it is a link
-    return read_plain(source, [student, *others[0]], NOTEBOOK_BYTES + 1) if len(others) == 1 else b""
+    paths: list[tuple[str, ...]] = [(path.name,) for path in sorted(folder.iterdir()) if path != inner]
+    if inner.is_symlink() or (inner.exists() and not inner.is_dir()):
+        paths.append((lab, f"{lab}.ipynb"))  # reading it says what is in the way
+    elif inner.is_dir():
+        paths += [(lab, path.name) for path in sorted(inner.iterdir())]
+    chosen = _choose(paths, lab)
+    return read_plain(source, [student, *chosen], NOTEBOOK_BYTES + 1) if chosen else b""
+
+
+def _notebook_in_zip(path: Path, lab: str) -> bytes:
+    """Return the notebook in one student's zip.
+
+    Raises:
+        _NotUnderstood: the zip cannot be read, or nothing says which notebook counts.
+    """
+    try:
+        files = {member.path: member for member in members(path)}
+        while files and len({parts[0] for parts in files}) == 1 and all(len(parts) > 1 for parts in files):
+            if next(iter(files))[0] == lab:
+                break
+            files = {parts[1:]: member for parts, member in files.items()}
+        chosen = _choose([parts for parts in files if len(parts) == 1 or parts[:-1] == (lab,)], lab)
+        return files[chosen].read(NOTEBOOK_BYTES + 1) if chosen else b""
+    except _NotUnderstood:
+        raise
+    except Exception as error:  # a damaged zip raises many kinds
+        raise _NotUnderstood(f"cannot be read ({error})") from error
+
+
+def _choose(paths: Sequence[tuple[str, ...]], lab: str) -> tuple[str, ...]:
+    """Which of a student's files is the notebook: by its name, or the only one, for downloads get renamed.
+
+    Raises:
+        _NotUnderstood: there are several, or only other files.
+    """
+    for exact in ((f"{lab}.ipynb",), (lab, f"{lab}.ipynb")):
+        if exact in paths:
+            return exact
+    notebooks = [path for path in paths if path[-1].casefold().endswith(".ipynb")]
+    notebooks = [path for path in notebooks if len(path) == 1] or notebooks
+    named = [path for path in notebooks if path[-1].casefold() == f"{lab}.ipynb".casefold()]
+    if len(named) == 1 or len(notebooks) == 1:
+        return (named or notebooks)[0]
+    if notebooks:
+        raise _NotUnderstood(f"holds {len(notebooks)} notebooks, of which none is called {lab}.ipynb")
+    strange = [path[-1] for path in paths if path[-1] != timestamp.FILE_NAME and not path[-1].startswith(".")]
+    if strange:
+        raise _NotUnderstood(f"holds {strange[0][:80]!r} and no notebook")
+    return ()
 
 
 def _stamp_in(source: Path, student: str, lab: str) -> bytes:
@@ -211,7 +331,7 @@ def _open_zip(source: Path, lab: str) -> zipfile.ZipFile:
 
 def _from_zip(source: Path, lab: str, refused: list[str]) -> dict[str, _HandedIn]:
     found: dict[str, _HandedIn] = {}
-    others: dict[str, list[zipfile.ZipInfo]] = {}
+    students: dict[str, dict[tuple[str, ...], zipfile.ZipInfo]] = {}
     with _open_zip(source, lab) as archive:
         members = archive.infolist()
         if len(members) > _MOST_ENTRIES:
@@ -222,17 +342,17 @@ def _from_zip(source: Path, lab: str, refused: list[str]) -> dict[str, _HandedIn
             inside = parts[depth:]
             if len(inside) < 2:
                 continue
-            student, rest = inside[0], inside[1:]
-            handed_in = found.setdefault(student, _HandedIn())
-            if rest in ((f"{lab}.ipynb",), (lab, f"{lab}.ipynb")):
-                handed_in.notebook = _member(archive, member, refused)
-            elif rest in ((timestamp.FILE_NAME,), (lab, timestamp.FILE_NAME)):
-                handed_in.timestamp = _member(archive, member, refused)[: timestamp.MOST_BYTES]
-            elif rest[-1].endswith(".ipynb") and (len(rest) == 1 or rest[:-1] == (lab,)):
-                others.setdefault(student, []).append(member)
-        for student, candidates in others.items():
-            if not found[student].notebook and len(candidates) == 1:
-                found[student].notebook = _member(archive, candidates[0], refused)
+            students.setdefault(inside[0], {})[inside[1:]] = member
+        for student, files in students.items():
+            try:
+                chosen = _choose([rest for rest in files if len(rest) == 1 or rest[:-1] == (lab,)], lab)
+                stamp = files.get((timestamp.FILE_NAME,)) or files.get((lab, timestamp.FILE_NAME))
+                found[student] = _HandedIn(
+                    _member(archive, files[chosen]) if chosen else b"",
+                    _member(archive, stamp)[: timestamp.MOST_BYTES] if stamp else b"",
+                )
+            except _NotUnderstood as reason:
+                refused.append(f"{student[:80]!r} {reason}; it was left out.")
     return found
 
 
@@ -241,7 +361,7 @@ def _paths(members: Sequence[zipfile.ZipInfo], refused: list[str]) -> list[tuple
     paths = []
     bad = []
     for member in members:
-        path = PurePosixPath(_name(member).replace("\\", "/"))
+        path = PurePosixPath(member_name(member).replace("\\", "/"))
         if not path.parts or path.is_absolute() or ".." in path.parts or "\0" in member.orig_filename:
             bad.append(repr(member.orig_filename[:60]))
         elif not member.is_dir() and not any(part.startswith(_PACKERS_PREFIXES) for part in path.parts):
@@ -252,14 +372,6 @@ def _paths(members: Sequence[zipfile.ZipInfo], refused: list[str]) -> list[tuple
     return paths
 
 
-def _name(member: zipfile.ZipInfo) -> str:
-    """A member's name; some packers write UTF-8 without saying so, which then is taken for the DOS character set."""
-    if not member.flag_bits & 0x800:
-        with contextlib.suppress(UnicodeError):
-            return member.filename.encode("cp437").decode("utf-8")
-    return member.filename
-
-
 def _depth(paths: list[tuple[str, ...]], lab: str) -> int:
     """How many folders to skip: 1 if everything lies in one folder that holds the students' folders."""
     one_top = len({path[0] for path in paths}) == 1
@@ -267,12 +379,11 @@ def _depth(paths: list[tuple[str, ...]], lab: str) -> int:
     return 1 if one_top and not is_student and any(len(path) >= 3 for path in paths) else 0
 
 
-def _member(archive: zipfile.ZipFile, member: zipfile.ZipInfo, refused: list[str]) -> bytes:
+def _member(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> bytes:
     try:
         if stat.S_IFMT(member.external_attr >> 16) not in (0, stat.S_IFREG):
             raise OSError("it is a link or something else that is no file")
         with archive.open(member) as file:
             return file.read(NOTEBOOK_BYTES + 1)
     except Exception as error:  # each way of packing fails in its own way (zlib.error, LZMAError); the class goes on
-        refused.append(f"{member.filename[:200]} in the zip cannot be read ({error}); it counts as an empty file.")
-        return b""
+        raise _NotUnderstood(f"holds {member.filename[:200]!r}, which cannot be read ({error})") from error
