@@ -21,7 +21,9 @@ import toy
 from junitparser import JUnitXml
 
 from autograder.core.files import write_beside
+from autograder.core.results import CheckResult, Isolation, Outcome, Status, SubmissionResult
 from autograder.course.lab import load_lab
+from autograder.report.github import annotations, summary
 from autograder.sandbox.isolation import preflight
 from autograder.sandbox.scratch import Scratch
 
@@ -310,3 +312,43 @@ def test_release_writes_what_students_receive(root: Path) -> None:
     assert "YOUR CODE HERE" in text and "secret" not in text and "hello" not in text
     status, out, _ = run(root, "check", "--course", ".", "labs/toy/toy.ipynb")
     assert status == 1 and "0 of 5" in out  # though a program of comments ends as the check wants it
+
+
+def test_check_tells_github_what_is_wrong_and_where(
+    root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    place = tmp_path / "summary.md"
+    monkeypatch.setenv("GITHUB_STEP_SUMMARY", str(place))
+    status, out, _ = run(root, "check", "class/bob/toy.ipynb", "--course", ".", "--github")
+    assert status == 1
+    line = next(line for line in out.splitlines() if line.startswith("::error "))
+    assert "file=class/bob/toy.ipynb" in line and "ZeroDivisionError" in line.rpartition("::")[2]
+    told = place.read_text(encoding="utf-8")
+    assert told.startswith("## toy: ") and "| ✗ |" in told and "ZeroDivisionError" in told
+
+
+def test_what_a_program_prints_is_no_command_and_no_markdown_for_github() -> None:
+    bad = Outcome(status=Status.FAILED, title="a | b, c: d", because="<img src=x>\n::stop-commands::x\n[l](u) 100%")
+    check = CheckResult(max_points=1, points=0, outcomes=[bad], grade_id="check", title="*The* check")
+    what = {"digest": "0", "isolation": Isolation.NONE, "seed": 1, "lab": "toy", "student": "ann"}
+    result = SubmissionResult(checks=[check], problems=[], **what)
+    told = annotations(result, Path("a,b.ipynb"))
+    assert told.count("\n") == 1 and "file=a%2Cb.ipynb" in told and "%0A::stop-commands" in told
+    text = summary(result)
+    assert "<img" not in text and "\\[l\\]" in text and "a \\| b" in text
+
+
+def test_check_goes_on_when_the_notebook_is_saved(root: Path, tmp_path: Path) -> None:
+    notebook = tmp_path / "toy.ipynb"
+    notebook.write_text((root / "class" / "bob" / "toy.ipynb").read_text())
+    process = start(root, "check", str(notebook), "--course", ".", "--watch")
+    assert process.stderr is not None
+    try:
+        for _ in range(2):
+            while "to be saved" not in (line := process.stderr.readline()):
+                assert line, "it ended"
+            notebook.write_text((root / "class" / "ann" / "toy.ipynb").read_text())
+    finally:
+        process.send_signal(signal.SIGINT)
+        out, _ = process.communicate(timeout=60)
+    assert out.index("ZeroDivisionError") < out.index("✓")

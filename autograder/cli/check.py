@@ -2,15 +2,29 @@
 
 from __future__ import annotations
 
+import contextlib
+import os
 import sys
+import time
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from autograder.cli.app import IsolationOption, JsonOption, SeedOption, app
 from autograder.core.errors import KitError
 from autograder.core.results import Isolation
+
+if TYPE_CHECKING:
+    from autograder.core.results import SubmissionResult
+    from autograder.course.lab import Lab
+    from autograder.grading.runner import Settings
+    from autograder.report.audience import Audience
+
+COULD_NOT_FIND_OUT = 3
+"""The exit status when no check failed, and the grader could not find out about one."""
+_LOOK = 0.3
+"""Seconds between two looks at whether the notebook was saved."""
 
 
 @app.command()
@@ -22,18 +36,22 @@ def check(
     instructor: Annotated[bool, typer.Option("--instructor", help="Show what the hidden checks look at.")] = False,
     isolation: IsolationOption = Isolation.FULL,
     seed: SeedOption = None,
+    github: Annotated[
+        bool, typer.Option("--github", help="Write annotations, and a summary, for GitHub Actions.")
+    ] = False,
+    watch: Annotated[bool, typer.Option("--watch", help="Check again whenever the notebook is saved.")] = False,
     course: Annotated[
         Path | None, typer.Option(help="The folder of the course whose checks are run; default: the kit's own.")
     ] = None,
 ) -> None:
-    """Check one notebook as grading would, and report what is wrong and why."""
+    """Check one notebook as grading would, and report what is wrong and why.
+
+    Exit status: 0 all checks passed, 1 some failed, 2 usage or set-up, 3 none failed and of some nobody could find out.
+    """
     if not notebook.is_file():
         raise KitError(f"There is no notebook {notebook}.", "Name an .ipynb file.")
-    from autograder.core.results import Status
     from autograder.course.folder import trusted_course
-    from autograder.grading.runner import WORKERS_FOR_ONE, Settings, run_submission
-    from autograder.report.audience import Audience, result_for
-    from autograder.report.terminal import working
+    from autograder.grading.runner import Settings
     from autograder.sandbox.isolation import choose
     from autograder.submission.reader import lab_of
 
@@ -42,20 +60,70 @@ def check(
         note = "This notebook is the course's own copy of the lab: its checks are run as they stand in it."
         print(f"note: {note}", file=sys.stderr)
     settings = Settings(isolation=choose(isolation), seed=seed)
-    number = f"the {len(found.checks)} checks" if len(found.checks) > 1 else "the check"
-    with working(f"Running {number} of {found.name}: evidence is waited for"):
-        result = run_submission(notebook, notebook.parent.resolve().name, found, settings, workers=WORKERS_FOR_ONE)
     audience: Audience = "instructor" if instructor else "student"
-    if junit is not None:
-        from autograder.core.files import write_beside
-        from autograder.report.export.junit import junit_xml
+    while True:
+        saved = notebook.stat().st_mtime_ns
+        result = _checked(notebook, found, settings)
+        if junit is not None:
+            from autograder.core.files import write_beside
+            from autograder.report.export.junit import junit_xml
 
-        write_beside(junit, junit_xml([result], audience))
+            write_beside(junit, junit_xml([result], audience))
+        _show(result, audience, as_json)
+        if github:
+            _tell_github(result, audience, notebook)
+        if not watch:
+            raise typer.Exit(_status(result))
+        print(f"Waiting for {notebook} to be saved. Ctrl-C ends it.", file=sys.stderr)
+        _wait_for_save(notebook, saved)
+
+
+def _checked(notebook: Path, lab: Lab, settings: Settings) -> SubmissionResult:
+    from autograder.grading.runner import WORKERS_FOR_ONE, run_submission
+    from autograder.report.terminal import working
+
+    number = f"the {len(lab.checks)} checks" if len(lab.checks) > 1 else "the check"
+    with working(f"Running {number} of {lab.name}: evidence is waited for"):
+        return run_submission(notebook, notebook.parent.resolve().name, lab, settings, workers=WORKERS_FOR_ONE)
+
+
+def _show(result: SubmissionResult, audience: Audience, as_json: bool) -> None:
     if as_json:
+        from autograder.report.audience import result_for
+
         print(result_for(result, audience).model_dump_json(indent=1))
     else:
         from autograder.report.terminal import console, submission_view
 
         console().print(submission_view(result, audience))
-    fine = not result.problems and all(check.status is Status.PASSED for check in result.checks)
-    raise typer.Exit(0 if fine else 1)
+
+
+def _tell_github(result: SubmissionResult, audience: Audience, notebook: Path) -> None:
+    """Annotations go to the log, where GitHub reads them; the summary goes to the file that it names."""
+    from autograder.report.audience import result_for
+    from autograder.report.github import annotations, summary
+
+    seen = result_for(result, audience)
+    print(annotations(seen, notebook), end="", flush=True)
+    place = os.environ.get("GITHUB_STEP_SUMMARY")
+    if place:
+        with Path(place).open("a", encoding="utf-8") as file:
+            file.write(summary(seen))
+
+
+def _status(result: SubmissionResult) -> int:
+    from autograder.core.results import Status
+
+    statuses = {check.status for check in result.checks}
+    if result.problems or statuses - {Status.PASSED, Status.UNKNOWN}:
+        return 1
+    return COULD_NOT_FIND_OUT if Status.UNKNOWN in statuses else 0
+
+
+def _wait_for_save(notebook: Path, saved: int) -> None:
+    """Wait until the notebook is another file than it was; while an editor replaces it, there may be none."""
+    while True:
+        time.sleep(_LOOK)
+        with contextlib.suppress(OSError):
+            if notebook.stat().st_mtime_ns != saved:
+                return
