@@ -23,7 +23,7 @@ from junitparser import JUnitXml
 from autograder.core.files import write_beside
 from autograder.core.results import CheckResult, Isolation, Outcome, Status, SubmissionResult
 from autograder.course.lab import load_lab
-from autograder.report.github import annotations, summary
+from autograder.report.github import commands, summary
 from autograder.sandbox.isolation import preflight
 from autograder.sandbox.scratch import Scratch
 
@@ -332,7 +332,7 @@ def test_what_a_program_prints_is_no_command_and_no_markdown_for_github() -> Non
     check = CheckResult(max_points=1, points=0, outcomes=[bad], grade_id="check", title="*The* check")
     what = {"digest": "0", "isolation": Isolation.NONE, "seed": 1, "lab": "toy", "student": "ann"}
     result = SubmissionResult(checks=[check], problems=[], **what)
-    told = annotations(result, Path("a,b.ipynb"))
+    told = commands(result, Path("a,b.ipynb"))
     assert told.count("\n") == 1 and "file=a%2Cb.ipynb" in told and "%0A::stop-commands" in told
     text = summary(result)
     assert "<img" not in text and "\\[l\\]" in text and "a \\| b" in text

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import shutil
@@ -121,10 +122,16 @@ def jupyter(folder: Path) -> Iterator[str]:
     )  # fmt: skip
     try:
         deadline = time.monotonic() + 120
-        while not (found := list(runtime.glob("jpserver-*.json"))):
+        address = ""
+        while not address:
             assert process.poll() is None and time.monotonic() < deadline, "the server does not start"
             time.sleep(0.1)
-        yield json.loads(found[0].read_text())["url"]
+            # It writes where it will listen before it does.
+            with contextlib.suppress(OSError, ValueError, StopIteration):
+                told = json.loads(next(runtime.glob("jpserver-*.json")).read_text())["url"]
+                with urllib.request.urlopen(f"{told}api", timeout=10):
+                    address = told
+        yield address
     finally:
         process.terminate()
         process.wait(30)

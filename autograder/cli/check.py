@@ -101,10 +101,10 @@ def _show(result: SubmissionResult, audience: Audience, as_json: bool) -> None:
 def _tell_github(result: SubmissionResult, audience: Audience, notebook: Path) -> None:
     """Annotations go to the log, where GitHub reads them; the summary goes to the file that it names."""
     from autograder.report.audience import result_for
-    from autograder.report.github import annotations, summary
+    from autograder.report.github import commands, summary
 
     seen = result_for(result, audience)
-    print(annotations(seen, notebook), end="", flush=True)
+    print(commands(seen, notebook), end="", flush=True)
     place = os.environ.get("GITHUB_STEP_SUMMARY")
     if place:
         with Path(place).open("a", encoding="utf-8") as file:

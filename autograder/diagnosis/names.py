@@ -267,7 +267,7 @@ def _elsewhere(scene: Scene, topic: str, kind: str, names: list[str]) -> Diagnos
     if not close:
         return None
     said = f"There is no {kind} on `{topic}`; the nearest topic with one is"
-    return _misspelt(scene, kind, close, said, "topic-name")
+    return _misspelt(scene, kind, close, said, code="topic-name")
 
 
 def _misspelt(scene: Scene, kind: str, close: str, said: str, code: str) -> Diagnosis:
@@ -295,5 +295,5 @@ def why_no_service(scene: Scene, name: str, srv_type: type) -> Diagnosis:
     close = nearest(name, [n for n in names if n not in elsewhere])
     if close and close != name:
         said = f"There is no service `{name}`; the nearest name on the graph is"
-        return _misspelt(scene, "service", close, said, "service-name")
+        return _misspelt(scene, "service", close, said, code="service-name")
     return inside_reason(scene) or Diagnosis(f"No node offers the service `{name}`.", "no-service")

@@ -52,18 +52,19 @@ _LONGEST_KEPT, _MOST_KEPT = 10_000, 1000
 class ColouredCode(Highlight2HTML):  # type: ignore[misc]
     """nbconvert's colouring of code, for what a person wrote; the rest is shown as plain text."""
 
-    _coloured: ClassVar[dict[tuple[str, str | None, str], Any]] = {}
+    kept: ClassVar[dict[tuple[str, str | None, str], Any]] = {}
+    """HTML by source, language and metadata."""
 
     def __call__(self, source: str, language: str | None = None, metadata: Any = None) -> Any:
         """Return the HTML of a code cell; most cells of a class's notebooks are the lab's, and coloured once."""
         if len(source) > _LONGEST_KEPT:
             return self._colour(source, language, metadata)
         cell = source, language, repr(metadata)
-        if cell not in self._coloured:
-            if len(self._coloured) >= _MOST_KEPT:
-                self._coloured.clear()
-            self._coloured[cell] = self._colour(source, language, metadata)
-        return self._coloured[cell]
+        if cell not in self.kept:
+            if len(self.kept) >= _MOST_KEPT:
+                self.kept.clear()
+            self.kept[cell] = self._colour(source, language, metadata)
+        return self.kept[cell]
 
     def _colour(self, source: str, language: str | None, metadata: Any) -> Any:
         return super().__call__(source, "text" if _TOO_LONG_TO_COLOUR.search(source) else language, metadata)

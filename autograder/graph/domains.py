@@ -24,11 +24,37 @@ def is_free(domain: int) -> bool:
     return True
 
 
+def _claimed(domain: int) -> socket.socket | None:
+    """Take a domain among the kit's own processes, for as long as the socket is open; None if another one has it.
+
+    Between the look at its ports and the first participant there is time in which another process may look as well.
+    The name lives in the network namespace, as the ports do, and goes with its process.
+    """
+    claim = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+    try:
+        claim.bind(f"\0ros-domain-{domain}")
+    except OSError:
+        claim.close()
+        return None
+    return claim
+
+
 def free_domains() -> Iterator[int]:
-    """Give domains that nobody on this machine seems to use, without end; one that was given comes again late."""
+    """Give domains that nobody on this machine seems to use, without end; one that was given comes again late.
+
+    The one that was given last is claimed until the next is asked for.
+    """
     order = random.SystemRandom().sample(range(1, LAST + 1), LAST)
     taken_anyway = itertools.cycle(order)
     candidates = itertools.cycle(order)
+    claim: socket.socket | None = None
     while True:
-        found = next((domain for domain in itertools.islice(candidates, LAST) if is_free(domain)), None)
+        earlier, claim, found = claim, None, None
+        for domain in itertools.islice(candidates, LAST):
+            claim = _claimed(domain) if is_free(domain) else None
+            if claim is not None:
+                found = domain
+                break
+        if earlier is not None:
+            earlier.close()
         yield next(taken_anyway) if found is None else found

@@ -12,8 +12,8 @@ from autograder.report import words
 from autograder.report.audience import reason
 
 
-def annotations(result: SubmissionResult, notebook: Path) -> str:
-    """Return the lines that become annotations: errors for what failed, warnings for what nobody could find out.
+def commands(result: SubmissionResult, notebook: Path) -> str:
+    """Return the workflow commands that become annotations: errors for what failed, warnings for what nobody could find out.
 
     Args:
         result: as its reader may see it.
