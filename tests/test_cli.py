@@ -319,12 +319,13 @@ def test_check_tells_github_what_is_wrong_and_where(
 ) -> None:
     place = tmp_path / "summary.md"
     monkeypatch.setenv("GITHUB_STEP_SUMMARY", str(place))
-    status, out, _ = run(root, "check", "class/bob/toy.ipynb", "--course", ".", "--github")
+    hand_in(root, "gil", "1 / 0")
+    status, out, _ = run(root, "check", "class/gil/toy.ipynb", "--course", ".", "--github")
     assert status == 1
     line = next(line for line in out.splitlines() if line.startswith("::error "))
-    assert "file=class/bob/toy.ipynb" in line and "ZeroDivisionError" in line.rpartition("::")[2]
+    assert "file=class/gil/toy.ipynb" in line and "hidden check failed" in line.rpartition("::")[2]
     told = place.read_text(encoding="utf-8")
-    assert told.startswith("## toy: ") and "| ✗ |" in told and "ZeroDivisionError" in told
+    assert told.startswith("## toy: 2 of 5 points") and "| ✗ | The talker | 0 of 3 points |" in told
 
 
 def test_what_a_program_prints_is_no_command_and_no_markdown_for_github() -> None:
@@ -333,22 +334,23 @@ def test_what_a_program_prints_is_no_command_and_no_markdown_for_github() -> Non
     what = {"digest": "0", "isolation": Isolation.NONE, "seed": 1, "lab": "toy", "student": "ann"}
     result = SubmissionResult(checks=[check], problems=[], **what)
     told = commands(result, Path("a,b.ipynb"))
-    assert told.count("\n") == 1 and "file=a%2Cb.ipynb" in told and "%0A::stop-commands" in told
+    assert told.count("\n") == 1 and "file=a%2Cb.ipynb" in told and "\n::stop" not in told
     text = summary(result)
     assert "<img" not in text and "\\[l\\]" in text and "a \\| b" in text
 
 
 def test_check_goes_on_when_the_notebook_is_saved(root: Path, tmp_path: Path) -> None:
     notebook = tmp_path / "toy.ipynb"
-    notebook.write_text((root / "class" / "bob" / "toy.ipynb").read_text())
+    wrong, right = (hand_in(root, who, text) for who, text in (("gil", "1 / 0"), ("hal", "print('hello')")))
+    notebook.write_text(wrong.read_text())
     process = start(root, "check", str(notebook), "--course", ".", "--watch")
     assert process.stderr is not None
     try:
         for _ in range(2):
             while "to be saved" not in (line := process.stderr.readline()):
                 assert line, "it ended"
-            notebook.write_text((root / "class" / "ann" / "toy.ipynb").read_text())
+            notebook.write_text(right.read_text())
     finally:
         process.send_signal(signal.SIGINT)
         out, _ = process.communicate(timeout=60)
-    assert out.index("ZeroDivisionError") < out.index("✓")
+    assert out.index("toy: 2 of 5 points") < out.index("toy: 5 of 5 points")

@@ -13,7 +13,7 @@ from autograder.report.audience import reason
 
 
 def commands(result: SubmissionResult, notebook: Path) -> str:
-    """Return the workflow commands that become annotations: errors for what failed, warnings for what nobody could find out.
+    """Return the workflow commands that become annotations: errors for failures, warnings for what nobody found out.
 
     Args:
         result: as its reader may see it.
