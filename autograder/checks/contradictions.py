@@ -44,9 +44,10 @@ def overlap_by_hand(insides: Sequence[Inside], topic: str, title: str) -> str:
     if any(other.awaited for other in inside.things.values()):
         return ""
     most = max((executor.most for executor in inside.executors), default=0)
+    together = f"at most {most}" if most > 1 else "no two"
     return (
         f"{title}: the messages on `{topic}` say so. But inside `{inside.name}` one thread published all "
-        f"{thing.runs} of them. Callbacks that ran at once, as far as was seen: {most}."
+        f"{thing.runs} of them, and {together} callbacks were seen to run at once."
     )
 
 
