@@ -83,3 +83,13 @@ def test_an_example_is_taken_from_what_students_may_see() -> None:
     )
     for example in check_api.examples().values():
         assert example.splitlines()[0].removesuffix(":") in released
+
+
+def test_hints_lead_to_sections_that_the_lectures_have() -> None:
+    sources = [*(ROOT / "autograder").rglob("*.py"), *(ROOT / "solutions").glob("*/*.ipynb")]
+    texts = [path.read_text(encoding="utf-8") for path in sources]
+    named = {found for text in texts for found in re.findall(r"Lecture (\d), section '([^']+)'", text)}
+    assert len(named) > 3
+    for number, section in named:
+        lecture = next((ROOT / "lectures").glob(f"0{number}_*.md")).read_text(encoding="utf-8")
+        assert re.search(rf"^##+ {re.escape(section)}$", lecture, re.MULTILINE), (number, section)
