@@ -102,8 +102,8 @@ def _send_goal(session: Session, options: Any) -> None:
     if not handle.accepted:
         print("Goal was rejected.")
         return
-    print(f"Goal accepted with ID: {bytes(handle.goal_id.uuid).hex()}\n", flush=True)
-    try:
+    try:  # from here on, printing included: Ctrl-C may come as soon as the goal is seen to be accepted
+        print(f"Goal accepted with ID: {bytes(handle.goal_id.uuid).hex()}\n", flush=True)
         ended = session.answer(handle.get_result_async())
     except BaseException:
         _cancel(session, handle)

@@ -18,6 +18,9 @@ _SAID = {"SIGINT": "Ctrl-C (SIGINT)", "SIGTERM": "SIGTERM"}
 _ENDED = "`main` has to catch what spinning raises then: `KeyboardInterrupt` and `ExternalShutdownException`. "
 _ENDED += "After that `rclpy.try_shutdown()` is right, which does nothing where the signal has shut rclpy down already."
 
+_SPINS_WITHIN = 3.0
+"""Seconds for which a program is let alone until it spins: before that it has not reached what catches the signal."""
+
 _RACE_OF_RCLPY = "failed to initialize wait set: the given context is not valid"
 """What rclpy raises once in a while if the signal comes just when it begins to wait: no mistake of the program's."""
 
@@ -106,6 +109,7 @@ class EndingExpectations(ProgramExpectations):
         program = self.program(name)
         title = f"`{name}` ends cleanly at {_SAID[by]}"
         self._running.may_end.append(program)
+        self._observer.wait(lambda: self._spun(program) or not program.running(), _SPINS_WITHIN)
         said_before = len(program.output())
         program.signal(getattr(signal, by))
         if not self._observer.wait(lambda: not program.running(), within):
@@ -130,6 +134,11 @@ class EndingExpectations(ProgramExpectations):
             observed=f"exit status {status}" + (" and an error" if error is not None else ""),
             hint=hint,
         )
+
+    def _spun(self, program: RunningProgram) -> bool:
+        """Whether a program has come to spin; its node is on the graph before its `__init__` is over."""
+        inside = self._scene().inside(program)
+        return any(executor.spins for executor in inside.executors)
 
     def _place_of(self, program: RunningProgram) -> str:
         """Where the main thread of a program is, as the end of a sentence; empty if that cannot be seen."""
