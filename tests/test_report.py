@@ -15,7 +15,8 @@ from rich.console import Console
 from autograder.core.results import CheckResult, Isolation, NodeLog, Outcome, Part, Status, SubmissionResult
 from autograder.report.audience import Audience, result_for
 from autograder.report.export.csv_table import to_csv
-from autograder.report.export.gradescope import to_gradescope
+from autograder.report.export.entry import Entry
+from autograder.report.export.gradescope import results_json
 from autograder.report.export.junit import junit_xml
 from autograder.report.html import check_html, submission_html
 from autograder.report.terminal import check_text, check_view, class_view, submission_view, undecided_view
@@ -83,7 +84,7 @@ def test_every_view_masks_hidden_checks_for_students_only(audience: Audience) ->
         assert "See lecture 2." in view
         assert ("secret" in view) == (audience == "instructor")
         assert ("A hidden check failed" in view) == (audience == "student")
-    assert "secret" not in to_gradescope([shown])
+    assert "secret" not in results_json(shown)
 
 
 def test_html_lets_nothing_of_a_students_act() -> None:
@@ -223,8 +224,9 @@ def test_junit_counts_failures_and_errors() -> None:
 
 def test_csv_and_gradescope_leave_undecided_points_open() -> None:
     class_ = [result(check(None, outcome(Status.UNKNOWN, code="grader")))]
-    assert "ann,lab,check,,3,could not find out,grader" in to_csv(class_)
-    assert "score" not in json.loads(to_gradescope(class_))["ann/lab"]["tests"][0]
+    entries = [Entry(one.student, one.lab, one) for one in class_]
+    assert "ann,lab,check,,3,could not find out,grader" in to_csv(entries, "").content
+    assert "score" not in json.loads(results_json(class_[0]))["tests"][0]
 
 
 def test_what_contradicts_itself_is_shown_to_instructors_only() -> None:

@@ -33,6 +33,7 @@ def check(
     lab: Annotated[str | None, typer.Option(help="The lab it answers, where its name does not say.")] = None,
     as_json: JsonOption = False,
     junit: Annotated[Path | None, typer.Option(help="Also write JUnit XML to this file.")] = None,
+    gradescope: Annotated[Path | None, typer.Option(help="Also write Gradescope's results.json to this file.")] = None,
     instructor: Annotated[bool, typer.Option("--instructor", help="Show what the hidden checks look at.")] = False,
     isolation: IsolationOption = Isolation.FULL,
     seed: SeedOption = None,
@@ -69,6 +70,11 @@ def check(
             from autograder.report.export.junit import junit_xml
 
             write_beside(junit, junit_xml([result], audience))
+        if gradescope is not None:
+            from autograder.core.files import write_beside
+            from autograder.report.export.gradescope import results_json
+
+            write_beside(gradescope, results_json(result))
         _show(result, audience, as_json)
         if github:
             _tell_github(result, audience, notebook)

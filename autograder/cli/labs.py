@@ -1,4 +1,4 @@
-"""Commands for who keeps a course: `new`, `lint`, `release` and `package`."""
+"""Commands for who keeps a course: `new`, `lint`, `release`, `package` and `gradescope`."""
 
 from __future__ import annotations
 
@@ -113,3 +113,15 @@ def package(
     program = min(path.stem for path in (written / name).glob("*.py") if path.stem != "__init__")
     start = f"ros2 launch {name} {launch[-1]}" if launch else f"ros2 run {name} {program}"
     print(f"  source install/setup.bash\n  {start}")
+
+
+@app.command()
+def gradescope(
+    lab: Annotated[str, typer.Argument(help="The lab, such as lab2_executors.")],
+    file: Annotated[Path, typer.Argument(metavar="FILE.zip", help="Where to write it.")],
+) -> None:
+    """Write a lab's autograder for Gradescope: a zip to upload, which checks each submission as it is handed in."""
+    from autograder.authoring.gradescope import write_gradescope
+    from autograder.course.folder import course_root
+
+    print(write_gradescope(course_root(), lab, file))

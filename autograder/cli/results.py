@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from autograder.cli.app import app
 from autograder.core.errors import KitError
-from autograder.report.export import FORMATS  # small, and the command's help names them all
+from autograder.report.export import FORMATS, SEVERAL_LABS  # small, and the command's help names them all
+
+if TYPE_CHECKING:
+    from autograder.report.export.entry import Entry
+
+LEFT_OUT = 3
+"""The exit status when somebody of the class is not in an export."""
 
 
 @app.command()
@@ -32,20 +39,44 @@ def export(
     form: Annotated[str, typer.Argument(metavar="FORMAT", help=f"One of: {', '.join(FORMATS)}.")],
     lab: Annotated[str | None, typer.Option(help="Only this lab.")] = None,
     output: Annotated[Path | None, typer.Option("--output", "-o", help="File to write; default: print it.")] = None,
+    column: Annotated[
+        str, typer.Option(help="Heading of the column, as the platform's own export names it; default: the lab's name.")
+    ] = "",
 ) -> None:
-    """Export the stored results for another program."""
+    """Export a graded class: for Canvas, Moodle, Blackboard, Gradescope, a CI server or a table program.
+
+    Exit status: 0, or 3 if somebody is not in it, which is said with the reason.
+    """
     from autograder.core.files import write_beside
     from autograder.course.folder import course_root
-    from autograder.grading.store import ResultStore
+    from autograder.gradebook.class_entries import class_entries
 
     if form not in FORMATS:
         raise KitError(f"There is no format `{form}`.", f"Name one of: {', '.join(FORMATS)}.")
-    results = ResultStore(course_root()).all(lab)
-    if not results:
+    entries = class_entries(course_root(), lab)
+    if not entries:
         raise KitError("There are no results to export.", "Grade a class first: autograder grade LAB")
-    text = FORMATS[form](results)
-    if output is None:
-        print(text, end="")
-    else:
-        write_beside(output, text)
+    labs = sorted({entry.lab for entry in entries})
+    if len(labs) > 1 and form not in SEVERAL_LABS:
+        raise KitError(f"The format `{form}` holds one lab.", f"Name it: --lab LAB, one of {', '.join(labs)}.")
+    made = FORMATS[form](entries, column)
+    if output is not None:
+        write_beside(output, made.content)
         print(output)
+    elif isinstance(made.content, str):
+        print(made.content, end="")
+    else:
+        raise KitError(f"The format `{form}` is a zip file.", "Name a file for it: --output FILE.zip")
+    _say(made.left_out, entries)
+    raise typer.Exit(LEFT_OUT if made.left_out else 0)
+
+
+def _say(left_out: list[str], entries: list[Entry]) -> None:
+    from autograder.report.terminal import plain  # students named themselves
+
+    waiting = sum(1 for entry in entries if entry.grade is not None and entry.grade.waiting)
+    if waiting:
+        told = f"{waiting} of {len(entries)} submissions have answers that nobody has graded yet"
+        print(f"{told}; those count 0 until then.", file=sys.stderr)
+    for sentence in left_out:
+        print(plain(sentence), file=sys.stderr)

@@ -47,6 +47,10 @@ class CoursePaths:
         """What checking found out: `<lab>/<student>.json`."""
         return self.build / "results"
 
+    def taken(self, lab: str) -> Path:
+        """Who is in the class of a lab, and what their learning platform calls them."""
+        return self.build / "taken" / f"{lab}.json"
+
     @property
     def gradebook(self) -> Path:
         """nbgrader's database."""

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import csv
 import io
+import math
 from pathlib import Path
 
 from autograder.core.files import modified, write_beside
 from autograder.course.paths import CoursePaths
-from autograder.gradebook.preparation import prepare_nbgrader
-from autograder.gradebook.settings import gradebook_address, gradebook_file
+from autograder.gradebook.scores import read_grades
+from autograder.gradebook.settings import gradebook_file
 
 
 def write_grades(root: Path) -> Path:
@@ -22,25 +23,18 @@ def write_grades(root: Path) -> Path:
     paths = CoursePaths(root)
     path = paths.grades
     file = gradebook_file(root)
-    if file is not None and modified(path) > modified(file):
+    newest = (
+        max(map(modified, (file, *sorted(paths.taken("").parent.glob("*.json"))))) if file is not None else math.inf
+    )
+    if modified(path) > newest:
         return path
-    prepare_nbgrader()
-    from nbgrader.api import Gradebook
-
-    rows: list[tuple[str, str, str, str, int]] = []
-    with Gradebook(gradebook_address(root)) as gradebook:
-        for assignment in gradebook.assignments:
-            answers = {cell.name for notebook in assignment.notebooks for cell in notebook.solution_cells}
-            for submission in assignment.submissions:
-                grades = [grade for notebook in submission.notebooks for grade in notebook.grades]
-                waiting = [grade.name for grade in grades if grade.auto_score is None and grade.manual_score is None]
-                left = max(0.0, sum(grade.score for grade in grades) - submission.late_submission_penalty)
-                score = "" if set(waiting) - answers else f"{left:g}"
-                top = f"{sum(grade.max_score for grade in grades):g}"
-                rows.append((submission.student_id, assignment.name, score, top, len(waiting)))
+    rows = []
+    for grade in read_grades(root):
+        score = "" if grade.score is None else f"{grade.score:g}"
+        rows.append((grade.student, grade.lab, score, f"{grade.max_score:g}", len(grade.waiting)))
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(("student", "lab", "score", "max_score", "waiting"))
-    writer.writerows(sorted(rows))
+    writer.writerows(rows)
     write_beside(path, text.getvalue())
     return path

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 from pathlib import Path
 
 from autograder.core.results import SCHEMA_VERSION, Isolation, SubmissionResult
 from autograder.course.lab import Lab
 from autograder.course.paths import CoursePaths
 from autograder.grading.validation import validated
+from autograder.intake.record import read_class
 
 
 class ResultStore:
@@ -19,7 +21,7 @@ class ResultStore:
 
     def __init__(self, root: Path) -> None:
         """Nothing is read or written before it is asked for."""
-        self._folder = CoursePaths(root).results
+        self._root, self._folder = root, CoursePaths(root).results
 
     def path(self, lab: str, student: str) -> Path:
         """Where the result of a submission is kept."""
@@ -54,11 +56,15 @@ class ResultStore:
         return validated(result, lab.checks) if fits else None
 
     def all(self, lab: str | None = None) -> list[SubmissionResult]:
-        """Return every stored result, or those of one lab, sorted by lab and student; unreadable ones are left out."""
+        """Return every stored result, or those of one lab, sorted by lab and student.
+
+        Unreadable ones are left out, and those of students who have left the class.
+        """
         results = []
         for path in sorted(self._folder.glob(f"{lab or '*'}/*.json")):
-            try:
-                results.append(SubmissionResult.load(path))
-            except (OSError, ValueError):
+            taken = read_class(self._root, path.parent.name).get(path.stem)
+            if taken is not None and taken.left:
                 continue
+            with contextlib.suppress(OSError, ValueError):
+                results.append(SubmissionResult.load(path))
         return results

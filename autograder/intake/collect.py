@@ -14,7 +14,7 @@ import re
 import stat
 import unicodedata
 import zipfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
 
@@ -23,6 +23,7 @@ from autograder.core.files import read_plain, write_beside
 from autograder.course.paths import CoursePaths
 from autograder.intake.formats import Claim, recognise
 from autograder.intake.members import member_name, members
+from autograder.intake.record import Taken, keep_class
 from autograder.intake.roster import FILE_NAME, Roster, read_roster
 from autograder.submission import timestamp
 from autograder.submission.notebook_file import NOTEBOOK_BYTES
@@ -58,6 +59,10 @@ class _HandedIn:
     """Empty: there is none that can be used."""
     timestamp: bytes = b""
     """Empty: nothing says when it was handed in."""
+    file: str = ""
+    owner: Mapping[str, str] = field(default_factory=dict)
+    late: bool = False
+    """These three as in `Taken`."""
 
 
 @dataclass
@@ -98,6 +103,7 @@ def collect(source: Path, lab: str, root: Path) -> Collected:
     if found and not (paths.build / "nbgrader_config.py").is_file():
         write_beside(paths.build / "nbgrader_config.py", _CLOSED)
     owners: dict[str, str] = {}
+    taken: dict[str, Taken] = {}
     for folder, handed_in in sorted(found.items(), key=lambda item: item[0]):
         student = _student(folder)
         if student is None:
@@ -117,11 +123,15 @@ def collect(source: Path, lab: str, root: Path) -> Collected:
             write_beside(path, handed_in.notebook)
         _keep_timestamp(paths.submitted, student, lab, handed_in.timestamp, collected.refused)
         collected.notebooks[student] = path
+        taken[student] = Taken(
+            source=str(source.resolve()), file=handed_in.file, owner=dict(handed_in.owner), late=handed_in.late
+        )
     if not collected.notebooks:
         why = f" {collected.refused[0]}" if collected.refused else ""
         raise KitError(
             f"There are no submissions in {source}.{why}", f"Each student needs a folder that holds {lab}.ipynb."
         )
+    collected.notes += keep_class(root, lab, source, taken, complete=not collected.refused)
     return collected
 
 
@@ -148,12 +158,13 @@ def _of_platform(source: Path, lab: str, roster: Roster | None, collected: Colle
     for student, claims in by_student.items():
         *earlier, last = sorted(claims, key=lambda claim: claim.turn)
         try:
-            found[student] = _HandedIn(last.member.read(NOTEBOOK_BYTES + 1), last.handed_in.encode())
+            content = last.member.read(NOTEBOOK_BYTES + 1)
         except Exception as error:  # each way of packing fails in its own way; the class goes on
             collected.refused.append(
                 f"{last.member.name[:100]!r} of {student} cannot be read ({error}); it was left out."
             )
             continue
+        found[student] = _HandedIn(content, last.handed_in.encode(), "/".join(last.member.path), last.owner, last.late)
         for claim in earlier:
             collected.notes.append(f"{student}: {last.member.name[:100]!r} replaces {claim.member.name[:100]!r}.")
         if last.late:

@@ -2,16 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 
-from autograder.core.results import SubmissionResult
+from autograder.report.export.blackboard import to_blackboard
+from autograder.report.export.canvas import to_canvas, to_canvas_feedback
 from autograder.report.export.csv_table import to_csv
+from autograder.report.export.entry import Format
 from autograder.report.export.gradescope import to_gradescope
-from autograder.report.export.junit import junit_xml
+from autograder.report.export.junit import to_junit
+from autograder.report.export.moodle import to_moodle, to_moodle_feedback
 
-FORMATS: Mapping[str, Callable[[Sequence[SubmissionResult]], str]] = {
+FORMATS: Mapping[str, Format] = {
     "csv": to_csv,
-    "junit": junit_xml,
+    "junit": to_junit,
+    "canvas": to_canvas,
+    "canvas-feedback": to_canvas_feedback,
+    "moodle": to_moodle,
+    "moodle-feedback": to_moodle_feedback,
+    "blackboard": to_blackboard,
     "gradescope": to_gradescope,
 }
 """What writes a format, by the name that `autograder export` knows it by."""
+SEVERAL_LABS = frozenset({"csv", "junit", "gradescope"})
+"""Formats that hold several labs at once."""

@@ -1,30 +1,78 @@
-"""Gradescope's results.json."""
+"""Gradescope's results.json. Source: Gradescope's "Autograder Specifications"."""
 
 from __future__ import annotations
 
+import io
 import json
+import zipfile
 from collections.abc import Sequence
+from typing import Any
 
-from autograder.core.results import Status, SubmissionResult
+from autograder.core.grades import Grade
+from autograder.core.results import CheckResult, Outcome, Status, SubmissionResult
+from autograder.report import words
 from autograder.report.audience import reason, result_for
+from autograder.report.export.entry import Entry, Export
 
 
-def to_gradescope(results: Sequence[SubmissionResult]) -> str:
-    """Return Gradescope's results.json by student, as a student may see it; an undecided check has no score."""
-    by_student = {}
-    for full in results:
-        result = result_for(full, "student")
-        tests = []
-        for check in result.checks:
-            bad = [outcome for outcome in check.outcomes if outcome.status is not Status.PASSED]
-            test = {
-                "name": check.title or check.grade_id,
-                "max_score": check.max_points,
-                "status": "passed" if check.status is Status.PASSED else "failed",
-                "output": "\n".join(f"{outcome.status.value}: {reason(outcome)}" for outcome in bad),
-            }
-            if check.points is not None:
-                test["score"] = check.points
-            tests.append(test)
-        by_student[f"{result.student}/{result.lab}"] = {"tests": tests}
-    return json.dumps(by_student, indent=1) + "\n"
+def to_gradescope(entries: Sequence[Entry], _: str) -> Export:
+    """Return a zip with `LAB/STUDENT/results.json` for each submission, as a student may see it."""
+    content = io.BytesIO()
+    with zipfile.ZipFile(content, "w", zipfile.ZIP_DEFLATED) as archive:
+        for entry in entries:
+            name = f"{entry.lab}/{entry.student}/results.json"
+            archive.writestr(zipfile.ZipInfo(name), results_json(entry.result, entry.grade))
+    return Export(content.getvalue())
+
+
+def results_json(full: SubmissionResult, grade: Grade | None = None) -> str:
+    """Return the results.json of one submission, as a student may see it.
+
+    Args:
+        full: what checking found out.
+        grade: what the gradebook has of it, with points by hand and penalties; None: what checking found counts.
+    """
+    result = result_for(full, "student")
+    graded = {cell.grade_id: cell for cell in grade.cells} if grade is not None else {}
+    tests = []
+    for check in result.checks:
+        cell = graded.pop(check.grade_id, None)
+        tests.append(_test(check, check.points if cell is None else cell.points))
+    for cell in graded.values():
+        test: dict[str, Any] = {"name": cell.grade_id, "max_score": cell.max_points, "output": cell.comment}
+        test |= {"output": "Not graded yet."} if cell.points is None else {"score": round(cell.points, 2)}
+        tests.append(test)
+    if grade is not None and grade.penalty:
+        tests.append({"name": "Late submission", "score": round(-grade.penalty, 2), "max_score": 0, "output": ""})
+    # A total of its own: of an undecided check Gradescope must not make up a score.
+    total = result.points if grade is None else max(0.0, sum(c.points or 0.0 for c in grade.cells) - grade.penalty)
+    said = [f"{problem.title}: {reason(problem)}" for problem in result.problems]
+    undecided = sum("score" not in test for test in tests)
+    if undecided:
+        said.append(f"{undecided} of the parts below {'is' if undecided == 1 else 'are'} not graded yet.")
+    made = {
+        "score": round(total, 2),
+        "execution_time": round(result.seconds.get("total", 0.0)),
+        "output": "\n".join(said),
+        "stdout_visibility": "hidden",
+        "tests": tests,
+        "extra_data": {"lab": result.lab, "isolation": result.isolation.value, "seed": result.seed},
+    }
+    return json.dumps(made, indent=1) + "\n"
+
+
+def _test(check: CheckResult, earned: float | None) -> dict[str, Any]:
+    test: dict[str, Any] = {"name": check.title or check.grade_id, "max_score": check.max_points}
+    test["output"] = "\n\n".join(_text(outcome) for outcome in check.outcomes if outcome.status is not Status.PASSED)
+    if earned is not None:
+        test["score"] = round(earned, 2)
+        test["status"] = "passed" if earned >= check.max_points else "failed"
+    else:
+        test["output"] = f"{words.points(check)}\n\n{test['output']}"
+    return test
+
+
+def _text(outcome: Outcome) -> str:
+    pairs = ("expected", outcome.expected), ("observed", outcome.observed), ("because", outcome.because)
+    lines = [f"{outcome.status.value}: {outcome.title}"]
+    return "\n".join([*lines, *(f"  {label}: {text}" for label, text in (*pairs, ("try", outcome.hint)) if text)])

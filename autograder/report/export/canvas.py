@@ -1,0 +1,44 @@
+"""Canvas's gradebook: the CSV file that it imports, and the zip of feedback that an assignment takes.
+
+Sources: Canvas's guide to importing grades, and `lib/gradebook_importer.rb` and `infer_comment_context_from_filename`
+of its published source.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import PurePosixPath
+
+from autograder.report.export.entry import Entry, Export, header, scores
+from autograder.report.export.feedback_zip import feedback_zip
+from autograder.report.export.tables import table
+
+
+def to_canvas(entries: Sequence[Entry], column: str) -> Export:
+    """Return Canvas's table. It finds a student by `ID`, then by SIS user id or login, then by name.
+
+    A new column makes an assignment; one that exists is named as Canvas's own export names it, `Lab 2 (4711)`.
+    """
+    left_out: list[str] = []
+    found = scores(entries, left_out)
+    top = max((most for _, _, most in found), key=float, default="0")
+    rows = [("Student", "ID", "SIS User ID", "SIS Login ID", "Section", header(entries, column))]
+    rows.append(("    Points Possible", "", "", "", "", top))
+    for entry, score, _ in found:
+        known = entry.known
+        login = known.get("canvas_login") or known.get("email", "")
+        name = known.get("name") or entry.student
+        rows.append(
+            (name, known.get("canvas_id", ""), known.get("id", entry.student), login, known.get("section", ""), score)
+        )
+    return Export(table(rows), left_out)
+
+
+def to_canvas_feedback(entries: Sequence[Entry], _: str) -> Export:
+    """Return the zip for "Upload submissions": Canvas reads user and upload from the names that it gave out."""
+    return feedback_zip(entries, "Canvas", _place)
+
+
+def _place(entry: Entry) -> str:
+    name = PurePosixPath(entry.file).name
+    return str(PurePosixPath(name).with_suffix(".html")) if "canvas_id" in entry.known and name else ""

@@ -1,0 +1,69 @@
+"""What an export is made of: a class's submissions with results, grades and the names that platforms have for them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from autograder.core.grades import Grade
+from autograder.core.results import SubmissionResult
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One submission."""
+
+    student: str
+    lab: str
+    result: SubmissionResult
+    grade: Grade | None = None
+    """None: the gradebook does not have it."""
+    known: Mapping[str, str] = field(default_factory=dict)
+    """What platforms call the student, by kind, such as `name`, `email`, `canvas_id`."""
+    file: str = ""
+    """The path under which a platform gave the notebook out; empty if none did."""
+    feedback: Path | None = None
+    """The student's page; None: there is none."""
+
+
+@dataclass
+class Export:
+    """What an export comes to."""
+
+    content: str | bytes
+    left_out: list[str] = field(default_factory=list)
+    """Who is not in it, and why, as sentences."""
+
+
+Format = Callable[[Sequence[Entry], str], Export]
+"""Makes an export of entries, sorted by lab and student, and the name of the column in the platform's gradebook."""
+
+
+def points(number: float) -> str:
+    """Return points as every table writes them: at most two decimals, none that say nothing."""
+    return f"{round(number, 2):g}"
+
+
+def scores(entries: Sequence[Entry], left_out: list[str]) -> list[tuple[Entry, str, str]]:
+    """Return each entry with its score and maximum; an undecided score is empty, and the platform's stays as it is.
+
+    Args:
+        entries: of one lab.
+        left_out: gets a sentence about each that has no grade.
+    """
+    found = []
+    for entry in entries:
+        if entry.grade is None:
+            left_out.append(f"{entry.student} is not in the gradebook: run autograder grade {entry.lab} once more.")
+            continue
+        if entry.grade.score is None:
+            left_out.append(f"{entry.student} has no score yet: a check waits for your verdict in formgrader.")
+        score = "" if entry.grade.score is None else points(entry.grade.score)
+        found.append((entry, score, points(entry.grade.max_score)))
+    return found
+
+
+def header(entries: Sequence[Entry], column: str) -> str:
+    """Return the heading of the column of scores: what was asked for, or the lab's name."""
+    return column or entries[0].lab

@@ -1,0 +1,51 @@
+"""Moodle's assignment: the offline grading worksheet, and the zip of feedback files.
+
+Sources: Moodle's documentation of both, and `importgradeslib.php` and `importziplib.php` of its published source.
+"""
+
+from __future__ import annotations
+
+import datetime
+from collections.abc import Sequence
+
+from autograder.report.export.entry import Entry, Export, scores
+from autograder.report.export.feedback_zip import feedback_zip
+from autograder.report.export.tables import table
+
+_COLUMNS = (
+    "Identifier", "Full name", "Email address", "Grade", "Maximum Grade", "Last modified (grade)", "Feedback comments",
+)  # fmt: skip
+
+
+def to_moodle(entries: Sequence[Entry], _: str) -> Export:
+    """Return the worksheet. Moodle finds a student by `Identifier`, which ends in the number of the submissions' zip.
+
+    It skips a grade that was changed in Moodle after the time in the worksheet, which is that of the export.
+    """
+    left_out: list[str] = []
+    now = datetime.datetime.now(datetime.UTC)
+    changed = f"{now:%A}, {now.day} {now:%B %Y}, {now:%I:%M %p} UTC"
+    rows: list[tuple[str, ...]] = [_COLUMNS]
+    for entry, score, most in scores(entries, left_out):
+        number = entry.known.get("moodle_id", "")
+        if not number:
+            left_out.append(f"{entry.student} has no `moodle_id`, by grading Moodle's zip or in roster.csv.")
+            continue
+        grade = entry.grade
+        comments = [cell.comment for cell in grade.cells if cell.comment] if grade is not None else []
+        name, email = entry.known.get("name") or entry.student, entry.known.get("email", "")
+        rows.append((f"Participant {number}", name, email, score, most, changed, "\n".join(comments)))
+    return Export(table(rows), left_out)
+
+
+def to_moodle_feedback(entries: Sequence[Entry], _: str) -> Export:
+    """Return the zip for "Upload multiple feedback files in a zip": folders as in the zip of the submissions."""
+    return feedback_zip(entries, "Moodle", _place)
+
+
+def _place(entry: Entry) -> str:
+    number = entry.known.get("moodle_id", "")
+    given = next((part for part in entry.file.split("/") if "_assignsubmission_" in part), "")
+    name = (entry.known.get("name") or entry.student).replace("_", " ").replace("/", " ")
+    folder = given or (f"{name}_{number}_assignsubmission_file" if number else "")
+    return f"{folder}/{entry.lab}.html" if folder else ""

@@ -1,0 +1,193 @@
+"""What goes back from a graded class: every table, page and zip shows the gradebook's number, for the right student."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import os
+import zipfile
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import pytest
+import toy
+from junitparser import JUnitXml
+
+from autograder.core.results import Isolation
+from autograder.course.lab import load_lab
+from autograder.gradebook.class_entries import class_entries
+from autograder.gradebook.class_run import ClassRun, grade_class
+from autograder.gradebook.preparation import prepare_nbgrader
+from autograder.gradebook.scores import read_grades
+from autograder.gradebook.settings import gradebook_address, gradebook_file
+from autograder.grading.executors import local
+from autograder.grading.runner import Settings
+from autograder.grading.validation import validated
+from autograder.intake.formats import recognise
+from autograder.intake.members import members
+from autograder.intake.roster import read_roster
+from autograder.report.export import FORMATS
+
+ROSTER = """id,name,email,section,canvas_id,moodle_id
+ann,"Doe, Ann",ann@example.edu,A,12345,501
+bob,Bob Müller,bob@example.edu,B,12346,502
+cem,=1+1,cem@example.edu,B,12347,503
+"""
+FILES = {
+    "ann": "doeann_12345_678901_toy.ipynb",
+    "bob": "mullerbob_LATE_12346_678902_toy-2.ipynb",
+    "cem": "11_12347_678903_toy.ipynb",
+}
+SCORES = {"ann": 9.5, "bob": 2.5, "cem": None}
+"""Ann: 5 by checks, 4 and half a point of extra credit by hand. Bob: 2 by a check, 1.5 by hand, 1 for being late."""
+
+
+@dataclass
+class Graded:
+    """The class and where it lies."""
+
+    root: Path
+    source: Path
+    run: ClassRun
+    pages: dict[str, str] = field(default_factory=dict)
+    """Feedback, by student."""
+
+    def export(self, form: str, column: str = "") -> Any:
+        return FORMATS[form](class_entries(self.root, toy.LAB), column)
+
+
+def answers(root: Path, talker: str, why: str = "Because of that.") -> str:
+    sources = {"talker": f"%%node talker\n{talker}", "answers": "%%file answers.yaml\nanswer: 42", "why": why}
+    return json.dumps(load_lab(root, toy.LAB).clean_notebook(sources))
+
+
+def grade(root: Path, source: Path) -> ClassRun:
+    return grade_class(root, toy.LAB, source, Settings(isolation=Isolation.NONE))
+
+
+@pytest.fixture(scope="module")
+def graded(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Graded]:
+    """A class of three from Canvas, checked, then graded by hand."""
+    patch = pytest.MonkeyPatch()
+    patch.setattr(local, "run_in_worker", lambda job, *_: validated(toy.judge(job), job.checks))
+    root = toy.make_course(tmp_path_factory.mktemp("handed_back") / "course")
+    (root / "roster.csv").write_text(ROSTER, encoding="utf-8")
+    source = root.parent / "submissions"
+    source.mkdir()
+    for student, talker in (("ann", "print('hello')"), ("bob", "print('no')"), ("cem", "die")):
+        (source / FILES[student]).write_text(answers(root, talker), encoding="utf-8")
+    grade(root, source)
+    prepare_nbgrader()
+    from nbgrader.api import Gradebook
+
+    with Gradebook(gradebook_address(root)) as gradebook:
+        for student, points, more in (("ann", 4, 0.5), ("bob", 1.5, None)):
+            mark = gradebook.find_grade("why", toy.LAB, toy.LAB, student)
+            mark.manual_score, mark.extra_credit, mark.needs_manual_grade = points, more, False
+            gradebook.find_comment("why", toy.LAB, toy.LAB, student).manual_comment = f"Well said, {student}."
+        gradebook.find_submission_notebook(toy.LAB, toy.LAB, "bob").late_submission_penalty = 1
+        gradebook.db.commit()
+    file = gradebook_file(root)
+    assert file is not None
+    os.utime(file)
+    run = grade(root, source)
+    pages = {
+        student: (root / "build" / "feedback" / student / toy.LAB / f"{toy.LAB}.html").read_text(encoding="utf-8")
+        for student in FILES
+    }
+    yield Graded(root, source, run, pages)
+    patch.undo()
+
+
+def rows(text: str | bytes) -> list[dict[str, str]]:
+    assert isinstance(text, str)
+    return list(csv.DictReader(io.StringIO(text)))
+
+
+def unpacked(content: str | bytes) -> dict[str, str]:
+    assert isinstance(content, bytes)
+    with zipfile.ZipFile(io.BytesIO(content)) as archive:
+        return {name: archive.read(name).decode() for name in archive.namelist()}
+
+
+def test_one_number_stands_in_gradebook_table_and_results(graded: Graded) -> None:
+    assert {one.student: one.score for one in read_grades(graded.root)} == SCORES
+    table = {row["student"]: row for row in rows(graded.run.grades.read_text())}
+    assert {name: row["score"] for name, row in table.items()} == {"ann": "9.5", "bob": "2.5", "cem": ""}
+    assert {name: row["waiting"] for name, row in table.items()} == {"ann": "0", "bob": "0", "cem": "2"}
+    added: dict[str, float] = {}
+    for row in rows(graded.export("csv").content):
+        added[row["student"]] = added.get(row["student"], 0.0) + float(row["points"] or 0)
+    assert added == {"ann": 9.5, "bob": 2.5, "cem": 2.0}
+
+
+def test_canvas_finds_every_student_and_score(graded: Graded) -> None:
+    """As its importer reads: the first two headings, the row of points possible, a student by number."""
+    made = graded.export("canvas", "Toy lab (4711)")
+    head, possible, *students = list(csv.reader(io.StringIO(made.content)))
+    assert "Student" in head[0] and "ID" in head[1] and head[4] == "Section" and head[5] == "Toy lab (4711)"
+    assert head[2:4] == ["SIS User ID", "SIS Login ID"]
+    assert "Points Possible" in possible[0] and possible[5] == "9"
+    roster = read_roster(graded.root / "roster.csv")
+    found = {roster.student({"canvas_id": row[1]}): row[5] for row in students}
+    assert found == {"ann": "9.5", "bob": "2.5", "cem": ""}
+    assert [sentence.split()[0] for sentence in made.left_out] == ["cem"]
+    assert next(row[0] for row in students if row[2] == "cem") == "'=1+1", "a name is no formula"
+
+
+def test_moodle_finds_every_student_and_score(graded: Graded) -> None:
+    """As its importer reads: the number after `Participant`, and three columns that it cannot do without."""
+    made = rows(graded.export("moodle").content)
+    assert {"Identifier", "Grade", "Last modified (grade)"} <= made[0].keys()
+    roster = read_roster(graded.root / "roster.csv")
+    found = {roster.student({"moodle_id": row["Identifier"][len("Participant ") :]}): row["Grade"] for row in made}
+    assert found == {"ann": "9.5", "bob": "2.5", "cem": ""}
+    assert made[0]["Feedback comments"] == "Well said, ann." and made[0]["Maximum Grade"] == "9"
+
+
+def test_blackboard_finds_every_student_and_score(graded: Graded) -> None:
+    made = graded.export("blackboard", "Toy [Total Pts: 9 Score] |4711")
+    assert all(line.startswith('"') and line.endswith('"') for line in made.content.splitlines())
+    table = rows(made.content)
+    scores = {row["Username"]: row["Toy [Total Pts: 9 Score] |4711"] for row in table}
+    assert scores == {"ann": "9.5", "bob": "2.5", "cem": ""}
+    assert (table[0]["Last Name"], table[1]["Last Name"]) == ("Doe", "Müller")
+
+
+def test_feedback_goes_back_under_the_names_that_the_platform_gave(graded: Graded, tmp_path: Path) -> None:
+    canvas = unpacked(graded.export("canvas-feedback").content)
+    assert set(canvas) == {str(Path(name).with_suffix(".html")) for name in FILES.values()}
+    moodle = graded.export("moodle-feedback").content
+    assert unpacked(moodle)["Bob Müller_502_assignsubmission_file/toy.html"] == graded.pages["bob"]
+    # What Moodle reads out of a folder's name is what the intake reads out of it.
+    names = {name.replace("toy.html", "toy.ipynb"): "" for name in unpacked(moodle)}
+    with zipfile.ZipFile(tmp_path / "moodle.zip", "w") as archive:
+        for name in names:
+            archive.writestr(name, "")
+    recognised = recognise(members(tmp_path / "moodle.zip"), toy.LAB)
+    assert recognised is not None and recognised.format == "Moodle"
+    assert {claim.owner["moodle_id"] for claim in recognised.claims} == {"501", "502", "503"}
+
+
+def test_gradescope_gets_a_result_for_each_submission(graded: Graded) -> None:
+    made = {name: json.loads(text) for name, text in unpacked(graded.export("gradescope").content).items()}
+    assert set(made) == {f"toy/{student}/results.json" for student in FILES}
+    ann, bob, cem = (made[f"toy/{student}/results.json"] for student in ("ann", "bob", "cem"))
+    assert (ann["score"], bob["score"], cem["score"]) == (9.5, 2.5, 2)
+    assert sum(test.get("score", 0) for test in bob["tests"]) == 2.5
+    undecided = cem["tests"][0]
+    assert "score" not in undecided and "status" not in undecided and "your instructor decides" in undecided["output"]
+    assert "secret" not in json.dumps(made) and "not graded yet" in cem["output"]
+
+
+def test_junit_has_a_suite_for_each_student(graded: Graded) -> None:
+    xml = JUnitXml.fromstring(graded.export("junit").content.encode())
+    suites = {suite.name: suite for suite in xml}
+    assert set(suites) == {"toy.ann", "toy.bob", "toy.cem"}
+    names = [(case.classname, case.name) for suite in xml for case in suite]
+    assert len(set(names)) == len(names)
+    score = {one.name: one.value for one in suites["toy.bob"].properties()}["score"]
+    assert (xml.tests, xml.failures, xml.errors, score) == (9, 1, 1, "2.5")
