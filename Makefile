@@ -46,8 +46,9 @@ check: setup ## report on one notebook: NB=path/to/notebook.ipynb
 jupyter: setup ## open the labs in JupyterLab
 	@$(RUN) autograder jupyter $(ARGS)
 
-release: setup ## make labs/ from solutions/
+release: setup-dev ## make labs/ from solutions/, and from them build/release: what students get
 	@$(RUN) autograder release $(ARGS)
+	@$(RUN) autograder kit
 
 lectures: setup-dev ## build the book and the slides into build/lectures
 	@$(RUN) python -m sphinx -q -W --keep-going -b html -d build/lectures/doctrees/book lectures build/lectures/book $(ARGS)

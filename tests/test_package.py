@@ -13,11 +13,11 @@ import pytest
 from sample_class import ROOT
 from typer.testing import CliRunner
 
-from autograder.authoring.package import lab_files, package_name, write_package
-from autograder.cli.labs import app
+from autograder.cli.main import app
 from autograder.core.errors import KitError
 from autograder.course.lab import load_lab
 from autograder.launch_files import read_launch_file
+from autograder.packages.ament_package import lab_files, package_name, write_package
 
 LAB = load_lab(ROOT, "lab3_remapping")
 SOLUTION = ROOT / "solutions" / "lab3_remapping" / "lab3_remapping.ipynb"

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from autograder.cli.app import IsolationOption, JsonOption, SeedOption, app
+from autograder.cli.app import JsonOption, SeedOption, app
 from autograder.core.errors import KitError
-from autograder.core.results import Isolation
+from autograder.core.results import Isolation  # its values stand in the command's help
 
 if TYPE_CHECKING:
     from autograder.core.results import SubmissionResult
@@ -35,7 +35,10 @@ def check(
     junit: Annotated[Path | None, typer.Option(help="Also write JUnit XML to this file.")] = None,
     gradescope: Annotated[Path | None, typer.Option(help="Also write Gradescope's results.json to this file.")] = None,
     instructor: Annotated[bool, typer.Option("--instructor", help="Show what the hidden checks look at.")] = False,
-    isolation: IsolationOption = Isolation.FULL,
+    isolation: Annotated[
+        Isolation | None,
+        typer.Option(help="How programs are kept apart; default: full, in a student's kit the most there is."),
+    ] = None,
     seed: SeedOption = None,
     github: Annotated[
         bool, typer.Option("--github", help="Write annotations, and a summary, for GitHub Actions.")
@@ -53,14 +56,13 @@ def check(
         raise KitError(f"There is no notebook {notebook}.", "Name an .ipynb file.")
     from autograder.course.folder import trusted_course
     from autograder.grading.runner import Settings
-    from autograder.sandbox.isolation import choose
     from autograder.submission.reader import lab_of
 
     found = lab_of(notebook, lab, trusted_course(course))
     if found.notebook.resolve() == notebook.resolve():
         note = "This notebook is the course's own copy of the lab: its checks are run as they stand in it."
         print(f"note: {note}", file=sys.stderr)
-    settings = Settings(isolation=choose(isolation), seed=seed)
+    settings = Settings(isolation=isolation_for(isolation), seed=seed)
     audience: Audience = "instructor" if instructor else "student"
     while True:
         saved = notebook.stat().st_mtime_ns
@@ -82,6 +84,23 @@ def check(
             raise typer.Exit(_status(result))
         print(f"Waiting for {notebook} to be saved. Ctrl-C ends it.", file=sys.stderr)
         _wait_for_save(notebook, saved)
+
+
+def isolation_for(wanted: Isolation | None) -> Isolation:
+    """Return the isolation that was asked for; a student's own programs run in any case, and it is said how.
+
+    Raises:
+        KitError: this machine does not offer it.
+    """
+    from autograder.course.folder import is_students_kit
+    from autograder.sandbox.isolation import choose, most
+
+    if wanted is not None or not is_students_kit():
+        return choose(wanted or Isolation.FULL)
+    found, why = most()
+    if why:
+        print(f"note: programs run with isolation `{found.value}`, since {why}.", file=sys.stderr)
+    return found
 
 
 def _checked(notebook: Path, lab: Lab, settings: Settings) -> SubmissionResult:

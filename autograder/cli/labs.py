@@ -1,4 +1,4 @@
-"""Commands for who keeps a course: `new`, `lint`, `release`, `package` and `gradescope`."""
+"""Commands for who keeps a course: `new`, `lint`, `release`, `kit` and `gradescope`."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from typing import Annotated
 import typer
 
 from autograder.cli.app import IsolationOption, app
-from autograder.core.errors import KitError
 from autograder.core.results import Isolation
 
 new = typer.Typer(no_args_is_help=True)
@@ -91,28 +90,25 @@ def release(
 
 
 @app.command()
-def package(
-    lab: Annotated[str, typer.Argument(help="The lab, such as lab3_remapping.")],
-    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Where to write it, such as the src of a workspace.")],
-    notebook: Annotated[
-        Path | None, typer.Option(help="The notebook whose programs are taken; default: the lab as it is handed out.")
+def kit(
+    book: Annotated[
+        Path | None,
+        typer.Option(help="A folder with the lectures as HTML; default: build/lectures/book, if it was built."),
     ] = None,
 ) -> None:
-    """Write a lab's programs and launch files as a package for an installed ROS 2."""
-    if notebook is not None and not notebook.is_file():
-        raise KitError(f"There is no notebook {notebook}.", "Name an .ipynb file.")
-    from autograder.authoring.package import lab_files, package_name, write_package
+    """Write what students get into build/release, a folder and a zip: labs, this program without solutions, a lock."""
+    from autograder.authoring.student_kit import write_kit
     from autograder.course.folder import course_root
-    from autograder.course.lab import load_lab
+    from autograder.course.paths import CoursePaths
 
-    found = load_lab(course_root(), lab)
-    name = package_name(found)
-    written = write_package(name, f"Programs and launch files of {lab}", lab_files(found, notebook), folder)
-    print(f"{written}\n\nIn a workspace of an installed ROS 2:\n  colcon build --packages-select {name}")
-    launch = sorted(path.name for path in (written / "launch").glob("*.launch.*"))
-    program = min(path.stem for path in (written / name).glob("*.py") if path.stem != "__init__")
-    start = f"ros2 launch {name} {launch[-1]}" if launch else f"ros2 run {name} {program}"
-    print(f"  source install/setup.bash\n  {start}")
+    root = course_root()
+    pages = book or CoursePaths(root).book
+    archive = write_kit(root, pages if pages.is_dir() else None, CoursePaths(root).release)
+    print(archive)
+    if not pages.is_dir():
+        print(
+            "It has no lectures, since they have not been built. Build them with `make lectures`, then run this again."
+        )
 
 
 @app.command()

@@ -7,12 +7,17 @@ from __future__ import annotations
 
 import os
 import sys
+from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 
-from autograder.cli import check, grade, labs, machine, results  # noqa: F401  each registers its commands
+from autograder.cli import check, machine, package  # noqa: F401  each registers its commands
 from autograder.cli.app import app
 from autograder.core.errors import KitError
 from autograder.setup.refusals import SetUpError, refuse_foreign_ros
+
+if find_spec("autograder.cli.instructors"):  # which a student's kit does without
+    import_module("autograder.cli.instructors")
 
 INTERRUPTED = 130
 """Exit status after Ctrl-C; Typer takes the KeyboardInterrupt and exits with it, saying nothing."""

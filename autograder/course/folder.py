@@ -1,4 +1,8 @@
-"""Where the course lies: the folder that holds `solutions/`, `labs/` and `build/`."""
+"""Where the course lies: the folder that holds `solutions/`, `labs/` and `build/`.
+
+A student's kit has two: `labs/`, where the student works, and below `kit/` the labs as they were handed out, whose
+checks are run.
+"""
 
 from __future__ import annotations
 
@@ -6,8 +10,10 @@ from pathlib import Path
 
 from autograder.core.errors import KitError
 from autograder.course.settings import SETTINGS_FILE
+from autograder.setup.places import ROOT
 
-_KIT = Path(__file__).resolve().parent.parent.parent
+KIT_FOLDER = "kit"
+"""The folder of a student's kit with what is not the student's to change."""
 
 
 def course_root() -> Path:
@@ -16,7 +22,7 @@ def course_root() -> Path:
     Raises:
         KitError: there is none.
     """
-    for folder in (Path.cwd(), *Path.cwd().parents, _KIT):
+    for folder in (Path.cwd(), *Path.cwd().parents, ROOT):
         if _is_course(folder):
             return folder
     raise KitError(
@@ -34,12 +40,18 @@ def trusted_course(named: Path | None) -> Path:
     Raises:
         KitError: there is none.
     """
-    root = _KIT if named is None else named.resolve()
+    own = ROOT / KIT_FOLDER if is_students_kit() else ROOT
+    root = own if named is None else named.resolve()
     if _is_course(root):
         return root
     if named is None:
         raise KitError("The kit was installed without a course of its own.", "Name yours: --course FOLDER")
     raise KitError(f"There is no course in {root}.", "It needs a folder `solutions` (or `labs`) with NAME/NAME.ipynb.")
+
+
+def is_students_kit() -> bool:
+    """Whether this is the environment of a student's kit, which has no solutions and grades nobody."""
+    return _is_course(ROOT / KIT_FOLDER)
 
 
 def _is_course(folder: Path) -> bool:

@@ -71,6 +71,16 @@ class CoursePaths:
         """The class report."""
         return self.build / "report" / "index.html"
 
+    @property
+    def book(self) -> Path:
+        """The lectures as HTML."""
+        return self.build / "lectures" / "book"
+
+    @property
+    def release(self) -> Path:
+        """What students get: a folder, and the same as a zip."""
+        return self.build / "release"
+
     def sample_class(self, lab: str) -> Path:
         """Where the sample class of a lab is put together."""
         return self.build / "classes" / lab

@@ -58,6 +58,14 @@ def choose(wanted: Isolation) -> Isolation:
     return wanted
 
 
+def most() -> tuple[Isolation, str]:
+    """Return the most that this machine offers, and why it is not full; for who runs programs of their own."""
+    found = preflight()
+    if found.full:
+        return Isolation.FULL, ""
+    return (Isolation.REDUCED if found.reduced else Isolation.NONE), found.why_not_full.rstrip(".")
+
+
 def _why_not_full() -> str:
     if not sys.platform.startswith("linux") or platform.machine() != "x86_64":
         return f"it is {sys.platform} on {platform.machine()}, not Linux on x86_64"

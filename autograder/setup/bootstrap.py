@@ -18,8 +18,8 @@ from autograder.setup.commands import write_commands
 from autograder.setup.environment import create, digest, discard, finish, read_marker
 from autograder.setup.interpreter import find_python
 from autograder.setup.jupyter import lead_jupyter
-from autograder.setup.packages import fill, say
-from autograder.setup.places import DEV_LOCK, MARKER, PYTHON, ROOT, STUDENT_LOCK, VENV
+from autograder.setup.packages import fill, install_wheel, say
+from autograder.setup.places import DEV_LOCK, MARKER, PYTHON, ROOT, STUDENT_LOCK, VENV, WHEEL
 from autograder.setup.refusals import SetUpError, refuse_closed_folder, refuse_foreign_ros, refuse_other_machines
 
 
@@ -36,7 +36,8 @@ def make_ready(dev: bool, wanted: str) -> None:
     known = state.get("locks", {})
     # What tests and lectures need is a superset, so that one environment serves both, and stays so once it is.
     locks = [STUDENT_LOCK, DEV_LOCK] if dev or DEV_LOCK in known else [STUDENT_LOCK]
-    if all(known.get(lock) == digest(lock) for lock in locks):
+    sources = locks + [WHEEL] if WHEEL else locks  # noqa: RUF005  Python 3.6 is to understand it
+    if all(known.get(source) == digest(source) for source in sources):
         write_commands()
         lead_jupyter()
         return
@@ -47,15 +48,18 @@ def make_ready(dev: bool, wanted: str) -> None:
         say("Bringing .venv up to date with %s" % locks[-1])
         version = tuple(state["version"])
         MARKER.unlink()
-        fill([str(PYTHON), "-m", "pip"], locks[-1])
+        pip = [str(PYTHON), "-m", "pip"]
     else:
         base = base or find_python("")
         version = base.version
         say("Making .venv%s (once, about a minute)" % (" anew" if VENV.exists() else ""))
         say("  Python %d.%d.%d: %s" % (version[0], version[1], version[2], base.program))
         discard()
-        fill(create(base), locks[-1])
-    finish(locks, version)
+        pip = create(base)
+    fill(pip, locks[-1])
+    if WHEEL:
+        install_wheel(pip)
+    finish(sources, version)
     say("  ready in %.0f s" % (time.time() - started))
 
 

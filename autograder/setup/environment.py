@@ -13,7 +13,7 @@ from typing import Any, Dict, List, Tuple
 from autograder.setup.commands import write_commands
 from autograder.setup.interpreter import Interpreter, output_of
 from autograder.setup.jupyter import lead_jupyter
-from autograder.setup.places import MARKER, PYTHON, ROOT, VENV
+from autograder.setup.places import MARKER, PYTHON, ROOT, VENV, WHEEL
 from autograder.setup.refusals import SetUpError, refuse_full_disk, tail
 
 _WITHOUT_GRAMMAR = "import sys; sys.modules.setdefault('rfc3987_syntax', None)"
@@ -21,7 +21,7 @@ _WITHOUT_GRAMMAR = "import sys; sys.modules.setdefault('rfc3987_syntax', None)"
 
 
 def digest(lock: str) -> str:
-    """Return the SHA-256 of the lock file `lock`."""
+    """Return the SHA-256 of the file `lock` of the course: a lock, or the wheel of a student's kit."""
     return hashlib.sha256((ROOT / lock).read_bytes()).hexdigest()
 
 
@@ -53,14 +53,15 @@ def create(base: Interpreter) -> "List[str]":
 
 
 def finish(locks: "List[str]", version: "Tuple[int, ...]") -> None:
-    """Make the kit importable from the checkout, then write the marker as the very last act.
+    """Make the kit importable from the checkout, if there is one, then write the marker as the very last act.
 
     Raises SetUpError if the new Python does not run.
     """
     status, text = output_of(str(PYTHON), "-I", "-c", "import sysconfig; print(sysconfig.get_path('purelib'))")
     if status:
         raise SetUpError("The new Python does not run:\n%s" % tail(text), "rm -rf .venv, then try again.")
-    Path(text.strip(), "autograder.pth").write_text("%s\n%s\n" % (ROOT, _WITHOUT_GRAMMAR), encoding="utf-8")
+    lines = [_WITHOUT_GRAMMAR] if WHEEL else [str(ROOT), _WITHOUT_GRAMMAR]
+    Path(text.strip(), "autograder.pth").write_text("\n".join(lines) + "\n", encoding="utf-8")
     write_commands()
     lead_jupyter()
     write_marker(locks, version)

@@ -3,7 +3,7 @@
 
 import contextlib
 
-from autograder.setup.places import ROOT, VENV
+from autograder.setup.places import ROOT, VENV, WHEEL
 
 
 def lead_jupyter() -> None:
@@ -13,6 +13,8 @@ def lead_jupyter() -> None:
     nbconvert would write reports into Markdown as HTML, though they have a plain text. Kernels would not know what to
     say when a notebook's first cell was not run.
     """
+    if WHEEL:
+        return
     ours = ROOT / "autograder" / "notebook" / "jupyter"
     for folder, config in (
         ("jupyter", ROOT / "nbgrader_config.py"),

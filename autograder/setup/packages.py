@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Dict, List
 
 from autograder.setup.interpreter import output_of
-from autograder.setup.places import PYTHON, ROOT, VENV
+from autograder.setup.places import PYTHON, ROOT, VENV, WHEEL
 from autograder.setup.refusals import NO_NETWORK, SetUpError, no_network, refuse_full_disk, tail
 
 PIP_INSTALL = ("install", "--quiet", "--retries=2", "--disable-pip-version-check", "--no-deps", "--require-hashes")
@@ -75,6 +75,24 @@ def fill(pip: "List[str]", lock: str) -> None:
         raise SetUpError(
             "The packages could not be installed:\n%s" % tail(text),
             "Look for the reason in these lines, then run it again.",
+        )
+
+
+def install_wheel(pip: "List[str]") -> None:
+    """Install the kit itself from the wheel of a student's kit, in place of an earlier one.
+
+    Raises SetUpError if that fails.
+    """
+    uv = shutil.which("uv", path=str(PYTHON.parent))
+    if uv:
+        command = [uv, "pip", "install", "--quiet", "--offline", "--python", str(PYTHON), "--compile-bytecode"]
+        status, text = output_of(*command, "--no-deps", "--reinstall", str(ROOT / WHEEL))
+    else:
+        status, text = output_of(*pip, "install", "--quiet", "--no-deps", "--force-reinstall", str(ROOT / WHEEL))
+    if status:
+        refuse_full_disk(text)
+        raise SetUpError(
+            "The kit itself could not be installed:\n%s" % tail(text), "Unpack the kit anew, and try again."
         )
 
 

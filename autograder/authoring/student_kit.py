@@ -1,0 +1,144 @@
+"""Writes what students get: the labs, the lectures, and the kit as a wheel that can check and cannot tell.
+
+Neither a solution nor a hidden test is in it, and nothing of the kit that only instructors use. What was written is
+searched for both before it is given out.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import zipfile
+from pathlib import Path
+
+from autograder.authoring.secrets import leaks, secrets_of
+from autograder.core.errors import KitError
+from autograder.course.folder import KIT_FOLDER
+from autograder.course.lab import lab_names
+from autograder.course.paths import CoursePaths
+from autograder.course.settings import SETTINGS_FILE, read_settings
+from autograder.setup.places import ROOT, STUDENT_LOCK
+
+NAME = "ros2-labs"
+"""Of the folder, and of the zip."""
+INSTRUCTORS = (
+    "authoring",
+    "gradebook",
+    "intake",
+    "cli/grade.py",
+    "cli/instructors.py",
+    "cli/labs.py",
+    "cli/results.py",
+    "report/class_page.py",
+    "report/templates/class.html",
+)
+"""What of the package `autograder` students do without."""
+
+_TEMPLATES = Path(__file__).with_name("templates") / "kit"
+_PLACES = {
+    "Makefile": "Makefile",
+    "readme.template": "README.md",
+    "gitignore": ".gitignore",
+    "devcontainer.json": ".devcontainer/devcontainer.json",
+    "workflow.yml": ".github/workflows/check.yml",
+    "Dockerfile": "binder/Dockerfile",
+}
+"""Where each template goes."""
+_BOOK_ROW = "| `lectures` | the lectures: open `lectures/index.html` in a browser |\n"
+_NOT_OURS = shutil.ignore_patterns(".*", "__pycache__", "*.pyc", "nodes", "*.new")
+_EPOCH = (1980, 1, 1, 0, 0, 0)
+"""The time of every file in the zip: equal sources give equal zips."""
+
+
+def write_kit(root: Path, book: Path | None, into: Path) -> Path:
+    """Write the student's kit of the course at `root`, a folder and a zip, and return the zip.
+
+    Args:
+        root: of the course; its `labs` are taken as they are.
+        book: a folder with the lectures as HTML; None leaves them out.
+        into: the folder that gets both.
+
+    Raises:
+        KitError: there are no labs, the wheel cannot be built, or a solution or hidden test would be given out.
+    """
+    paths = CoursePaths(root)
+    names = [name for name in lab_names(root) if (paths.labs / name / f"{name}.ipynb").is_file()]
+    lock = ROOT / STUDENT_LOCK
+    if not names:
+        raise KitError(f"There are no labs in {paths.labs}.", "Make them from the solutions: autograder release")
+    if not lock.is_file() or not (ROOT / "pyproject.toml").is_file():
+        raise KitError("The students' kit is built from a checkout of the kit, and this is none.", "Use a checkout.")
+    folder = into / NAME
+    shutil.rmtree(folder, ignore_errors=True)
+    for place in (folder / "labs", folder / KIT_FOLDER / "labs"):
+        for name in names:
+            shutil.copytree(paths.labs / name, place / name, ignore=_NOT_OURS)
+    shutil.copy(paths.labs / "README.md", folder / "labs")
+    if book is not None:
+        shutil.copytree(book, folder / "lectures", ignore=_NOT_OURS)
+    title = read_settings(root).title
+    listed = ", ".join(f'"{name}"' for name in names)
+    quoted = title.replace("\\", "\\\\").replace('"', '\\"')
+    (folder / KIT_FOLDER / SETTINGS_FILE).write_text(f'title = "{quoted}"\nlabs = [{listed}]\n', encoding="utf-8")
+    shutil.copy(lock, folder)
+    wheel = build_wheel(folder / KIT_FOLDER)
+    values = {"WHEEL": wheel.name, "TITLE": title, "FIRST": names[0], "NAME": NAME, "BOOK": _BOOK_ROW if book else ""}
+    for template, where in _PLACES.items():
+        text = (_TEMPLATES / template).read_text(encoding="utf-8")
+        for word, value in values.items():
+            text = text.replace(f"@{word}@", value)
+        (folder / where).parent.mkdir(parents=True, exist_ok=True)
+        (folder / where).write_text(text, encoding="utf-8")
+    found = leaks(folder, secrets_of(root, names))
+    if found:
+        shutil.rmtree(folder)
+        raise KitError("Students would get what they may not:\n  " + "\n  ".join(found[:10]), "Nothing was written.")
+    return _zipped(folder)
+
+
+def build_wheel(into: Path) -> Path:
+    """Build the kit without what only instructors use, and return the wheel.
+
+    Raises:
+        KitError: it cannot be built.
+    """
+    with tempfile.TemporaryDirectory() as name:
+        source = Path(name)
+        for file in ("README.md", "LICENSE"):
+            shutil.copy(ROOT / file, source)
+        shutil.copytree(ROOT / "autograder", source / "autograder", ignore=_NOT_OURS)
+        for path in (source / "autograder" / one for one in INSTRUCTORS):
+            shutil.rmtree(path) if path.is_dir() else path.unlink()
+        # nbgrader's configuration is an instructor's.
+        project = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
+        project = re.sub(r'^ *"autograder/gradebook/.*\n', "", project, flags=re.MULTILINE)
+        (source / "pyproject.toml").write_text(project, encoding="utf-8")
+        options = ("--quiet", "--wheel", "--no-build-isolation", "--offline", "--python", sys.executable)
+        done = subprocess.run(
+            [str(Path(sys.executable).with_name("uv")), "build", *options, "--out-dir", str(into), str(source)],
+            env=os.environ | {"SOURCE_DATE_EPOCH": "315532800"},
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+    if done.returncode:
+        raise KitError(f"The wheel cannot be built:\n{done.stderr.strip()[-2000:]}", "Run it with: make release")
+    (into / ".gitignore").unlink(missing_ok=True)  # uv hides what it builds from git
+    return next(into.glob("*.whl"))
+
+
+def _zipped(folder: Path) -> Path:
+    archive = folder.with_suffix(".zip")
+    beside = archive.with_suffix(".new")
+    with zipfile.ZipFile(beside, "w", zipfile.ZIP_DEFLATED) as packed:
+        for path in sorted(path for path in folder.rglob("*") if path.is_file()):
+            info = zipfile.ZipInfo(str(path.relative_to(folder.parent)), _EPOCH)
+            info.external_attr = 0o100644 << 16
+            info.compress_type = zipfile.ZIP_DEFLATED
+            packed.writestr(info, path.read_bytes())
+    beside.replace(archive)
+    return archive

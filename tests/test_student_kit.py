@@ -1,0 +1,147 @@
+"""What students get: nothing in it tells a solution, and it works from an unpacked zip."""
+
+from __future__ import annotations
+
+import ast
+import io
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import pytest
+import toy
+from test_setup import ENVIRON, ROOT, make, write_lock
+
+from autograder.authoring.student_kit import NAME, write_kit
+from autograder.core.errors import KitError
+from autograder.course.lab import lab_names
+
+
+@pytest.fixture(scope="module")
+def course(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A course of one small lab, released."""
+    from autograder.authoring.release import release
+    from autograder.authoring.start_page import START_PAGE, start_page
+
+    root = toy.make_course(tmp_path_factory.mktemp("toy"))
+    release(root, toy.LAB)
+    (root / "labs" / START_PAGE).write_text(start_page(root / "labs"), encoding="utf-8")
+    return root
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    """All that is in the zip of this course, and in the wheel in it, by name."""
+    with zipfile.ZipFile(write_kit(ROOT, None, tmp_path_factory.mktemp("release"))) as archive:
+        found = {name: archive.read(name) for name in archive.namelist()}
+    wheel = next(name for name in found if name.endswith(".whl"))
+    with zipfile.ZipFile(io.BytesIO(found.pop(wheel))) as archive:
+        found |= {f"{wheel}/{name}": archive.read(name) for name in archive.namelist()}
+    return {name: content.decode("utf-8") for name, content in found.items()}
+
+
+def cells(notebook: Path) -> list[str]:
+    return ["".join(cell["source"]) for cell in json.loads(notebook.read_text(encoding="utf-8"))["cells"]]
+
+
+def regions(source: str, mark: str) -> list[str]:
+    return re.findall(rf"BEGIN {mark}[^\n]*\n(.*?)\n[^\n]*END {mark}", source, re.DOTALL)
+
+
+def test_no_solution_hidden_test_expected_value_or_mark_scheme_is_in_it(files: dict[str, str]) -> None:
+    everything = {
+        name: "\n".join(cell for cell in map("".join, (one["source"] for one in json.loads(text)["cells"])))
+        if name.endswith(".ipynb")
+        else text
+        for name, text in files.items()
+    }
+    seen = dict.fromkeys(("solutions", "tests", "answers"), 0)
+    for lab in lab_names(ROOT):
+        given = "\n".join(cells(ROOT / "labs" / lab / f"{lab}.ipynb"))
+        raw = json.loads((ROOT / "solutions" / lab / f"{lab}.ipynb").read_text(encoding="utf-8"))
+        for cell in raw["cells"]:
+            source = "".join(cell["source"])
+            secrets = [("solutions", region) for region in regions(source, "SOLUTION")]
+            for mark in ("HIDDEN TESTS", "MARK SCHEME"):
+                # Line by line: expected values stand in them.
+                secrets += [("tests", line) for region in regions(source, mark) for line in region.split("\n")]
+            if cell["cell_type"] == "markdown" and cell["metadata"].get("nbgrader", {}).get("solution"):
+                secrets += [("answers", line) for line in source.split("\n")]
+            for kind, secret in secrets:
+                if len(secret.strip()) > 20 and secret.strip() not in given:
+                    seen[kind] += 1
+                    assert [name for name, text in everything.items() if secret.strip() in text] == [], secret
+    assert min(seen.values()) > 5, seen
+    for name, text in files.items():
+        if name.endswith(".ipynb"):
+            assert not re.search(r"### (BEGIN|END) |BEGIN (SOLUTION|HIDDEN|MARK)", text), name
+    for part in ("solutions/", "tests/", "autograder/authoring/", "autograder/gradebook/", "autograder/intake/"):
+        assert not [name for name in files if part in name]
+
+
+def test_the_wheel_lacks_nothing_that_it_imports(files: dict[str, str]) -> None:
+    modules = {
+        name.split(".whl/")[1].removesuffix(".py").removesuffix("/__init__").replace("/", "."): text
+        for name, text in files.items()
+        if ".whl/" in name and name.endswith(".py")
+    }
+    for name, text in modules.items():
+        for node in ast.walk(ast.parse(text)):
+            if isinstance(node, ast.ImportFrom) and node.module and node.module.startswith("autograder"):
+                wanted = {node.module} | {f"{node.module}.{alias.name}" for alias in node.names}
+                assert wanted & modules.keys(), f"{name} imports {node.module}"
+
+
+def test_no_file_of_the_kit_names_a_package_host(files: dict[str, str]) -> None:
+    from test_layout import FOREIGN
+
+    assert [name for name, text in files.items() if FOREIGN.search(text)] == []
+
+
+def test_a_lab_that_would_tell_its_solution_is_not_given_out(course: Path, tmp_path: Path) -> None:
+    root = shutil.copytree(course, tmp_path / "course")
+    told = [{**cell, "source": re.sub(r"###.*\n", "", str(cell["source"]))} for cell in toy.CELLS]
+    (root / "labs" / "toy" / "notes.json").write_text(json.dumps(toy.notebook(told)), encoding="utf-8")
+    (root / "labs" / "toy" / "hints.md").write_text('ros.expect_exit("talker", status=secret, hint="Mind the status.")')
+    with pytest.raises(KitError, match=r"hints\.md: a hidden test of toy") as refused:
+        write_kit(root, None, tmp_path / "out")
+    assert "Nothing was written" in refused.value.do
+    assert not list((tmp_path / "out").rglob("*.ipynb"))
+
+
+def test_from_an_unpacked_zip_to_a_verdict(course: Path, tmp_path: Path) -> None:
+    with zipfile.ZipFile(write_kit(course, None, tmp_path)) as archive:
+        archive.extractall(tmp_path / "für Übungen")
+    kit = tmp_path / "für Übungen" / NAME
+    write_lock(kit, "requirements.lock", "uv")
+    made = make(kit, "setup")
+    assert made.returncode == 0, made.stderr
+    # All that the lock would have installed comes from this environment, as hard links.
+    for name in ("lib", "share"):
+        subprocess.run(["cp", "-aln", f"{sys.prefix}/{name}/.", kit / ".venv" / name], check=True)
+    for path in kit.glob(".venv/lib/python*/site-packages/autograder.pth"):
+        assert str(ROOT) not in path.read_text()
+
+    notebook = kit / "labs" / "toy" / "toy.ipynb"
+    text = notebook.read_text(encoding="utf-8")
+    assert "Name a lab" in make(kit, "check").stderr
+    blank = make(kit, "check", "LAB=toy")
+    assert blank.returncode == 0, blank.stderr  # the report was given, and make has nothing to add
+    assert "not attempted yet" in blank.stdout and "own copy" not in blank.stderr
+
+    solved = text.replace("# YOUR CODE HERE", "print('hello')", 1)
+    # The student's own copy of a check does not count, only the one that was handed out.
+    notebook.write_text(solved.replace("table.expect_answer", "table.expect_answr"), encoding="utf-8")
+    again = make(kit, "--no-print-directory", "check", "LAB=toy", "ARGS=--json")
+    result = json.loads(again.stdout)
+    assert [check["points"] for check in result["checks"]] == [3.0, 0.0]
+    refused = subprocess.run(
+        [kit / ".venv" / "bin" / "autograder", "grade", "toy"], cwd=kit, env=ENVIRON, capture_output=True, text=True
+    )
+    assert refused.returncode == 2 and "No such command 'grade'" in refused.stderr
+    assert os.access(kit / ".venv" / "bin" / "ros2", os.X_OK)
