@@ -80,7 +80,7 @@ def test_no_solution_hidden_test_expected_value_or_mark_scheme_is_in_it(files: d
     for name, text in files.items():
         if name.endswith(".ipynb"):
             assert not re.search(r"### (BEGIN|END) |BEGIN (SOLUTION|HIDDEN|MARK)", text), name
-    for part in ("solutions/", "tests/", "autograder/authoring/", "autograder/gradebook/", "autograder/intake/"):
+    for part in ("solutions/", "tests/", "autograder/authoring/", "autograder/gradebook/", "autograder/intake/collect"):
         assert not [name for name in files if part in name]
 
 

@@ -28,7 +28,10 @@ NAME = "ros2-labs"
 INSTRUCTORS = (
     "authoring",
     "gradebook",
-    "intake",
+    "intake/collect.py",
+    "intake/formats.py",
+    "intake/members.py",
+    "intake/roster.py",
     "cli/grade.py",
     "cli/instructors.py",
     "cli/labs.py",
@@ -112,7 +115,7 @@ def build_wheel(into: Path) -> Path:
             shutil.copy(ROOT / file, source)
         shutil.copytree(ROOT / "autograder", source / "autograder", ignore=_NOT_OURS)
         for path in (source / "autograder" / one for one in INSTRUCTORS):
-            shutil.rmtree(path) if path.is_dir() else path.unlink()
+            shutil.rmtree(path) if path.is_dir() else path.unlink(missing_ok=True)
         # nbgrader's configuration is an instructor's.
         project = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
         project = re.sub(r'^ *"autograder/gradebook/.*\n', "", project, flags=re.MULTILINE)
