@@ -49,11 +49,11 @@ def test_when_the_parent_is_killed_nothing_remains(kind: Isolation, processes: i
     parent = subprocess.Popen([sys.executable, "-c", outer], cwd=ROOT)
     try:
         # python, bwrap (outer, its first process), worker, bwrap, launcher, the launch's first process, two programs
-        family = _wait_for(lambda: found if len(found := descendants(parent.pid)) >= processes else None, 20)
+        family = _wait_for(lambda: found if len(found := descendants(parent.pid)) >= processes else None, 60)
     finally:
         parent.kill()
         parent.wait()
-    _wait_for(lambda: not [pid for pid in family if Path(f"/proc/{pid}").exists()], 5)
+    _wait_for(lambda: not [pid for pid in family if Path(f"/proc/{pid}").exists()], 30)
     assert Path("/proc/self/mounts").read_text() == mounts
 
 
@@ -62,7 +62,7 @@ def test_a_run_that_takes_too_long_is_ended_as_a_whole() -> None:
     began = time.monotonic()
     run = run_in_sandbox(["timeit", "-n1", "-r1", "import time; time.sleep(60)"], b"", Isolation.FULL, time_limit=1.0)
     assert run.timed_out
-    assert time.monotonic() - began < 5
+    assert time.monotonic() - began < 30
 
 
 @needs_full
@@ -198,6 +198,27 @@ def test_stacks_name_the_waiting_line(local: NodeSandbox) -> None:
     assert program.running()
 
 
+def test_looking_at_a_program_never_ends_it(local: NodeSandbox) -> None:
+    """Its threads return from deep calls, and end, at any moment of a look."""
+    (local.folder / "restless.py").write_text(
+        "import threading\n"
+        "def deep(n):\n    return n and deep(n - 1)\n"
+        "def work():\n"
+        "    while True:\n"
+        "        deep(150)\n"
+        "        short = threading.Thread(target=deep, args=(200,))\n"
+        "        short.start()\n"
+        "        short.join()\n"
+        "for _ in range(4):\n    threading.Thread(target=work).start()\n"
+        "print('here')\n"
+    )
+    program = local.group().start("restless")
+    _wait_for(program.output, 10)
+    looks = [program.stacks(10) for _ in range(80)]
+    assert program.running()
+    assert all('restless.py", line' in look for look in looks)
+
+
 def test_output_keeps_its_beginning_and_its_end(tmp_path: Path) -> None:
     (tmp_path / "talks.py").write_text("print('first'); print('x' * 100000); print('last')")
     with NodeSandbox(tmp_path, Isolation.NONE, limits=Limits(output_kept=2000)) as sandbox:
@@ -295,7 +316,7 @@ def test_a_killed_notebook_leaves_nothing(tmp_path: Path) -> None:
     finally:
         notebook.kill()
         notebook.wait()
-    _wait_for(lambda: not [pid for pid in family if Path(f"/proc/{pid}").exists()], 5)
+    _wait_for(lambda: not [pid for pid in family if Path(f"/proc/{pid}").exists()], 30)
     assert not list(scratch.iterdir())
 
 

@@ -22,7 +22,8 @@ Stacks = dict[int, list[Frame]]
 _TAKING = ("acquire", "__enter__", "wait")
 """Functions of `threading` in which a thread waits for its turn."""
 
-_THREAD = re.compile(r"(?:Current thread|Thread) 0x([0-9a-f]+)")
+_THREAD = re.compile(r"Thread 0x([0-9a-f]+)")
+_WRITER = "Current thread"
 _FRAME = re.compile(r'\s+File "(.*)", line (\d{1,9}) in (.*)')
 
 
@@ -59,6 +60,8 @@ def parse(dump: str) -> Stacks:
         if head := _THREAD.match(line):
             thread = int(head[1], 16)
             stacks[thread] = []
+        elif line.startswith(_WRITER):
+            thread = None  # the one that writes this is not the program's
         elif thread is not None and (frame := _FRAME.match(line)):
             stacks[thread].append((frame[1], int(frame[2]), frame[3]))
     return stacks

@@ -17,8 +17,8 @@ from autograder.sandbox.limits import Limits
 STACK_SIGNAL = signal.SIGRTMIN + 10
 """The launcher makes a program write its threads' stacks at this signal."""
 
-_COMPLETE_AFTER = 0.05
-"""Seconds without a further line after which a dump of stacks counts as complete: it has no end mark."""
+_END_OF_STACKS = b"\n=\n"
+"""What the program writes behind its stacks."""
 
 _LONGEST_NOTE = 4096
 """Bytes; the probe's own are shorter."""
@@ -187,13 +187,5 @@ class RunningProgram:
             if self._status is not None:
                 return ""
             self.signal(STACK_SIGNAL)
-            deadline = time.monotonic() + timeout
-            while True:
-                size = len(self._stacks)
-                left = deadline - time.monotonic()
-                grown = self._changed.wait_for(
-                    lambda: len(self._stacks) > size or self._status is not None,  # noqa: B023
-                    min(left, _COMPLETE_AFTER) if size else left,
-                )
-                if not grown or self._status is not None:
-                    return self._stacks.decode("utf-8", "replace")
+            self._changed.wait_for(lambda: _END_OF_STACKS in self._stacks or self._status is not None, timeout)
+            return self._stacks.decode("utf-8", "replace")

@@ -3,7 +3,6 @@
 import builtins
 import contextlib
 import ctypes
-import faulthandler
 import fcntl
 import importlib
 import linecache
@@ -17,9 +16,7 @@ from .interrupt import interrupt
 from .kernel import PR_SET_DUMPABLE, filter_calls, limit, prctl
 from .probe import attach
 from .requests import Start
-
-STACK_SIGNAL = signal.SIGRTMIN + 10
-"""At this signal a program writes its threads' stacks. `sandbox/running_program.py` sends it."""
+from .thread_stacks import answer
 
 _EVENTS, _STACKS = 3, 4
 """The descriptors that the probe and the stacks are written to."""
@@ -48,8 +45,8 @@ def become(start: Start) -> None:
     sys.stderr = open(2, "w", encoding="utf-8", errors="backslashreplace", buffering=1, closefd=False)
     vars(sys).update(__stdin__=sys.stdin, __stdout__=sys.stdout, __stderr__=sys.stderr)
     signal.signal(signal.SIGINT, interrupt)
-    faulthandler.register(STACK_SIGNAL, file=_STACKS, all_threads=True, chain=False)
     filter_calls(start.filter)
+    answer(_STACKS)
 
 
 def _take_descriptors(start: Start) -> None:
