@@ -151,7 +151,7 @@ def test_no_verdict_means_manual_grading(course: Course) -> None:
     assert course.grades("died")["check_talker"] == (None, True)
     rows = write_grades(course.root).read_text().splitlines()
     assert rows[0] == "student,lab,score,max_score,waiting" and "died,toy,,9,2" in rows
-    assert "an instructor decides" in course.feedback("died")
+    assert "your instructor decides" in course.feedback("died")
 
 
 def test_markers_in_an_answer_are_only_words(course: Course) -> None:
@@ -258,7 +258,7 @@ def test_nothing_of_a_students_is_live_in_feedback_or_formgrader(course: Course)
         "img onerror=alert(1)", "script alert(2)"
     ]  # fmt: skip
     page = course.feedback("live")
-    assert Tags(page).live == [] and 'href="https://docs.ros.org"' in page and "alert(1)" in page
+    assert Tags(page).live == [] and "https://docs.ros.org" in page and "alert(1)" in page
     from nbconvert.exporters import HTMLExporter
     from nbgrader.server_extensions.formgrader import handlers
     from traitlets.config import Config
@@ -312,7 +312,7 @@ def test_a_manual_grade_stays_and_reaches_the_feedback(course: Course) -> None:
         gradebook.db.commit()
     os.utime(course.root / "build" / "gradebook.db")
     course.grade("manual")
-    assert "(Score: 7.5 / 9.0)" in course.feedback("manual")
+    assert "7.5 of 9 points" in course.feedback("manual")
     course.grade("manual", force=True)
     assert "manual,toy,7.5,9,0\n" in write_grades(course.root).read_text()
 
@@ -348,15 +348,15 @@ def test_who_is_late_has_the_same_score_everywhere(tmp_path: Path, monkeypatch: 
     run = grade_class(late.root, toy.LAB, tmp_path / "class", Settings(isolation=Isolation.NONE))
     assert run.unrecorded == {} and run.collected.refused == []
     assert run.grades.read_text().splitlines()[1:] == ["ann,toy,5,9,1", "bob,toy,4,9,1"]
-    assert "(Score: 5.0 / 9.0)" in late.feedback("ann") and "(Score: 4.0 / 9.0)" in late.feedback("bob")
-    assert "Late submission penalty (Score: -1.0)" in late.feedback("bob")
+    assert "5 of 9 points so far" in late.feedback("ann") and "4 of 9 points so far" in late.feedback("bob")
+    assert "after 1 point off for handing in late" in late.feedback("bob")
     with Gradebook(address) as gradebook:
         submission = gradebook.find_submission(toy.LAB, "bob")
         assert submission.score - submission.late_submission_penalty == 4.0
     (tmp_path / "class" / "bob" / "timestamp.txt").write_text("2026-11-02T12:00:00Z", encoding="utf-8")
     again = grade_class(late.root, toy.LAB, tmp_path / "class", Settings(isolation=Isolation.NONE))
     assert again.grades.read_text().splitlines()[2] == "bob,toy,5,9,1"
-    assert "(Score: 5.0 / 9.0)" in late.feedback("bob")
+    assert "5 of 9 points" in late.feedback("bob")
 
 
 def test_changed_graded_cells_are_refused_with_a_way_out(course: Course, tmp_path: Path) -> None:

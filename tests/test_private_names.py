@@ -1,4 +1,4 @@
-"""The contract with nbgrader and nbconvert: names that they may change without notice are still as the kit needs them.
+"""The contract with nbgrader: names that it may change without notice are still as the kit needs them.
 
 A failure here names what an update has moved, and where the kit uses it.
 """
@@ -15,10 +15,7 @@ from autograder.gradebook.preparation import prepare_nbgrader
 
 prepare_nbgrader()
 
-import nbconvert  # noqa: E402
 import nbgrader  # noqa: E402
-from nbconvert.exporters import HTMLExporter  # noqa: E402
-from nbconvert.exporters.templateexporter import TemplateExporter  # noqa: E402
 from nbgrader.converters import Autograde  # noqa: E402
 from nbgrader.preprocessors import Execute, SaveAutoGrades  # noqa: E402
 from nbgrader.validator import Validator  # noqa: E402
@@ -32,9 +29,6 @@ USED = [
     (Execute, "preprocess", ["self", "nb", "resources", "km"], "executes notebooks, which the kit closes"),
     (Validator, "validate", ["self", "filename"], "is nbgrader's validation, which the kit replaces"),
     (Validator, "invert", None, "asks for what passed"),
-    (TemplateExporter, "_create_environment", ["self"], "makes the templates' environment, which the kit lets compile"),
-    (HTMLExporter, "_init_resources", ["self", "resources"], "prepares what the templates of a page use"),
-    (HTMLExporter, "from_notebook_node", ["self", "nb", "resources", "kw"], "converts, then parses its own page again"),
 ]
 
 
@@ -43,7 +37,7 @@ def test_a_name_that_the_kit_relies_on_is_as_it_was(
     owner: type, name: str, arguments: list[str] | None, use: str
 ) -> None:
     library = owner.__module__.partition(".")[0]
-    versions = {"nbgrader": nbgrader.__version__, "nbconvert": nbconvert.__version__}
+    versions = {"nbgrader": nbgrader.__version__}
     said = (
         f"{library} {versions[library]} has moved {owner.__name__}.{name}, which {use}."
         f" Adapt autograder/gradebook/private_{library}.py, or keep pyproject.toml's bound."
@@ -52,13 +46,6 @@ def test_a_name_that_the_kit_relies_on_is_as_it_was(
     if arguments is not None:
         found = list(inspect.signature(inspect.unwrap(getattr(owner, name))).parameters)
         assert found == arguments, f"{said} Its arguments are {found}, and were {arguments}."
-
-
-def test_an_exporter_knows_the_metadata_of_its_notebook() -> None:
-    assert isinstance(HTMLExporter()._nb_metadata, dict), (
-        f"nbconvert {nbconvert.__version__} has moved HTMLExporter._nb_metadata, which the kit hands to the filter of"
-        " data types. Adapt autograder/gradebook/private_nbconvert.py."
-    )
 
 
 @pytest.mark.parametrize("path", OTHERS, ids=lambda path: path.stem)
@@ -75,4 +62,4 @@ def test_private_names_of_libraries_stand_in_their_modules(path: Path) -> None:
         if isinstance(node, ast.Attribute)
         and node.attr.startswith("_") and not node.attr.startswith("__") and node.attr not in own
     }  # fmt: skip
-    assert used == set(), f"{path.name} uses what belongs into private_nbgrader.py or private_nbconvert.py"
+    assert used == set(), f"{path.name} uses what belongs into private_nbgrader.py"

@@ -173,6 +173,12 @@ def source_of(cell: dict[str, Any]) -> str:
     return encodable(source).replace("\r\n", "\n").replace("\r", "\n")
 
 
+def heading_in(markdown: str) -> str:
+    """Return the last heading in a cell's text; empty if there is none."""
+    found: list[str] = _HEADING.findall(markdown)
+    return found[-1] if found else ""
+
+
 def lab_names(root: Path) -> list[str]:
     """Return the names of the course's labs in the course's order."""
     found = {
@@ -222,8 +228,7 @@ def _read(name: str, notebook: Path, raw: dict[str, Any], released_only: bool) -
         if grade_id:
             seen.add(grade_id)
         if cell["cell_type"] == "markdown" and not nbgrader.get("solution"):
-            headings = _HEADING.findall(source)
-            title = headings[-1] if headings else title
+            title = heading_in(source) or title
         blank = source
         points = float(nbgrader["points"]) if nbgrader.get("grade") else None
         if nbgrader.get("solution"):

@@ -8,29 +8,8 @@ from typing import Any
 from autograder.course.lab import CODE_STUB, TEXT_STUB
 from autograder.course.paths import CoursePaths
 from autograder.gradebook.autograde import AUTOGRADE, SANITIZE, SubmissionExporter
-from autograder.gradebook.feedback import FEEDBACK, FeedbackExporter
+from autograder.gradebook.feedback import FeedbackExporter
 from autograder.gradebook.released_notebook import RELEASE, WITHOUT_GRADEBOOK
-
-_REPORT_TAGS = ["div", "span", "b", "code", "pre", "details", "summary", "br", "p"]
-_REPORT_STYLES = [
-    "background",
-    "border",
-    "border-left",
-    "color",
-    "font-family",
-    "font-size",
-    "font-weight",
-    "line-height",
-    "margin",
-    "margin-left",
-    "margin-top",
-    "max-height",
-    "overflow-wrap",
-    "overflow",
-    "padding",
-    "padding-left",
-    "white-space",
-]
 
 
 def configure(config: Any, root: Path) -> None:
@@ -56,15 +35,11 @@ def configure(config: Any, root: Path) -> None:
     config.Autograde.sanitize_preprocessors = SANITIZE
     config.Autograde.autograde_preprocessors = AUTOGRADE
     config.GenerateFeedback.exporter_class = FeedbackExporter
-    config.GenerateFeedback.preprocessors = FEEDBACK
+    config.GenerateFeedback.preprocessors = []
     config.GenerateAssignment.preprocessors = RELEASE
     config.Validator.failed_warning = "{num_failed} part(s) did not pass, or could not be checked:"
     config.ClearSolutions.code_stub = {"python": CODE_STUB}
     config.ClearSolutions.text_stub = TEXT_STUB
-    config.SanitizeHTML.enabled = True
-    config.SanitizeHTML.tags = _REPORT_TAGS
-    config.SanitizeHTML.attributes = ["style", "role", "aria-label"]
-    config.SanitizeHTML.styles = _REPORT_STYLES
 
 
 def leave_gradebook_alone(config: Any) -> None:

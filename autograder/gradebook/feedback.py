@@ -1,83 +1,92 @@
-"""The course's own stages of `nbgrader generate_feedback`: the page that a student gets to read."""
+"""The course's own way through `nbgrader generate_feedback`: the page that a student gets to read.
+
+It is made of the stored result, the gradebook and the text of the answers; nothing of a notebook's own HTML is in it.
+"""
 
 from __future__ import annotations
 
-import re
-from typing import Any, ClassVar
+import contextlib
+import datetime
+from pathlib import Path
+from typing import Any
 
-from jinja2.bccache import Bucket, BytecodeCache
-from nbconvert.filters import Highlight2HTML
-from nbconvert.preprocessors import CSSHTMLHeaderPreprocessor
+from nbconvert.exporters import Exporter
 from nbgrader import utils
-from nbgrader.preprocessors import ClearMarkScheme, GetGrades
 
-from autograder.gradebook.inert import SanitizeOutputs
-from autograder.gradebook.private_nbconvert import LeanHTMLExporter
-from autograder.gradebook.released_notebook import HideTests
+from autograder.core.errors import KitError
+from autograder.core.results import SubmissionResult
+from autograder.course.lab import Lab, heading_in, load_lab
+from autograder.gradebook.one_grade import read_grade
+from autograder.grading.store import ResultStore
+from autograder.intake.roster import FILE_NAME, read_roster
+from autograder.report.feedback_page import Heading, Task, feedback_html, plain_title
+from autograder.submission import timestamp
+from autograder.submission.reader import read_submission
 
 
-class HideMarkScheme(ClearMarkScheme):  # type: ignore[misc]
-    """Keeps mark schemes out of feedback."""
+class FeedbackExporter(Exporter):  # type: ignore[misc]
+    """Makes the page of one submission."""
 
-    def preprocess_cell(self, cell: Any, resources: dict[str, Any], index: int) -> tuple[Any, dict[str, Any]]:
-        """Cut in the lab's own cells; a student who types a marker only types a word."""
+    def __init__(self, *args: Any, **kwargs: Any) -> None:
+        """It is a page of HTML, whatever it is made of."""
+        super().__init__(*args, **kwargs)
+        self.file_extension = ".html"
+
+    def from_notebook_node(
+        self, nb: Any, resources: dict[str, Any] | None = None, **kwargs: Any
+    ) -> tuple[str, dict[str, Any]]:
+        """Return the page; the notebook is nbgrader's copy of the submission."""
+        copied, resources = super().from_notebook_node(nb, resources, **kwargs)
+        course, told = self.parent.coursedir, resources["nbgrader"]
+        student, name = told["student"], told["assignment"]
+        root = Path(course.root)
+        folder = Path(course.format_path(course.submitted_directory, student, name))
+        lab = load_lab(root, name)
+        page = feedback_html(
+            Heading(_title(lab), student, _name(root, student), _handed_in(folder)),
+            _tasks(copied),
+            _result(root, lab, student, folder / f"{name}.ipynb"),
+            read_grade(told["db_url"], name, student),
+            datetime.date.today(),
+        )
+        return page, resources
+
+
+def _title(lab: Lab) -> str:
+    titles = (heading_in("".join(cell.get("source", ""))) for cell in lab.released if cell["cell_type"] == "markdown")
+    return plain_title(next(filter(None, titles), lab.name))
+
+
+def _name(root: Path, student: str) -> str:
+    """What the roster calls a student; empty if it says nothing, or cannot be read, which grading says."""
+    with contextlib.suppress(KitError):
+        return read_roster(root / FILE_NAME).students.get(student, {}).get("name", "")
+    return ""
+
+
+def _handed_in(folder: Path) -> str:
+    with contextlib.suppress(OSError):
+        return timestamp.moment((folder / timestamp.FILE_NAME).read_bytes()[: timestamp.MOST_BYTES]) or ""
+    return ""
+
+
+def _result(root: Path, lab: Lab, student: str, path: Path) -> SubmissionResult | None:
+    return ResultStore(root).fitting(lab, student, read_submission(path, lab).digest)
+
+
+def _tasks(nb: Any) -> list[Task]:
+    """What stands between two headings, where it has points; answers without points belong to the next that has."""
+    tasks: list[Task] = []
+    title, answers = "", {}
+    for cell in nb.cells:
+        if cell.cell_type == "markdown" and not utils.is_solution(cell):
+            title = plain_title(heading_in(cell.source)) or title
         if utils.is_solution(cell):
-            return cell, resources
-        made: tuple[Any, dict[str, Any]] = super().preprocess_cell(cell, resources, index)
-        return made
-
-
-class _CompiledTemplates(BytecodeCache):
-    """Keeps templates compiled from one feedback page to the next."""
-
-    def __init__(self) -> None:
-        self._codes: dict[str, bytes] = {}
-
-    def load_bytecode(self, bucket: Bucket) -> None:
-        if bucket.key in self._codes:
-            bucket.bytecode_from_string(self._codes[bucket.key])
-
-    def dump_bytecode(self, bucket: Bucket) -> None:
-        self._codes[bucket.key] = bucket.bytecode_to_string()
-
-
-_TOO_LONG_TO_COLOUR = re.compile(r"\s{200}|\S{400}")
-"""No program looks like that, and the time that Pygments takes for it grows with the square of its length."""
-
-
-_LONGEST_KEPT, _MOST_KEPT = 10_000, 1000
-"""Characters of a cell, and cells, that are kept coloured."""
-
-
-class ColouredCode(Highlight2HTML):  # type: ignore[misc]
-    """nbconvert's colouring of code, for what a person wrote; the rest is shown as plain text."""
-
-    kept: ClassVar[dict[tuple[str, str | None, str], Any]] = {}
-    """HTML by source, language and metadata."""
-
-    def __call__(self, source: str, language: str | None = None, metadata: Any = None) -> Any:
-        """Return the HTML of a code cell; most cells of a class's notebooks are the lab's, and coloured once."""
-        if len(source) > _LONGEST_KEPT:
-            return self._colour(source, language, metadata)
-        cell = source, language, repr(metadata)
-        if cell not in self.kept:
-            if len(self.kept) >= _MOST_KEPT:
-                self.kept.clear()
-            self.kept[cell] = self._colour(source, language, metadata)
-        return self.kept[cell]
-
-    def _colour(self, source: str, language: str | None, metadata: Any) -> Any:
-        return super().__call__(source, "text" if _TOO_LONG_TO_COLOUR.search(source) else language, metadata)
-
-
-class FeedbackExporter(LeanHTMLExporter):
-    """The page that a student gets to read."""
-
-    compiled = _CompiledTemplates()
-
-    def colour(self) -> ColouredCode:
-        """Return what colours the code of the page."""
-        return ColouredCode(pygments_lexer="ipython3", parent=self)
-
-
-FEEDBACK = [GetGrades, HideTests, HideMarkScheme, SanitizeOutputs, CSSHTMLHeaderPreprocessor]
+            answers[cell.metadata.nbgrader["grade_id"]] = cell.source
+        if utils.is_grade(cell):
+            if not tasks or tasks[-1].title != title:
+                tasks.append(Task(title))
+            tasks[-1].graded.append(cell.metadata.nbgrader["grade_id"])
+            tasks[-1].answers |= answers
+            answers = {}
+    return tasks

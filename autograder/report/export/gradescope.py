@@ -63,7 +63,9 @@ def results_json(full: SubmissionResult, grade: Grade | None = None) -> str:
 
 def _test(check: CheckResult, earned: float | None) -> dict[str, Any]:
     test: dict[str, Any] = {"name": check.title or check.grade_id, "max_score": check.max_points}
-    test["output"] = "\n\n".join(_text(outcome) for outcome in check.outcomes if outcome.status is not Status.PASSED)
+    said = [_text(outcome) for outcome in check.outcomes if outcome.status in (Status.FAILED, Status.UNKNOWN)]
+    left = words.findings(check).not_looked_at
+    test["output"] = "\n\n".join([*said, left] if left else said)
     if earned is not None:
         test["score"] = round(earned, 2)
         test["status"] = "passed" if earned >= check.max_points else "failed"

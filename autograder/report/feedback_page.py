@@ -1,0 +1,187 @@
+"""The page that a student gets to read: what it came to, what to repair first, then each task, all in one file."""
+
+from __future__ import annotations
+
+import datetime
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+from markupsafe import Markup
+
+from autograder.core.grades import CellGrade, Grade
+from autograder.core.results import CheckResult, SubmissionResult
+from autograder.core.version import VERSION
+from autograder.report import words
+from autograder.report.audience import reason, result_for
+from autograder.report.html import check_html, render
+from autograder.report.words import Verdict
+
+_FIRST = 3
+"""Checks that are named under "repair this first"."""
+
+
+@dataclass
+class Task:
+    """One task of the lab: what stands between two headings that has points."""
+
+    title: str
+    graded: list[str] = field(default_factory=list)
+    """The grade_ids of its graded cells, in order."""
+    answers: dict[str, str] = field(default_factory=dict)
+    """What the student wrote, by grade_id."""
+
+
+@dataclass(frozen=True)
+class Heading:
+    """What stands at the top of the page."""
+
+    lab: str
+    student: str
+    name: str = ""
+    handed_in: str = ""
+    """Date and time; empty if nothing says so."""
+
+
+@dataclass(frozen=True)
+class _Graded:
+    """A graded cell, ready to be shown."""
+
+    points: str
+    verdict: str
+    look: Verdict
+    report: Markup
+    comment: str
+    remark: str
+    answer: str
+    """The text of an answer that a person grades."""
+
+
+def feedback_html(
+    heading: Heading, tasks: Sequence[Task], result: SubmissionResult | None, grade: Grade, written: datetime.date
+) -> str:
+    """Return the page.
+
+    Args:
+        heading: for whom, and of which lab.
+        tasks: in the lab's order.
+        result: what checking found out; None: it is not stored any more.
+        grade: as the gradebook has it.
+        written: the day that stands on the page.
+    """
+    shown = result_for(result, "student") if result is not None else None
+    checks = {check.grade_id: check for check in shown.checks} if shown is not None else {}
+    cells = {cell.grade_id: cell for cell in grade.cells}
+    sections = []
+    for number, task in enumerate(tasks, start=1):
+        graded = [_graded(cells[name], checks.get(name), task) for name in task.graded if name in cells]
+        of_task = [cells[name] for name in task.graded if name in cells]
+        sections.append(
+            {
+                "title": task.title,
+                "anchor": f"task-{number}",
+                "points": _points(of_task),
+                "verdict": _verdict(of_task, [checks[name] for name in task.graded if name in checks]),
+                "graded": graded,
+                "programs": [(name, text) for name, text in task.answers.items() if name not in task.graded],
+            }
+        )
+    return render(
+        "feedback.html",
+        heading=heading,
+        total=_total(grade),
+        penalty=f"{grade.penalty:g}" if grade.penalty else "",
+        waiting=_waiting(grade),
+        problems=shown.problems if shown is not None else [],
+        sections=sections,
+        repairs=_repairs(tasks, cells, checks),
+        written=f"{written.day} {written:%B %Y}",
+        version=result.kit_version if result is not None else VERSION,
+        digest=result.digest[:12] if result is not None else "",
+        isolation=result.isolation.value if result is not None else "",
+    )
+
+
+def _number(points: float) -> str:
+    return f"{round(points, 2):g}"
+
+
+def _total(grade: Grade) -> str:
+    earned = max(0.0, sum(cell.points or 0.0 for cell in grade.cells) - grade.penalty)
+    so_far = " so far" if grade.waiting else ""
+    return f"{_number(earned)} of {_number(grade.max_score)} points{so_far}"
+
+
+def _waiting(grade: Grade) -> str:
+    if not grade.waiting:
+        return ""
+    count, top = len(grade.waiting), sum(cell.max_points for cell in grade.waiting)
+    which = "1 answer is" if count == 1 else f"{count} answers are"
+    return f"{which} not graded yet, which can still give up to {_number(top)} points."
+
+
+def _points(cells: Sequence[CellGrade]) -> str:
+    top = _number(sum(cell.max_points for cell in cells))
+    decided = [cell.points for cell in cells if cell.points is not None]
+    if not decided:
+        return f"not graded yet, of {top}"
+    open_ = ", rest not graded yet" if len(decided) < len(cells) else ""
+    return f"{_number(sum(decided))} of {top}{open_}"
+
+
+def _verdict(cells: Sequence[CellGrade], checks: Sequence[CheckResult]) -> Verdict:
+    if any(cell.points is None for cell in cells):
+        return Verdict.UNKNOWN
+    earned, top = sum(cell.points or 0.0 for cell in cells), sum(cell.max_points for cell in cells)
+    if not earned and any(words.verdict(check) is Verdict.NOT_ATTEMPTED for check in checks):
+        return Verdict.NOT_ATTEMPTED
+    return Verdict.PASSED if earned >= top else Verdict.PARTLY if earned else Verdict.FAILED
+
+
+def _graded(cell: CellGrade, check: CheckResult | None, task: Task) -> _Graded:
+    look = _verdict([cell], [check] if check is not None else [])
+    several = len(task.graded) > 1
+    report = Markup()
+    if check is not None:
+        report = Markup(check_html(check, title=f"Check {task.graded.index(cell.grade_id) + 1}" if several else ""))
+    remark = ""
+    if cell.is_check and check is None:
+        remark = "What the check found is not stored any more."
+    elif cell.is_check and cell.by_hand:
+        remark = f"Your instructor has looked at this check and gives {_number(cell.points or 0.0)} points."
+    return _Graded(
+        points=_points([cell]),
+        verdict="not graded yet" if cell.points is None else look.value,
+        look=look,
+        report=report,
+        comment=cell.comment,
+        remark=remark,
+        answer=task.answers.get(cell.grade_id, ""),
+    )
+
+
+def _repairs(
+    tasks: Sequence[Task], cells: Mapping[str, CellGrade], checks: Mapping[str, CheckResult]
+) -> list[dict[str, str]]:
+    """What to repair first: the checks that cost the most, with the first reason of each."""
+    lost = []
+    for number, task in enumerate(tasks, start=1):
+        for name in task.graded:
+            cell, check = cells.get(name), checks.get(name)
+            if cell is None or check is None or cell.points is None or cell.points >= cell.max_points:
+                continue
+            failure = check.first_failure
+            why = reason(failure) if failure is not None else ""
+            said = words.not_attempted(check) or why or check.status.value
+            lost.append((cell.max_points - cell.points, task.title, f"task-{number}", said, failure))
+    lost.sort(key=lambda one: -one[0])
+    return [
+        {"lost": _number(points), "title": title, "anchor": anchor, "why": why, "hint": failure.hint if failure else ""}
+        for points, title, anchor, why, failure in lost[:_FIRST]
+    ]
+
+
+def plain_title(markdown: str) -> str:
+    """Return a heading's text without the marks of Markdown's links and emphasis."""
+    text = re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", markdown)
+    return re.sub(r"(\*\*|__)(.+?)\1", r"\2", text)
