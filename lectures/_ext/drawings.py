@@ -9,6 +9,7 @@ from docutils import nodes
 from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
 
+import drawings_bringup
 from autograder.core.picture import Picture
 from autograder.pictures.svg import Canvas
 
@@ -96,6 +97,9 @@ DRAWINGS: dict[str, Callable[[], Picture]] = {
     "executor-loop": executor_loop,
     "groups-and-threads": groups_and_threads,
     "waiting-for-itself": waiting_for_itself,
+    "robot-layers": drawings_bringup.robot_layers,
+    "two-helpers": drawings_bringup.two_helpers,
+    "middleware": drawings_bringup.middleware,
 }
 
 
