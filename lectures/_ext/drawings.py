@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+import drawings_bringup
 from docutils import nodes
 from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
 
-import drawings_bringup
 from autograder.core.picture import Picture
 from autograder.pictures.svg import Canvas
 

@@ -53,9 +53,9 @@ def two_helpers() -> Picture:
         canvas.words(440, y + 110, does, anchor="middle")
     canvas.words(450, 338, "After a crash both are needed, the upper one first.", anchor="middle", bold=True)
     return canvas.picture(
-        "Two helpers. A launch file with respawn knows processes: it sees that a process has ended and starts it again. "
-        "A manager knows the states of nodes: it sees that a node is unconfigured, and configures and activates it. "
-        "After a crash both are needed, respawn first."
+        "Two helpers. A launch file with respawn knows processes: it sees that a process has ended, and starts it "
+        "again. A manager knows the states of nodes: it sees that a node is unconfigured, and configures and "
+        "activates it. After a crash both are needed, respawn first."
     )
 
 
