@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import hashlib
 import io
 import json
 import os
@@ -10,6 +11,7 @@ import re
 import shutil
 import subprocess
 import sys
+import time
 import zipfile
 from pathlib import Path
 
@@ -140,8 +142,62 @@ def test_from_an_unpacked_zip_to_a_verdict(course: Path, tmp_path: Path) -> None
     again = make(kit, "--no-print-directory", "check", "LAB=toy", "ARGS=--json")
     result = json.loads(again.stdout)
     assert [check["points"] for check in result["checks"]] == [3.0, 0.0]
+
+    handed_in = make(kit, "submit", "LAB=toy")
+    assert handed_in.returncode == 0, handed_in.stderr
+    assert "holds so far The talker" in " ".join(handed_in.stdout.split())
+    packed = kit / "handed_in" / "toy.ipynb"
+    assert packed.read_bytes() == notebook.read_bytes()
+    receipt = packed.with_suffix(".receipt.txt").read_text(encoding="utf-8")
+    assert (
+        hashlib.sha256(notebook.read_bytes()).hexdigest() in receipt
+        and "of 5 points, up to 3 more decided at" in receipt
+    )
+
     refused = subprocess.run(
         [kit / ".venv" / "bin" / "autograder", "grade", "toy"], cwd=kit, env=ENVIRON, capture_output=True, text=True
     )
     assert refused.returncode == 2 and "No such command 'grade'" in refused.stderr
     assert os.access(kit / ".venv" / "bin" / "ros2", os.X_OK)
+
+
+def test_submit_says_what_is_unsaved_outdated_ignored_or_empty_and_intake_takes_it(
+    course: Path, tmp_path: Path
+) -> None:
+    from typer.testing import CliRunner
+
+    from autograder.cli.main import app
+    from autograder.course.cell_file import parse
+    from autograder.intake.collect import collect
+    from autograder.notebook.program_folder import ProgramFolder, Written
+
+    raw = json.loads((course / "labs" / "toy" / "toy.ipynb").read_text(encoding="utf-8"))
+    by_id = {cell["metadata"].get("nbgrader", {}).get("grade_id", ""): cell for cell in raw["cells"]}
+    by_id["talker"] |= {"source": "%%node talker\nprint('hello')", "execution_count": 7}
+    by_id["check_talker"]["execution_count"] = 3
+    raw["cells"].append(toy.cell("code", "%%node talker\nprint('mine')", 90))
+    notebook = tmp_path / "my toy" / "toy.ipynb"
+    notebook.parent.mkdir()
+    notebook.write_text(json.dumps(raw), encoding="utf-8")
+    file = parse("%%node talker\nprint('hello, all')")
+    assert file is not None
+    folder = ProgramFolder(notebook, notebook.parent)
+    folder.write(Written(file, "", "", 7, time.time()))
+
+    def submit() -> str:
+        words = ["submit", str(notebook), "--without-checks", "--course", str(course), "-o", str(tmp_path / "ann")]
+        done = CliRunner().invoke(app, words)
+        assert done.exit_code == 0, done.output
+        return " ".join(done.output.split())
+
+    os.utime(notebook, (0, time.time() - 60))
+    told = submit()
+    assert "with a text that is not in the saved notebook. Save the notebook" in told
+    assert "The cell `%%file answers.yaml` is still as you received it." in told
+    assert "A cell above was run again after the check of “The talker”" in told
+    assert "`%%node talker`" in told and "ignore" in told
+    os.utime(notebook, (0, time.time() + 60))
+    assert "has been changed since it was run" in submit()
+
+    taken = collect(tmp_path, "toy", tmp_path / "course")
+    assert taken.notebooks["ann"].read_bytes() == notebook.read_bytes()

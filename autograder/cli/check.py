@@ -66,7 +66,7 @@ def check(
     audience: Audience = "instructor" if instructor else "student"
     while True:
         saved = notebook.stat().st_mtime_ns
-        result = _checked(notebook, found, settings)
+        result = checked(notebook, found, settings)
         if junit is not None:
             from autograder.core.files import write_beside
             from autograder.report.export.junit import junit_xml
@@ -103,7 +103,8 @@ def isolation_for(wanted: Isolation | None) -> Isolation:
     return found
 
 
-def _checked(notebook: Path, lab: Lab, settings: Settings) -> SubmissionResult:
+def checked(notebook: Path, lab: Lab, settings: Settings) -> SubmissionResult:
+    """Run the checks on a notebook, and say meanwhile on a terminal what takes so long."""
     from autograder.grading.runner import WORKERS_FOR_ONE, run_submission
     from autograder.report.terminal import working
 

@@ -22,6 +22,7 @@ from autograder.course.cell_file import BadNameError, CellFile, check_name
 NODES = "nodes"
 MANIFEST = ".autograder.json"
 _NAMELESS = "kernel-"
+_TIME = "%Y-%m-%d %H:%M:%S"
 
 
 @dataclass(frozen=True)
@@ -42,6 +43,25 @@ class Written:
     def origin(self) -> str:
         """Where it came from, in words: `cell [7], run at 14:03:12`."""
         return f"cell [{self.number}], run at {time.strftime('%H:%M:%S', time.localtime(self.at))}"
+
+
+@dataclass(frozen=True)
+class Ran:
+    """What a manifest says of a file: which text a cell wrote, and when."""
+
+    sha256: str
+    at: float
+    """In seconds since 1970."""
+
+
+def read_runs(folder: Path) -> dict[str, Ran]:
+    """Return what the cells of a notebook wrote into its folder last, by file name."""
+    found = {}
+    for name, entry in _manifest(folder).get("files", {}).items():
+        with contextlib.suppress(ValueError, OverflowError):
+            at = time.mktime(time.strptime(str(entry.get("time")), _TIME))
+            found[name] = Ran(str(entry.get("sha256")), at)
+    return found
 
 
 class ProgramFolder:
@@ -133,7 +153,7 @@ class ProgramFolder:
                 "sha256": hashlib.sha256(one.file.text.encode("utf-8", "replace")).hexdigest(),
                 "cell": one.cell_id,
                 "number": one.number,
-                "time": time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(one.at)),
+                "time": time.strftime(_TIME, time.localtime(one.at)),
             }
             for name, one in self.written.items()
         }

@@ -57,14 +57,24 @@ def submission_view(result: SubmissionResult, audience: Audience = "student") ->
     for check in result.checks:
         parts.append(check_view(check, title=check.title or check.grade_id))
     parts.append(Text())
-    total = f"{result.points:g} of {result.max_points:g} points"
-    undecided = sum(check.status is Status.UNKNOWN for check in result.checks)
-    if undecided:
-        total += f", {undecided} check{'s' if undecided > 1 else ''} undecided: your instructor decides"
-    parts.append(Text(f"{result.lab}: {total}", "bold"))
+    parts.append(_total(result))
     if result.isolation != "full":
         parts.append(Text(f"isolation: {result.isolation.value}", "dim"))
     return Group(*parts)
+
+
+def _total(result: SubmissionResult) -> Text:
+    return Text(f"{result.lab}: {words.total(result)}", "bold")
+
+
+def summary_view(result: SubmissionResult) -> RenderableType:
+    """Return a line for each check, as students may know it, and the points."""
+    table = Table.grid(padding=(0, 1))
+    for check in result_for(result, "student").checks:
+        verdict = words.verdict(check)
+        head = Text(f"{words.SYMBOL[verdict]} {verdict.value}", _VERDICT_STYLE[verdict])
+        table.add_row(head, Text(plain(check.title or check.grade_id)), Text(words.points(check)))
+    return Group(table, Text(), _total(result))
 
 
 def check_view(check: CellResult, remarks: Sequence[str] = (), origin: str = "", title: str = "") -> RenderableType:

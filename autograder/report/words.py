@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import StrEnum
 
-from autograder.core.results import CellResult, Outcome, Part, Status
+from autograder.core.results import CellResult, Outcome, Part, Status, SubmissionResult
 
 
 class Verdict(StrEnum):
@@ -51,6 +51,18 @@ def points(check: CellResult) -> str:
     sure, possible = check.sure_points or 0.0, check.possible_points
     upto = "" if possible == check.max_points else f"{possible:g} of "
     return f"{f'{sure:g} sure, ' if sure else ''}up to {upto}{full}, decided at grading"
+
+
+def total(result: SubmissionResult) -> str:
+    """Return the points of all checks in words."""
+    told = f"{result.points:g} of {result.max_points:g} points"
+    undecided = sum(check.status is Status.UNKNOWN for check in result.checks)
+    later = sum(one.possible_points - (one.sure_points or 0.0) for one in result.checks if one.more_at_grading)
+    if later:
+        told += f", up to {later:g} more decided at grading"
+    if undecided:
+        told += f", {undecided} check{'s' if undecided > 1 else ''} undecided: your instructor decides"
+    return told
 
 
 def part_points(part: Part) -> str:

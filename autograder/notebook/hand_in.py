@@ -1,0 +1,113 @@
+"""What a student should know before a notebook is handed in: what is not saved, not run, outdated, ignored or empty."""
+
+from __future__ import annotations
+
+import hashlib
+import time
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from autograder.course.cell_file import BadNameError, CellFile, parse
+from autograder.course.lab import Answer, Lab, blank_mark, cell_digest, grade_id_of, source_of
+from autograder.notebook.program_folder import NODES, Ran, read_runs
+from autograder.submission.notebook_file import UnreadableError, cells_of
+from autograder.submission.reader import read_submission
+
+
+@dataclass
+class HandIn:
+    """What was found about a notebook, as sentences; none of it keeps the notebook from being handed in."""
+
+    unsaved: list[str] = field(default_factory=list)
+    outdated: list[str] = field(default_factory=list)
+    unrun: list[str] = field(default_factory=list)
+    ignored: list[str] = field(default_factory=list)
+    empty: list[str] = field(default_factory=list)
+
+    @property
+    def warnings(self) -> list[str]:
+        """All of them, in the order in which they matter."""
+        return [*self.unsaved, *self.ignored, *self.outdated, *self.unrun, *self.empty]
+
+
+def look_over(notebook: Path, lab: Lab, packed: Path) -> HandIn:
+    """Return what to tell the student about a notebook.
+
+    Args:
+        notebook: where it lies; beside it lies what its cells have written.
+        lab: that it answers.
+        packed: the copy of it that is handed in.
+    """
+    found = HandIn()
+    submission = read_submission(packed, lab)
+    for problem in submission.problems:
+        found.ignored.append(" ".join(text for text in (problem.because, problem.hint) if text))
+    try:
+        cells = {grade_id_of(cell): cell for cell in cells_of(packed)}
+    except UnreadableError:
+        return found
+    saved_at = notebook.stat().st_mtime
+    runs = read_runs(notebook.parent / NODES / notebook.stem)
+    for answer in lab.answers.values():
+        cell = cells.get(answer.grade_id)
+        if cell is not None:
+            _look_at_answer(answer, cell, runs, saved_at, found)
+    found.outdated += _older_checks(lab, cells)
+    return found
+
+
+def _look_at_answer(answer: Answer, cell: dict[str, Any], runs: dict[str, Ran], saved_at: float, found: HandIn) -> None:
+    source = source_of(cell)
+    name = f"`%%{answer.file.magic} {answer.file.name}`" if answer.file else f"`{answer.grade_id}`"
+    if cell_digest(source) in (blank_mark(answer.blank)["blank"], cell_digest("")):
+        found.empty.append(f"The cell {name} is still as you received it.")
+    elif answer.file is None:
+        return
+    elif (ran := runs.get(answer.file.file_name)) is None:
+        if cell.get("execution_count") is None:
+            found.unrun.append(f"The cell {name} has not been run.")
+    elif ran.sha256 != _digest(source, answer.file):
+        clock = time.strftime("%H:%M:%S", time.localtime(ran.at))
+        if ran.at > saved_at:
+            found.unsaved.append(
+                f"The cell {name} was run at {clock} with a text that is not in the saved notebook. Save the notebook,"
+                " and submit it again."
+            )
+        else:
+            found.outdated.append(
+                f"The cell {name} has been changed since it was run at {clock}: what you saw of it is about the earlier"
+                " text. The saved text is handed in."
+            )
+
+
+def _digest(source: str, file: CellFile) -> str:
+    try:
+        now = parse(source)
+    except BadNameError:
+        now = None
+    text = (now or file).text
+    return hashlib.sha256(text.encode("utf-8", "replace")).hexdigest()
+
+
+def _older_checks(lab: Lab, cells: dict[str, dict[str, Any]]) -> list[str]:
+    """Name the checks that were run before a cell that stands between them and the check above."""
+    older = []
+    newest = 0
+    checks = {check.grade_id: check.title for check in lab.checks}
+    for released in lab.released:
+        grade_id = grade_id_of(released)
+        cell = cells.get(grade_id)
+        count = cell.get("execution_count") if cell is not None else None
+        if grade_id in lab.answers and isinstance(count, int):
+            newest = max(newest, count)
+        elif grade_id in checks:
+            if isinstance(count, int) and count < newest:
+                older.append(f"“{checks[grade_id]}”")
+            newest = 0
+    if not older:
+        return []
+    named = ", ".join(dict.fromkeys(older))
+    return [
+        f"A cell above was run again after the check of {named}: the report in the notebook is about an earlier text."
+    ]
