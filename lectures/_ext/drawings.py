@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 import drawings_bringup
+import drawings_lifecycle
 from docutils import nodes
 from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
@@ -100,6 +101,7 @@ DRAWINGS: dict[str, Callable[[], Picture]] = {
     "robot-layers": drawings_bringup.robot_layers,
     "two-helpers": drawings_bringup.two_helpers,
     "middleware": drawings_bringup.middleware,
+    **drawings_lifecycle.DRAWINGS,
 }
 
 
