@@ -40,9 +40,9 @@ def lifecycle_switch() -> Picture:
     canvas.words(730, 214, "in every state")
     canvas.words(730, 296, "in every state")
     return canvas.picture(
-        "A lifecycle node with a timer, a lifecycle publisher, an ordinary publisher and a subscription. Between the timer "
-        "and the lifecycle publisher stands a switch that is on only while the node is active. The timer, the ordinary "
-        "publisher and the subscription have no switch: they work in every state."
+        "A lifecycle node with a timer, a lifecycle publisher, an ordinary publisher and a subscription. Between the "
+        "timer and the lifecycle publisher stands a switch that is on only while the node is active. The timer, the "
+        "ordinary publisher and the subscription have no switch: they work in every state."
     )
 
 
@@ -73,9 +73,9 @@ def three_endings() -> Picture:
     canvas.words(752, 344, "finalized", bold=True, size=17)
     canvas.words(740, 372, "(not SUCCESS)", size=16)
     return canvas.picture(
-        "Three ways in which a transition callback ends. SUCCESS leads to the next state. FAILURE leads back to the state "
-        "before. ERROR, or an exception, leads to on_error: if that returns SUCCESS the node is unconfigured, otherwise "
-        "it is finalized."
+        "Three ways in which a transition callback ends. SUCCESS leads to the next state. FAILURE leads back to the "
+        "state before. ERROR, or an exception, leads to on_error: if that returns SUCCESS the node is unconfigured, "
+        "otherwise it is finalized."
     )
 
 
@@ -94,8 +94,8 @@ def layers() -> Picture:
     canvas.line([(840, 216), (840, 244), (64, 244)], arrow=True, line=2.4, dashed=True)
     canvas.words(450, 280, "Down, if one is not ready: the last one first", anchor="middle")
     return canvas.picture(
-        "Bring-up in layers: camera, perception and steering are configured and activated one after the other. If one of "
-        "them is not ready, the way down goes in the reverse order."
+        "Bring-up in layers: camera, perception and steering are configured and activated one after the other. If one "
+        "of them is not ready, the way down goes in the reverse order."
     )
 
 
