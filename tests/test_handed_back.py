@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import datetime
 import io
 import json
 import os
@@ -29,6 +30,7 @@ from autograder.grading.validation import validated
 from autograder.intake.formats import recognise
 from autograder.intake.members import members
 from autograder.intake.roster import read_roster
+from autograder.report.class_page import write_class_page
 from autograder.report.export import FORMATS
 
 ROSTER = """id,name,email,section,canvas_id,moodle_id
@@ -191,3 +193,37 @@ def test_junit_has_a_suite_for_each_student(graded: Graded) -> None:
     assert len(set(names)) == len(names)
     score = {one.name: one.value for one in suites["toy.bob"].properties()}["score"]
     assert (xml.tests, xml.failures, xml.errors, score) == (9, 1, 1, "2.5")
+
+
+def test_the_feedback_page_says_first_what_it_came_to_and_what_to_repair(graded: Graded) -> None:
+    ann, bob, cem = (graded.pages[student] for student in ("ann", "bob", "cem"))
+    assert "9.5 of 9 points<" in ann and "Well said, ann." in ann and "Doe, Ann" in ann
+    assert "2.5 of 9 points<" in bob and "after 1 point off for handing in late" in bob
+    assert bob.index("What to repair first") < bob.index("3 points lost") < bob.index('id="task-1"')
+    assert "What to repair first" not in ann
+    assert "2 of 9 points so far" in cem and "2 answers are not graded yet" in cem and "up to 7 points" in cem
+    for page in graded.pages.values():
+        assert "secret" not in page and "http" not in page.replace("http-equiv", "")
+
+
+def test_the_class_page_shows_what_needs_a_person(graded: Graded) -> None:
+    page = graded.root / "build" / "report" / "toy.html"
+    write_class_page(page, class_entries(graded.root, toy.LAB), datetime.date(2026, 11, 22))
+    text = page.read_text(encoding="utf-8")
+    assert "3 students" in text and "mean <b>4.67</b>" in text and "median <b>2.5</b>" in text
+    assert "1 student: " in text and "1 of 3" in text and "An answer in words" in text
+    assert "check_talker" in text and "secret reason" in text and "<script>alert" not in text
+    for student in FILES:
+        assert f'href="../feedback/{student}/toy/toy.html"' in text
+
+
+def test_who_is_gone_from_the_source_leaves_the_class_until_they_are_back(graded: Graded) -> None:
+    gone = (graded.source / FILES["cem"]).rename(graded.root / "cem.ipynb")
+    run = grade(graded.root, graded.source)
+    assert any(note.startswith("cem is not among the submissions any more") for note in run.collected.notes)
+    assert "cem" not in run.grades.read_text() and not list(
+        (graded.root / "build" / "feedback" / "cem").rglob("*.html")
+    )
+    assert [entry.student for entry in class_entries(graded.root)] == ["ann", "bob"]
+    gone.rename(graded.source / FILES["cem"])
+    assert "cem,toy,,9,2" in grade(graded.root, graded.source).grades.read_text()

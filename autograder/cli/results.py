@@ -21,17 +21,21 @@ LEFT_OUT = 3
 
 @app.command()
 def report() -> None:
-    """Write the class report, build/report/index.html, from the stored results."""
+    """Write a page about the class for each lab, build/report/LAB.html: for instructors, not for students."""
+    import datetime
+
     from autograder.course.folder import course_root
     from autograder.course.paths import CoursePaths
-    from autograder.grading.store import ResultStore
+    from autograder.gradebook.class_entries import class_entries
     from autograder.report.class_page import write_class_page
 
     root = course_root()
-    results = ResultStore(root).all()
-    if not results:
+    entries = class_entries(root)
+    if not entries:
         raise KitError("There are no results yet.", "Grade a class first: autograder grade LAB")
-    print(write_class_page(CoursePaths(root).report, results))
+    for lab in sorted({entry.lab for entry in entries}):
+        of_lab = [entry for entry in entries if entry.lab == lab]
+        print(write_class_page(CoursePaths(root).class_page(lab), of_lab, datetime.date.today()))
 
 
 @app.command()

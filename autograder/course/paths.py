@@ -66,10 +66,9 @@ class CoursePaths:
         """The table of grades."""
         return self.build / "grades.csv"
 
-    @property
-    def report(self) -> Path:
-        """The class report."""
-        return self.build / "report" / "index.html"
+    def class_page(self, lab: str) -> Path:
+        """The page about a lab's class, for instructors."""
+        return self.build / "report" / f"{lab}.html"
 
     @property
     def book(self) -> Path:

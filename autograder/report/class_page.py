@@ -1,50 +1,202 @@
-"""The class report: one page with how each check went, why it failed most often, and who stands where."""
+"""The class page: one file for a lab, for whoever teaches it. It shows hidden checks, so it is not for students.
+
+Points are those of the gradebook; where the gradebook does not have a submission, those that its checks gave.
+"""
 
 from __future__ import annotations
 
+import base64
+import datetime
+import hashlib
+import os
+import statistics
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from urllib.parse import quote
+
+from markupsafe import Markup
 
 from autograder.core.files import write_beside
-from autograder.core.results import CheckResult, Status, SubmissionResult
+from autograder.core.results import CheckResult, Status
+from autograder.report import words
 from autograder.report.audience import reason
+from autograder.report.export.entry import Entry, points
 from autograder.report.html import render
 from autograder.report.terminal import class_status, why_lost
+from autograder.report.words import Verdict
 
-_REASONS = 5
+_BINS = 10
+"""Bars of the distribution, each of as many percent as the others."""
+_FEWEST = 5
+"""Of fewer students a discrimination says nothing."""
+_SCRIPT = Path(__file__).with_name("templates") / "class.js"
 
 
-def _check_row(checks: Sequence[CheckResult]) -> dict[str, object]:
-    reasons: Counter[str] = Counter()
+@dataclass(frozen=True)
+class _Person:
+    """What a person has to look at."""
+
+    student: str
+    what: str
+    why: str
+
+
+def write_class_page(path: Path, entries: Sequence[Entry], written: datetime.date) -> Path:
+    """Write the page of one lab and return its path.
+
+    Args:
+        path: of the page.
+        entries: the lab's submissions.
+        written: the day that stands on the page.
+    """
+    scores = [_earned(entry) for entry in entries]
+    top = max((_top(entry) for entry in entries), default=0.0)
+    script = _SCRIPT.read_text(encoding="utf-8")
+    digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+    page = render(
+        "class.html",
+        lab=entries[0].lab,
+        written=f"{written.day} {written:%B %Y}",
+        count=len(entries),
+        top=points(top),
+        mean=points(statistics.fmean(scores)),
+        median=points(statistics.median(scores)),
+        lowest=points(min(scores)),
+        highest=points(max(scores)),
+        bars=_distribution(scores, top),
+        persons=_persons(entries),
+        checks=_checks(entries),
+        students=[_student(entry, path) for entry in entries],
+        script=Markup(script),
+        digest=digest,
+    )
+    write_beside(path, page)
+    return path
+
+
+def _earned(entry: Entry) -> float:
+    if entry.grade is None:
+        return entry.result.points
+    return max(0.0, sum(cell.points or 0.0 for cell in entry.grade.cells) - entry.grade.penalty)
+
+
+def _top(entry: Entry) -> float:
+    return entry.result.max_points if entry.grade is None else entry.grade.max_score
+
+
+def _distribution(scores: Sequence[float], top: float) -> list[dict[str, object]]:
+    counts = Counter(min(_BINS - 1, int(_BINS * score / top)) if top else 0 for score in scores)
+    most = max(counts.values(), default=1)
+    step = top / _BINS
+    bars: list[dict[str, object]] = []
+    for number in range(_BINS):
+        last = number == _BINS - 1
+        label = f"{points(number * step)} to {'' if last else 'below '}{points((number + 1) * step)}"
+        bars.append({"label": label, "count": counts[number], "percent": round(100 * counts[number] / most)})
+    return bars
+
+
+def _persons(entries: Sequence[Entry]) -> list[_Person]:
+    found = []
+    for entry in entries:
+        for check in entry.result.checks:
+            cell = next((c for c in entry.grade.cells if c.grade_id == check.grade_id), None) if entry.grade else None
+            if check.status is Status.UNKNOWN and (cell is None or cell.points is None):
+                why = reason(check.first_failure) if check.first_failure else "The grader could not find out."
+                found.append(
+                    _Person(entry.student, f"{_title(check)}: decide about {points(check.max_points)} points", why)
+                )
+        for cell in entry.grade.waiting if entry.grade is not None else ():
+            if not cell.is_check:
+                what = f"{cell.grade_id}: {points(cell.max_points)} points"
+                found.append(_Person(entry.student, what, "An answer in words, which nobody has graded yet."))
+        found += [_Person(entry.student, "look at this; the points stay", flag) for flag in entry.result.flags]
+        if entry.grade is None:
+            found.append(_Person(entry.student, "not in the gradebook", "Grade the class once more."))
+    return found
+
+
+def _title(check: CheckResult) -> str:
+    return check.title or check.grade_id
+
+
+def _checks(entries: Sequence[Entry]) -> list[dict[str, object]]:
+    """What became of each check, in the lab's order."""
+    order = list(dict.fromkeys(check.grade_id for entry in entries for check in entry.result.checks))
+    rows = []
+    for grade_id in order:
+        found = [(entry, check) for entry in entries for check in entry.result.checks if check.grade_id == grade_id]
+        verdicts = Counter(words.verdict(check) for _, check in found)
+        shares = [_share(entry, check) for entry, check in found]
+        first = found[0][1]
+        rows.append(
+            {
+                "title": _title(first),
+                "grade_id": grade_id,
+                "max_points": points(first.max_points),
+                "count": len(found),
+                "passed": verdicts[Verdict.PASSED] + verdicts[Verdict.HOLDS],
+                "partly": verdicts[Verdict.PARTLY],
+                "failed": verdicts[Verdict.FAILED],
+                "untouched": verdicts[Verdict.NOT_ATTEMPTED],
+                "undecided": verdicts[Verdict.UNKNOWN],
+                "percent": round(100 * statistics.fmean(shares)),
+                "discrimination": _discrimination(found, shares),
+                "reasons": _reasons([check for _, check in found]),
+            }
+        )
+    return rows
+
+
+def _share(entry: Entry, check: CheckResult) -> float:
+    """How much of a check's points somebody has, from 0 to 1."""
+    cells = entry.grade.cells if entry.grade is not None else ()
+    earned = next((cell.points for cell in cells if cell.grade_id == check.grade_id), check.points)
+    return (earned or 0.0) / check.max_points if check.max_points else 0.0
+
+
+def _discrimination(found: Sequence[tuple[Entry, CheckResult]], shares: Sequence[float]) -> str:
+    """The correlation of a check's points with those of all others, from -1 to 1; a word where there is none."""
+    rest = [_earned(entry) - share * check.max_points for (entry, check), share in zip(found, shares, strict=True)]
+    if len(found) < _FEWEST:
+        return "too few"
+    try:
+        return f"{statistics.correlation(shares, rest):.2f}"
+    except statistics.StatisticsError:  # all have the same
+        return "all alike"
+
+
+def _reasons(checks: Sequence[CheckResult]) -> list[dict[str, object]]:
+    """Why points were lost, each reason once a student, the most frequent first."""
+    counts: Counter[str] = Counter()
     example: dict[str, str] = {}
     for check in checks:
-        failure = check.first_failure
-        if failure is not None:
-            code = failure.code or "other"
-            reasons[code] += 1
-            example.setdefault(code, reason(failure))
-    passed = sum(check.status is Status.PASSED for check in checks)
+        bad = {one.code or "other": one for one in reversed(check.outcomes) if one.status is Status.FAILED}
+        for code, outcome in bad.items():
+            counts[code] += 1
+            example.setdefault(code, reason(outcome))
+    return [
+        {"code": code, "told": f"{count} student{'' if count == 1 else 's'}: {example[code]}"}
+        for code, count in counts.most_common()
+    ]
+
+
+def _student(entry: Entry, page: Path) -> dict[str, object]:
+    grade = entry.grade
+    link = quote(os.path.relpath(entry.feedback, page.parent)) if entry.feedback is not None else ""
+    waiting = len(grade.waiting) if grade is not None else 0
     return {
-        "title": checks[0].title or checks[0].grade_id,
-        "max_points": checks[0].max_points,
-        "passed": passed,
-        "count": len(checks),
-        "percent": round(100 * passed / len(checks)),
-        "reasons": [(number, code, example[code]) for code, number in reasons.most_common(_REASONS)],
+        "student": entry.student,
+        "name": entry.known.get("name", ""),
+        "section": entry.known.get("section", ""),
+        "points": points(_earned(entry)),
+        "waiting": waiting,
+        "by_hand": sum(cell.by_hand for cell in grade.cells) if grade is not None else 0,
+        "late": grade.penalty if grade is not None else 0.0,
+        "status": class_status(entry.result),
+        "why": why_lost(entry.result),
+        "flags": len(entry.result.flags),
+        "feedback": link,
     }
-
-
-def write_class_page(path: Path, results: Sequence[SubmissionResult]) -> Path:
-    """Write the page to `path` and return that."""
-    labs = []
-    for lab in sorted({result.lab for result in results}):
-        of_lab = [result for result in results if result.lab == lab]
-        by_id: dict[str, list[CheckResult]] = {}
-        for result in of_lab:
-            for check in result.checks:
-                by_id.setdefault(check.grade_id, []).append(check)
-        students = [{"result": result, "status": class_status(result), "why": why_lost(result)} for result in of_lab]
-        labs.append({"name": lab, "checks": [_check_row(checks) for checks in by_id.values()], "students": students})
-    write_beside(path, render("class.html", labs=labs))
-    return path
