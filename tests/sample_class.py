@@ -1,6 +1,6 @@
 """Builds the sample class of a lab from `tests/classes/<lab>` and says what grading must make of it.
 
-As a script: `python tests/sample_class.py lab2_executors` writes `build/classes/lab2_executors/<student>/…`.
+As a script: `python tests/sample_class.py lab2_executors` writes `build/sample/classes/lab2_executors/<student>/…`.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
 from autograder.course.lab import Lab, grade_id_of, load_lab  # noqa: E402
+from autograder.course.paths import CoursePaths  # noqa: E402
 
 
 @dataclass
@@ -144,9 +145,9 @@ def _notebook(lab: Lab, home: Path, changes: dict[str, Any]) -> dict[str, Any]:
 
 
 def build_class(lab_name: str) -> Path:
-    """Build a lab's sample class under `build/classes/<lab>` and return that folder."""
+    """Build a lab's sample class under `build/sample/classes/<lab>` and return that folder."""
     lab = load_lab(ROOT, lab_name)
-    into = ROOT / "build" / "classes" / lab_name
+    into = CoursePaths(ROOT).sample_class(lab_name)
     shutil.rmtree(into, ignore_errors=True)
     into.mkdir(parents=True)
     for student in students(lab_name):

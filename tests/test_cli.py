@@ -22,8 +22,10 @@ import toy
 from junitparser import JUnitXml
 
 from autograder.core.files import write_beside
+from autograder.core.lock import only_one
 from autograder.core.results import CheckResult, Isolation, Outcome, Status, SubmissionResult
 from autograder.course.lab import load_lab
+from autograder.course.paths import CoursePaths
 from autograder.report.github import commands, summary
 from autograder.sandbox.isolation import preflight
 from autograder.sandbox.scratch import Scratch
@@ -156,7 +158,7 @@ def test_what_the_machine_refuses_is_named_with_a_way_out(root: Path, tmp_path: 
     course = toy.make_course(tmp_path / "course")
     (course / "build").touch()
     status, _, err = run(course, "grade", "toy", str(root / "class"))
-    assert status == 2 and f"{course}/build/" in err and "chown" in err and "defect" not in err
+    assert status == 2 and f"{course}/build: " in err and "chown" in err and "defect" not in err
 
 
 def test_a_full_disk_names_the_file_and_leaves_nothing_behind(tmp_path: Path) -> None:
@@ -184,7 +186,7 @@ def test_a_class_is_graded_once_and_only_what_changed_again(root: Path) -> None:
     assert status == 0, err
     rows = {line.split()[0]: line for line in out.splitlines() if line[:4] in ("ann ", "bob ", "cem ", "dan ")}
     assert "5/5" in rows["ann"] and "✓ passed" in rows["ann"]
-    assert "2/5" in rows["bob"] and "ZeroDivisionError" in rows["bob"]
+    assert "2/5" in rows["bob"] and "1 to grade" in rows["bob"] and "ZeroDivision" in rows["bob"]
     assert "2/5" in rows["cem"] and "0/5" in rows["dan"] and "not valid JSON" in rows["dan"]
     with (root / "build" / "grades.csv").open() as file:
         scores = {row["student"]: (row["score"], row["waiting"]) for row in csv.DictReader(file)}
@@ -194,6 +196,11 @@ def test_a_class_is_graded_once_and_only_what_changed_again(root: Path) -> None:
 
     stamps = {path: path.stat().st_mtime_ns for path in (root / "build" / "results" / "toy").iterdir()}
     hand_in(root, "bob", "print('hello')")
+    table = (root / "build" / "grades.csv").read_text()
+    status, out, _ = run(root, "grade", "toy", "class", "--diff")
+    assert status == 0 and "0/3 → 3/3" in out and "1 of 4 students would have more points, 0 fewer, 3 as many" in out
+    assert {path: path.stat().st_mtime_ns for path in stamps} == stamps
+    assert (root / "build" / "grades.csv").read_text() == table
     began = time.monotonic()
     status, out, _ = run(root, "grade", "toy", "class", "--json")
     assert status == 0 and time.monotonic() - began < 60
@@ -212,6 +219,14 @@ def test_a_class_is_graded_once_and_only_what_changed_again(root: Path) -> None:
     zipped = root / "build" / "gradescope.zip"
     assert run(root, "export", "gradescope", "-o", str(zipped))[0] == 0
     assert len(zipfile.ZipFile(zipped).namelist()) == 4
+
+
+def test_two_gradings_in_one_folder_are_one_too_many(root: Path, tmp_path: Path) -> None:
+    course = toy.make_course(tmp_path / "course")
+    with only_one(CoursePaths(course).lock, "A grading"):
+        status, _, err = run(course, "grade", "toy", str(root / "class"))
+    assert status == 2 and f"A grading is at work in {course} already: process {os.getpid()}, since" in err
+    assert not (course / "gradebook").exists()
 
 
 def family_with_a_worker(process: subprocess.Popen[str]) -> list[psutil.Process]:
@@ -299,7 +314,6 @@ def test_json_tells_what_was_left_out_and_fails_like_the_table(tmp_path: Path) -
         toy.hand_in(course / "class", student, "{")
     (course / "build" / "autograded").mkdir(parents=True)
     (course / "build" / "autograded" / "bob").touch()  # nbgrader needs a folder there
-    (course / "build" / "gradebook.db").touch()
     for arguments in (("--json",), ()):
         status, out, err = run(course, "grade", "toy", "class", *arguments)
         told = err if arguments else out

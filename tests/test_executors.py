@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from collections.abc import Generator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from pathlib import Path
 
 import pytest
@@ -33,8 +33,9 @@ class Elsewhere:
     def __init__(self, address: str, at_once: int) -> None:
         self.folder = address
 
-    def run(self, jobs: Sequence[Job]) -> Generator[SubmissionResult, None, None]:
+    def run(self, jobs: Sequence[Job], started: Callable[[str], None]) -> Generator[SubmissionResult, None, None]:
         for job in jobs:
+            started(job.student)
             ran = subprocess.run(
                 [sys.executable, "-c", FAR], input=job.model_dump_json(), capture_output=True, text=True, check=True,
                 cwd=self.folder,
@@ -83,6 +84,6 @@ def test_a_job_that_cannot_be_run_costs_no_other_its_result(lab: Lab, tmp_path: 
         Job(student=who, lab=lab.name, digest="", isolation=Isolation.NONE, seed=1, files=files, cells=list(lab.cells))
         for who, files in (("ann", {"answers.yaml": "answer: 42\n"}), ("bob", {"talker.py": "\udce4"}))
     )
-    results = {result.student: result for result in Local(2).run([good, bad])}
+    results = {result.student: result for result in Local(2).run([good, bad], lambda _: None)}
     assert results["ann"].points == 2.0
     assert all(check.points is None for check in results["bob"].checks)

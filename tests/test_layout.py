@@ -38,6 +38,7 @@ def tree() -> list[Path]:
         paths = [ROOT / name for name in listed.stdout.decode().split("\0") if name]
     else:
         paths = [path for path in ROOT.rglob("*") if not NOT_OURS & set(path.relative_to(ROOT).parts)]
+        paths = [path for path in paths if path.relative_to(ROOT).parts[0] != "gradebook"]
     return sorted(path for path in paths if path.is_file())
 
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import copy
 import html.parser
 import json
 import os
 import shutil
+import sqlite3
 import subprocess
 import sys
 from pathlib import Path
@@ -16,7 +18,6 @@ import pytest
 import toy
 
 from autograder.authoring.release import release
-from autograder.core.errors import KitError
 from autograder.core.results import Isolation
 from autograder.course.lab import Lab, grade_id_of, load_lab
 from autograder.gradebook.class_run import grade_class
@@ -24,6 +25,7 @@ from autograder.gradebook.grades import write_grades
 from autograder.gradebook.preparation import prepare_nbgrader
 from autograder.gradebook.recorder import Recorder
 from autograder.gradebook.release import register
+from autograder.gradebook.scores import read_grades
 from autograder.gradebook.settings import TEMPLATE
 from autograder.grading import runner
 from autograder.grading.executors import local
@@ -74,9 +76,9 @@ class Course:
         return [student for student in students if self._stamp(student) != before[student]]
 
     def record(self, *students: str, force: bool = False) -> None:
-        with Recorder(self.root, self.lab, force) as recorder:
-            for student in students:
-                recorder.record(student)
+        recorder = Recorder(self.root, self.lab, force)
+        for student in students:
+            recorder.record(student)
         assert recorder.failures == {}
 
     def _stamp(self, student: str) -> float:
@@ -88,7 +90,7 @@ class Course:
         prepare_nbgrader()
         from nbgrader.api import Gradebook
 
-        with Gradebook(f"sqlite:///{self.root / 'build' / 'gradebook.db'}") as gradebook:
+        with Gradebook(f"sqlite:///{self.root / 'gradebook' / 'gradebook.db'}") as gradebook:
             notebook = gradebook.find_submission_notebook(toy.LAB, toy.LAB, student)
             return {grade.name: (grade.auto_score, grade.needs_manual_grade) for grade in notebook.grades}
 
@@ -301,16 +303,22 @@ def test_unchanged_submissions_are_not_recorded_again(course: Course) -> None:
     assert course.grade("same", force=True) == ["same"]
 
 
+def by_hand(course: Course, student: str, **points: float) -> None:
+    """Give points as formgrader does."""
+    prepare_nbgrader()
+    from nbgrader.api import Gradebook
+
+    with Gradebook(f"sqlite:///{course.root / 'gradebook' / 'gradebook.db'}") as gradebook:
+        for name, given in points.items():
+            grade = gradebook.find_grade(name, toy.LAB, toy.LAB, student)
+            grade.manual_score, grade.needs_manual_grade = given, False
+        gradebook.db.commit()
+
+
 def test_a_manual_grade_stays_and_reaches_the_feedback(course: Course) -> None:
     course.hand_in("manual", course.cells(talker="die"))
     course.grade("manual")
-    from nbgrader.api import Gradebook
-
-    with Gradebook(f"sqlite:///{course.root / 'build' / 'gradebook.db'}") as gradebook:
-        for name, points in (("check_talker", 1.5), ("why", 4)):
-            gradebook.find_grade(name, toy.LAB, toy.LAB, "manual").manual_score = points
-        gradebook.db.commit()
-    os.utime(course.root / "build" / "gradebook.db")
+    by_hand(course, "manual", check_talker=1.5, why=4)
     course.grade("manual")
     assert "7.5 of 9 points" in course.feedback("manual")
     course.grade("manual", force=True)
@@ -341,8 +349,8 @@ def test_who_is_late_has_the_same_score_everywhere(tmp_path: Path, monkeypatch: 
     prepare_nbgrader()
     from nbgrader.api import Gradebook
 
-    address = f"sqlite:///{late.root / 'build' / 'gradebook.db'}"
-    (late.root / "build").mkdir()
+    address = f"sqlite:///{late.root / 'gradebook' / 'gradebook.db'}"
+    (late.root / "gradebook").mkdir()
     with Gradebook(address) as gradebook:
         gradebook.add_assignment(toy.LAB, duedate="2026-11-02 12:00 UTC")
     run = grade_class(late.root, toy.LAB, tmp_path / "class", Settings(isolation=Isolation.NONE))
@@ -359,13 +367,81 @@ def test_who_is_late_has_the_same_score_everywhere(tmp_path: Path, monkeypatch: 
     assert "5 of 9 points" in late.feedback("bob")
 
 
-def test_changed_graded_cells_are_refused_with_a_way_out(course: Course, tmp_path: Path) -> None:
-    copied = tmp_path / "course"
-    shutil.copytree(course.root, copied)
-    path = copied / "solutions" / toy.LAB / "toy.ipynb"
-    path.write_text(path.read_text().replace("check_answers", "check_renamed"))
-    with pytest.raises(KitError, match=r"gradebook\.db away"):
-        register(copied, toy.LAB)
+def test_points_by_hand_stay_and_ask_to_be_looked_at_where_what_they_judged_has_changed(course: Course) -> None:
+    def waiting() -> int:
+        return next(
+            len(one.waiting) + len(one.stale) for one in read_grades(course.root, toy.LAB) if one.student == "again"
+        )
+
+    course.hand_in("again", course.cells(talker="print('no')"))
+    course.grade("again")
+    by_hand(course, "again", why=3, check_talker=1.5)
+    for _ in range(2):
+        course.grade("again", force=True)
+        assert waiting() == 0
+    course.hand_in("again", course.cells(talker="print('no')", why="Because of something else."))
+    course.grade("again")
+    assert course.grades("again")["why"] == (None, True) and course.grades("again")["check_talker"] == (0, False)
+    by_hand(course, "again", why=4)
+    course.hand_in("again", course.cells(why="Because of something else."))
+    course.grade("again")
+    assert course.grades("again") == {"check_talker": (3, True), "check_answers": (2, False), "why": (None, False)}
+    assert waiting() == 1 and "again,toy,7.5,9,1\n" in write_grades(course.root).read_text()
+
+
+def test_a_renamed_check_keeps_its_grades_and_a_removed_one_stays_in_a_copy(course: Course, tmp_path: Path) -> None:
+    shutil.copytree(course.root / "solutions", tmp_path / "course" / "solutions")
+    own = Course.__new__(Course)
+    own.root, own.lab = tmp_path / "course", load_lab(tmp_path / "course", toy.LAB)
+    own.hand_in("ann", own.cells())
+    own.grade("ann")
+    by_hand(own, "ann", check_talker=1, why=3)
+    path = own.root / "solutions" / toy.LAB / "toy.ipynb"
+    path.write_text(path.read_text().replace("check_talker", "check_speaker"))
+    own.lab = load_lab(own.root, toy.LAB)
+    told = register(own.root, toy.LAB)
+    assert len(told) == 1 and "check_talker is called check_speaker now and keeps its grades" in told[0]
+    own.grade("ann")
+    assert own.grades("ann") == {"check_speaker": (3, False), "check_answers": (2, False), "why": (None, False)}
+    assert "ann,toy,6,9,0\n" in write_grades(own.root).read_text()
+    notebook = json.loads(path.read_text())
+    notebook["cells"] = [cell for cell in notebook["cells"] if grade_id_of(cell) != "check_speaker"]
+    more = toy.cell("markdown", "And why not?", 40, grade_id="why_not", grade=True, solution=True, points=1)
+    path.write_text(json.dumps(notebook | {"cells": [*notebook["cells"], more]}))
+    own.lab = load_lab(own.root, toy.LAB)
+    told = register(own.root, toy.LAB)
+    assert "check_speaker is no longer graded, with the points that 1 students had by hand" in told[0]
+    own.grade("ann")
+    assert own.grades("ann") == {"check_answers": (2, False), "why": (None, False), "why_not": (0, False)}
+    copies = sorted((own.root / "gradebook" / "backups").glob("*.db"))
+    assert len(copies) == 2 and register(own.root, toy.LAB) == []
+    # A copy that is put back gets what it lacks.
+    (own.root / "gradebook" / "gradebook.db").write_bytes(copies[0].read_bytes())
+    own.grade("ann")
+    assert own.grades("ann").keys() == {"check_answers", "why", "why_not"}
+    assert "ann,toy,5,7,0\n" in write_grades(own.root).read_text()
+
+
+def test_a_gradebook_moves_to_where_clean_does_not_reach_and_gets_the_newest_form(
+    course: Course, tmp_path: Path
+) -> None:
+    root = tmp_path / "course"
+    shutil.copytree(course.root / "solutions", root / "solutions")
+    (root / "build").mkdir()
+    earlier = root / "build" / "gradebook.db"
+    shutil.copy(course.root / "gradebook" / "gradebook.db", earlier)
+    with contextlib.closing(sqlite3.connect(earlier)) as old:  # as nbgrader 0.6 made it
+        old.executescript(
+            "CREATE TABLE a AS SELECT id, name, duedate FROM assignment; DROP TABLE assignment;"
+            "ALTER TABLE a RENAME TO assignment; DROP TABLE course; DROP TABLE autograder_recorded;"
+            "UPDATE alembic_version SET version_num = '282d30a0218e'"
+        )
+    register(root, toy.LAB)
+    assert not earlier.exists()
+    assert [
+        path.name.endswith("_before_nbgrader_upgrade.db") for path in (root / "gradebook" / "backups").iterdir()
+    ] == [True]
+    assert {one.student for one in read_grades(root)} == {one.student for one in read_grades(course.root)}
 
 
 def test_releasing_twice_gives_the_same_files(course: Course) -> None:

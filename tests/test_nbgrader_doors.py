@@ -162,7 +162,7 @@ def points(root: Path) -> dict[str, float]:
     prepare_nbgrader()
     from nbgrader.api import Gradebook
 
-    with Gradebook(f"sqlite:///{root / 'build' / 'gradebook.db'}") as gradebook:
+    with Gradebook(f"sqlite:///{root / 'gradebook' / 'gradebook.db'}") as gradebook:
         found = gradebook.assignment_submissions(toy.LAB)
         return {one.student_id: sum(grade.auto_score or 0 for grade in one.notebooks[0].grades) for one in found}
 

@@ -141,7 +141,7 @@ def test_nbgraders_own_settings_of_a_course_hold_everywhere(environment: Environ
     hand_in(root, tmp_path / "class", "ann", solved=True)
     told = environment.run(root, "autograder", "grade", LAB, tmp_path / "class")
     assert f"gradebook  {tmp_path}/elsewhere.db" in told
-    assert (tmp_path / "elsewhere.db").is_file() and not (root / "build" / "gradebook.db").exists()
+    assert (tmp_path / "elsewhere.db").is_file() and not (root / "gradebook" / "gradebook.db").exists()
     assert f"ann,{LAB},5,5,0" in (root / "build" / "grades.csv").read_text(encoding="utf-8")
 
 

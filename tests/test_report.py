@@ -194,7 +194,7 @@ def test_thirty_students_are_readable_at_120_columns() -> None:
     checks = [check(3, outcome(Status.PASSED), grade_id=f"c{number}") for number in range(9)]
     checks.append(check(0, outcome(Status.FAILED, because="It waits for ever. " * 20), grade_id="c9"))
     class_ = [result(*checks, student=f"student_with_long_name_{number}") for number in range(30)]
-    lines = text_of(class_view(class_)).rstrip().split("\n")
+    lines = text_of(class_view(class_, {})).rstrip().split("\n")
     rows = [line for line in lines if line.startswith("student_with")]
     assert len(rows) == 30 and max(map(len, lines)) <= 120
     assert all("27/30" in row and "✗ failed" in row and "It waits for ever" in row for row in rows)
@@ -202,7 +202,7 @@ def test_thirty_students_are_readable_at_120_columns() -> None:
 
 def test_the_class_table_tells_part_of_the_points_from_none() -> None:
     checks = [check(points, outcome(Status.FAILED), grade_id=f"c{points}") for points in (1, 0)]
-    (row,) = [line for line in text_of(class_view([result(*checks, student="ann")])).split("\n") if "ann" in line]
+    (row,) = [line for line in text_of(class_view([result(*checks, student="ann")], {})).split("\n") if "ann" in line]
     assert "◑✗" in row
 
 
@@ -211,7 +211,7 @@ def test_undecided_checks_are_listed_for_the_instructor() -> None:
     undecided = result(check(None, outcome(Status.UNKNOWN, because="The observer died.")), student="bob")
     assert undecided_view([decided]) is None
     assert "bob: The talker: The observer died." in text_of(undecided_view([decided, undecided]))
-    assert "?" in text_of(class_view([undecided]))
+    assert "?" in text_of(class_view([undecided], {}))
 
 
 def test_junit_counts_failures_and_errors() -> None:

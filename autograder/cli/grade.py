@@ -14,6 +14,7 @@ from autograder.core.results import Isolation
 from autograder.course.paths import CoursePaths
 
 if TYPE_CHECKING:
+    from autograder.core.grades import Grade
     from autograder.gradebook.class_run import ClassRun
 
 LEFT_OUT = 3
@@ -35,6 +36,9 @@ def grade(
     jobs: Annotated[int, typer.Option(min=0, help="How many run at once; 0 lets the machine decide.")] = 0,
     seed: SeedOption = None,
     as_json: JsonOption = False,
+    diff: Annotated[
+        bool, typer.Option("--diff", help="Only show what would change, such as after a change of a check.")
+    ] = False,
 ) -> None:
     """Grade a class: gradebook, grades, feedback, and a table of who lost points why.
 
@@ -44,23 +48,33 @@ def grade(
     from autograder.grading.runner import Settings
 
     root = course_root()
-    paths = CoursePaths(root)
-    source = submissions or paths.sample_class(lab)
+    source = submissions or CoursePaths(root).sample_class(lab)
     if not source.exists():
         raise KitError(
             f"There are no submissions at {source}.",
             "Name a folder or zip." if submissions else f"Build the sample class: python tests/sample_class.py {lab}",
         )
+    if submissions is None:
+        from autograder.authoring.sample_course import sample_course
+
+        root = sample_course(root)
     if root.is_relative_to(source.resolve()):
         raise KitError(
             f"The working folder lies in the submissions, and {root} would be taken for the course.",
             "Change to the folder of your course, and name the submissions from there.",
         )
-    from autograder.gradebook.class_run import grade_class
+    from autograder.gradebook.class_run import grade_class, try_class
     from autograder.sandbox.isolation import choose
 
-    run = grade_class(root, lab, source, Settings(choose(isolation), seed, force, jobs))
-    _show(run, paths, lab, as_json)
+    settings = Settings(choose(isolation), seed, force, jobs)
+    if diff:
+        from autograder.gradebook.differences import difference_view
+        from autograder.report.terminal import console
+
+        console().print(difference_view(try_class(root, lab, source, settings)))
+        return
+    run = grade_class(root, lab, source, settings)
+    _show(run, CoursePaths(root), lab, as_json)
     raise typer.Exit(2 if run.unrecorded else LEFT_OUT if run.collected.refused else 0)
 
 
@@ -68,7 +82,7 @@ def _show(run: ClassRun, paths: CoursePaths, lab: str, as_json: bool) -> None:
     from autograder.gradebook.settings import gradebook_place
     from autograder.report.terminal import class_view, console, plain, undecided_view
 
-    left_out = [plain(sentence) for sentence in (*run.collected.notes, *run.collected.refused)]
+    left_out = [plain(sentence) for sentence in (*run.told, *run.collected.notes, *run.collected.refused)]
     left_out += [f"{plain(name)} is not in the gradebook: {plain(why)}" for name, why in run.unrecorded.items()]
     if as_json:
         print("[" + ",\n".join(result.model_dump_json() for result in run.results) + "]")
@@ -76,7 +90,8 @@ def _show(run: ClassRun, paths: CoursePaths, lab: str, as_json: bool) -> None:
             print(sentence, file=sys.stderr)
         return
     screen = console()
-    screen.print(class_view(run.results))
+    by_hand = {student: _by_hand(grade) for student, grade in run.by_student.items()}
+    screen.print(class_view(run.results, by_hand))
     undecided = undecided_view(run.results)
     if undecided is not None:
         screen.print()
@@ -86,9 +101,7 @@ def _show(run: ClassRun, paths: CoursePaths, lab: str, as_json: bool) -> None:
         screen.print(f"Taken as what {run.collected.format} gives out.", markup=False)
     for sentence in left_out:
         screen.print(sentence, markup=False)
-    screen.print(
-        f"{len(run.results)} submissions in {run.seconds['all']:.0f} s ({run.seconds['recording']:.0f} s in nbgrader)"
-    )
+    screen.print(_time(len(run.results), run.seconds))
     for label, path in (
         ("gradebook", gradebook_place(paths.root)),
         ("grades", run.grades),
@@ -96,3 +109,22 @@ def _show(run: ClassRun, paths: CoursePaths, lab: str, as_json: bool) -> None:
         ("results", paths.results / lab),
     ):
         screen.print(f"{label:<10} {path}", markup=False, soft_wrap=True)
+
+
+def _by_hand(grade: Grade) -> str:
+    """What people gave of what they can give, and what waits for them."""
+    cells = [cell for cell in grade.cells if cell.by_hand or cell.points is None or not cell.is_check]
+    given = [cell for cell in cells if cell.points is not None]
+    most = sum(cell.max_points for cell in cells)
+    parts = [f"{sum(cell.points or 0.0 for cell in given):g}/{most:g}"] if given else []
+    parts += [f"{len(cells) - len(given)} to grade"] if len(given) < len(cells) else []
+    parts += [f"{len(grade.stale)} to look at again"] if grade.stale else []
+    return ", ".join(parts)
+
+
+def _time(submissions: int, seconds: dict[str, float]) -> str:
+    after = seconds["all"] - seconds["running"]
+    return (
+        f"{submissions} submissions in {seconds['all']:.0f} s: {seconds['running']:.0f} s until the last had run, then"
+        f" {after:.0f} s more until the last was recorded. nbgrader worked for {seconds['recording']:.0f} s of that."
+    )

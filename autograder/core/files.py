@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import errno
-import math
 import os
 import stat
 from collections.abc import Callable, Sequence
@@ -27,14 +26,6 @@ def write_beside(path: Path, content: str | bytes) -> None:
             beside.unlink()
         error.filename = str(path)  # a full disk names no file, and nobody knows the one beside it
         raise
-
-
-def modified(path: Path) -> float:
-    """When a file was last written; before all time if it is not there."""
-    try:
-        return path.stat().st_mtime
-    except OSError:
-        return -math.inf
 
 
 def signature(path: Path) -> tuple[int, ...] | None:

@@ -16,9 +16,11 @@ class CellGrade:
     is_check: bool
     """Or else an answer that a person grades."""
     by_hand: bool
-    """A person gave the points."""
+    """A person gave the points, or some of them."""
     comment: str = ""
     """What a person wrote about the answer."""
+    stale: bool = False
+    """A person gave the points for something that has changed since, and should look at it again."""
 
 
 @dataclass(frozen=True)
@@ -35,6 +37,11 @@ class Grade:
     def waiting(self) -> list[CellGrade]:
         """The cells that a person has yet to grade."""
         return [cell for cell in self.cells if cell.points is None]
+
+    @property
+    def stale(self) -> list[CellGrade]:
+        """The cells that a person should look at again."""
+        return [cell for cell in self.cells if cell.stale]
 
     @property
     def score(self) -> float | None:

@@ -113,6 +113,11 @@ class Lab:
         ]
         return hashlib.sha256(json.dumps(parts).encode()).hexdigest()
 
+    @cached_property
+    def source_digest(self) -> str:
+        """SHA-256 over the lab's notebook: all that the gradebook knows of it, and feedback shows."""
+        return hashlib.sha256(json.dumps(self.raw).encode()).hexdigest()
+
     def clean_notebook(self, sources: dict[str, str]) -> dict[str, Any]:
         """Return the released notebook with these sources in its answer cells: nothing else of a student's is in it."""
         cells = copy.deepcopy(list(self.released))

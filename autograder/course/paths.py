@@ -1,4 +1,4 @@
-"""Where everything of a course lies: the one place that knows the names below `build`."""
+"""Where everything of a course lies: the one place that knows the names in it."""
 
 from __future__ import annotations
 
@@ -52,9 +52,19 @@ class CoursePaths:
         return self.build / "taken" / f"{lab}.json"
 
     @property
+    def tried(self) -> Path:
+        """The same of what was only tried, before it counts."""
+        return self.build / "tried"
+
+    @property
     def gradebook(self) -> Path:
-        """nbgrader's database."""
-        return self.build / "gradebook.db"
+        """nbgrader's database: apart from what grading can make again, for it holds what people decided."""
+        return self.root / "gradebook" / "gradebook.db"
+
+    @property
+    def lock(self) -> Path:
+        """Held by the grading that is at work."""
+        return self.build / "grading.lock"
 
     @property
     def gradebook_url(self) -> str:
@@ -80,9 +90,14 @@ class CoursePaths:
         """What students get: a folder, and the same as a zip."""
         return self.build / "release"
 
+    @property
+    def sample_course(self) -> Path:
+        """The course that the sample classes are graded in, so that nobody's gradebook holds sample students."""
+        return self.build / "sample"
+
     def sample_class(self, lab: str) -> Path:
         """Where the sample class of a lab is put together."""
-        return self.build / "classes" / lab
+        return self.sample_course / "classes" / lab
 
     def requirements(self, lab: str) -> Path:
         """What of a lab's text is required, and which check holds it."""

@@ -14,6 +14,7 @@ from typing import Any
 import nbformat
 from nbconvert.exporters import NotebookExporter
 from nbgrader import utils
+from nbgrader.api import Gradebook
 from nbgrader.converters import Autograde
 from nbgrader.preprocessors import (
     AssignLatePenalties,
@@ -28,6 +29,7 @@ from nbgrader.preprocessors import (
 from autograder.core.errors import KitError
 from autograder.core.results import CheckResult, Isolation
 from autograder.course.lab import Lab, load_lab
+from autograder.gradebook import notes
 from autograder.gradebook.inert import UNDECIDED, InertAnswers, inert_text
 from autograder.gradebook.private_nbgrader import SaveScores, in_first_pass
 from autograder.grading.runner import Settings, run_submission
@@ -123,12 +125,37 @@ def _attach(cell: Any, check: CheckResult | None) -> float | None:
 
 
 class SaveCheckedGrades(SaveScores):
-    """Records points of check cells from their results; without a verdict the cell waits for manual grading."""
+    """Records points of check cells from their results; without a verdict the cell waits for manual grading.
+
+    What a person gave stays. If what it was given for has changed since, the person is asked to look at it again.
+    """
+
+    def preprocess(self, nb: Any, resources: dict[str, Any]) -> tuple[Any, dict[str, Any]]:
+        """Record all grades of a submission, and that they are recorded."""
+        root, student, lab, _ = _submitted(self.parent.parent, resources)
+        self._programs = [cell.source for cell in nb.cells if cell.cell_type == "code" and utils.is_solution(cell)]
+        digest = notes.recordable(root, lab, student)
+        with Gradebook(resources["nbgrader"]["db_url"]) as gradebook:
+            notes.make_tables(gradebook.engine)
+        made: tuple[Any, dict[str, Any]] = super().preprocess(nb, resources)
+        with Gradebook(resources["nbgrader"]["db_url"]) as gradebook:
+            notes.note_recorded(gradebook.db, lab.name, student, digest)
+            gradebook.db.commit()
+        return made
 
     def score_check(self, grade: Any, resources: dict[str, Any]) -> None:
         """Set the points that checking found."""
         grade.auto_score = resources[_POINTS].get(grade.name)
-        grade.needs_manual_grade = grade.auto_score is None or grade.manual_score is not None
+
+    def needs_person(self, grade: Any, cell: Any, asked: bool) -> bool:
+        """Ask where there are no points yet, and where points were given by hand for something else."""
+        programs = [] if utils.is_solution(cell) else self._programs
+        about = notes.digest_of(cell.source, programs, grade.auto_score, grade.max_score)
+        before = notes.judged(self.gradebook.db, grade.id)
+        notes.note_judged(self.gradebook.db, grade.id, about)
+        if grade.manual_score is None and grade.extra_credit is None:
+            return grade.auto_score is None
+        return asked or about != before
 
 
 SANITIZE = [ClearOutput, DeduplicateIds, OverwriteKernelspec, OverwriteCells, CheckCellMetadata]

@@ -24,7 +24,7 @@ def class_entries(root: Path, lab: str | None = None) -> list[Entry]:
     """
     paths = CoursePaths(root)
     roster = read_roster(root / FILE_NAME).students if (root / FILE_NAME).is_file() else {}
-    grades = {(grade.lab, grade.student): grade for grade in read_grades(root, lab)}
+    grades = {(grade.lab, grade.student): grade for grade in read_grades(root, lab or "")}
     entries = []
     for result in ResultStore(root).all(lab):
         taken = read_class(root, result.lab).get(result.student, Taken(source=""))

@@ -8,14 +8,20 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
+from autograder.core.grades import Grade
+from autograder.core.lock import only_one
 from autograder.core.results import SubmissionResult
-from autograder.course.lab import load_lab
+from autograder.course.lab import Lab, load_lab
+from autograder.course.paths import CoursePaths
+from autograder.gradebook.background import Recording
 from autograder.gradebook.grades import write_grades
+from autograder.gradebook.progress import Steps
 from autograder.gradebook.recorder import Recorder
+from autograder.gradebook.scores import read_grades
 from autograder.grading.class_runner import run_class
 from autograder.grading.runner import Settings
+from autograder.grading.store import ResultStore
 from autograder.intake.collect import Collected, collect
 
 
@@ -29,39 +35,24 @@ class ClassRun:
     unrecorded: dict[str, str]
     """Why nbgrader has no grade, by student."""
     grades: Path
+    by_student: dict[str, Grade]
+    """What the gradebook holds now, with what people gave."""
+    told: list[str]
+    """What was changed about the gradebook itself, as sentences."""
     seconds: dict[str, float] = field(default_factory=dict)
-    """How long it took in all, and how much of that nbgrader took, which mostly overlaps with running."""
+    """How long it took in all; until the last submission had run; and how long nbgrader worked, mostly meanwhile."""
 
 
-class _Steps:
-    """Progress on a terminal; a line for each step where nobody watches."""
+@dataclass
+class Tried:
+    """What grading a class now would change, of which nothing is recorded."""
 
-    def __init__(self, title: str, total: int, console: Console) -> None:
-        self.console, self.total, self.done = console, total, 0
-        self.progress = Progress(
-            TextColumn(title),
-            BarColumn(),
-            MofNCompleteColumn(),
-            TimeElapsedColumn(),
-            TextColumn("{task.fields[last]}", markup=False),
-            console=console,
-            disable=not console.is_terminal,
-            transient=True,
-        )
-        self.task = self.progress.add_task(title, total=total, last="")
-
-    def __enter__(self) -> _Steps:
-        self.progress.start()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.progress.stop()
-
-    def step(self, last: str) -> None:
-        self.done += 1
-        self.progress.update(self.task, advance=1, last=last)
-        if not self.console.is_terminal:
-            self.console.print(f"{self.done}/{self.total} {last}", markup=False, soft_wrap=True)
+    before: dict[str, SubmissionResult]
+    """The results that are recorded, by student; of who is new there is none."""
+    after: list[SubmissionResult]
+    grades: dict[str, Grade]
+    """What the gradebook holds, by student."""
+    collected: Collected
 
 
 def grade_class(root: Path, lab_name: str, source: Path, settings: Settings) -> ClassRun:
@@ -74,38 +65,77 @@ def grade_class(root: Path, lab_name: str, source: Path, settings: Settings) -> 
         settings: how to run them.
 
     Raises:
-        KitError: usage or set-up.
+        KitError: usage or set-up; or another grading is at work.
         KeyboardInterrupt: finished results are kept, and the next run goes on from them.
     """
-    console = Console(file=sys.stderr, highlight=False)
+    with only_one(CoursePaths(root).lock, "A grading"):
+        return _graded(root, load_lab(root, lab_name), source, settings)
+
+
+def try_class(root: Path, lab_name: str, source: Path, settings: Settings) -> Tried:
+    """Run what `grade_class` would run, and record nothing; `grade_class` takes what was run here.
+
+    Raises:
+        KitError: as `grade_class`.
+    """
     lab = load_lab(root, lab_name)
+    with only_one(CoursePaths(root).lock, "A grading"):
+        collected = collect(source, lab.name, root)
+        store = ResultStore(root)
+        before = {student: store.last(lab.name, student) for student in collected.notebooks}
+        console = Console(file=sys.stderr, highlight=False)
+        with Steps(len(collected.notebooks), console) as steps:
+            after = run_class(collected.notebooks, root, lab, settings, steps.finished, steps.started, tried=True)
+    return Tried(
+        before={student: result for student, result in before.items() if result is not None},
+        after=list(after.values()),
+        grades={grade.student: grade for grade in read_grades(root, lab.name)},
+        collected=collected,
+    )
+
+
+def _graded(root: Path, lab: Lab, source: Path, settings: Settings) -> ClassRun:
+    console = Console(file=sys.stderr, highlight=False)
     collected = collect(source, lab.name, root)
     began = time.monotonic()
-    recording = 0.0
-    with (
-        Recorder(root, lab, settings.force) as recorder,
-        _Steps("grading", len(collected.notebooks), console) as steps,
-    ):
+    recorder = Recorder(root, lab, settings.force)
+    recorded: set[str] = set()
+
+    with Steps(len(collected.notebooks), console) as steps:
+
+        def on_recorded(student: str) -> None:
+            recorded.add(student)
+            if steps.done == steps.total:
+                steps.recording(len(recorded))
+            if student in recorder.failures:
+                steps.say(f"{student} is not in the gradebook: {recorder.failures[student]}")
+
+        recording = Recording(recorder, on_recorded)
 
         def finished(result: SubmissionResult) -> None:
-            # nbgrader is slow and works one by one: it does so while the rest of the class is running.
-            nonlocal recording
-            start = time.monotonic()
-            recorder.record(result.student)
-            recording += time.monotonic() - start
-            steps.step(f"{result.student} {result.points:g}/{result.max_points:g}")
+            steps.finished(result)
+            recording.put(result.student)
 
         try:
-            results = run_class(collected.notebooks, root, lab, settings, finished)
-        except KeyboardInterrupt:
-            steps.progress.stop()
-            console.print(f"\n{steps.done} of {steps.total} results are kept in build/results; run again to go on.")
+            results = run_class(collected.notebooks, root, lab, settings, finished, steps.started)
+            ran = time.monotonic()
+            recording.finish()
+        except BaseException as error:
+            recording.give_up()
+            if isinstance(error, KeyboardInterrupt):
+                kept = f"{steps.done} of {steps.total} results are kept in {CoursePaths(root).results / lab.name}"
+                steps.say(f"\n{kept}; run again to go on.")
             raise
-    grades = write_grades(root)
     return ClassRun(
         results=list(results.values()),
         collected=collected,
         unrecorded=recorder.failures,
-        grades=grades,
-        seconds={"all": round(time.monotonic() - began, 2), "recording": round(recording, 2)},
+        grades=write_grades(root),
+        by_student={grade.student: grade for grade in read_grades(root, lab.name)},
+        told=recorder.told,
+        seconds={
+            "all": round(time.monotonic() - began, 2),
+            "running": round(ran - began, 2),
+            "recording": round(recording.seconds, 2),
+        },
     )

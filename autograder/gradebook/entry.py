@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from autograder.gradebook.config import configure
+from autograder.gradebook.keeping import make_room
 from autograder.gradebook.release import register
-from autograder.gradebook.settings import gradebook_address
 from autograder.gradebook.validate import install
 
 
@@ -22,18 +22,10 @@ def take_over(config: Any, root: Path) -> None:
     configure(config, root)
     config.Autograde.pre_convert_hook = partial(before_autograde, root)
     install(root)
+    if Path.cwd().is_relative_to(root):  # the environment's configuration leads here from other folders, too
+        make_room(root)
 
 
 def before_autograde(root: Path, assignment: str, student: str, notebooks: list[str]) -> None:
     """nbgrader's hook: note the lab's cells when `nbgrader autograde` meets a gradebook without them."""
-    from nbgrader.api import Gradebook, MissingEntry
-
-    with Gradebook(gradebook_address(root)) as gradebook:
-        try:
-            gradebook.find_notebook(assignment, assignment)
-        except MissingEntry:
-            known = False
-        else:
-            known = True
-    if not known:
-        register(root, assignment)
+    register(root, assignment)

@@ -16,7 +16,7 @@ from nbgrader import utils
 from autograder.core.errors import KitError
 from autograder.core.results import SubmissionResult
 from autograder.course.lab import Lab, heading_in, load_lab
-from autograder.gradebook.one_grade import read_grade
+from autograder.gradebook.reading import read_grade
 from autograder.grading.store import ResultStore
 from autograder.intake.roster import FILE_NAME, read_roster
 from autograder.report.feedback_page import Heading, Task, feedback_html, plain_title

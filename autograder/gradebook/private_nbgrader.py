@@ -10,9 +10,10 @@ from pathlib import Path
 from typing import Any
 
 from nbgrader import utils
+from nbgrader.api import MissingEntry
 from nbgrader.converters import Autograde
 from nbgrader.converters.generate_solution import GenerateSolution
-from nbgrader.preprocessors import Execute, SaveAutoGrades
+from nbgrader.preprocessors import Execute, SaveAutoGrades, SaveCells
 from nbgrader.validator import Validator
 
 Verdicts = dict[str, list[dict[str, str]]]
@@ -25,21 +26,50 @@ def in_first_pass(autograde: Autograde) -> bool:
 
 
 class SaveScores(SaveAutoGrades):  # type: ignore[misc]
-    """nbgrader's stage that records points, without its way of finding the points of a check cell."""
+    """nbgrader's stage that records points, without its ways of finding them and of asking for a person."""
 
     def score_check(self, grade: Any, resources: dict[str, Any]) -> None:
         """Set the points of a check cell in its grade."""
         raise NotImplementedError
 
+    def needs_person(self, grade: Any, cell: Any, asked: bool) -> bool:
+        """Whether a person has to look at a cell, whose grade has its points; `asked`: whether one had to before."""
+        raise NotImplementedError
+
     def _add_score(self, cell: Any, resources: dict[str, Any]) -> None:
+        grade_id = cell.metadata["nbgrader"]["grade_id"]
+        grade = self.gradebook.find_grade(grade_id, self.notebook_id, self.assignment_id, self.student_id)
+        asked = bool(grade.needs_manual_grade)
         if utils.is_solution(cell) or cell.cell_type != "code":
             super()._add_score(cell, resources)
-            return
-        grade_id = cell.metadata["nbgrader"]["grade_id"]
-        self.score_check(
-            self.gradebook.find_grade(grade_id, self.notebook_id, self.assignment_id, self.student_id), resources
-        )
+        else:
+            self.score_check(grade, resources)
+        grade.needs_manual_grade = self.needs_person(grade, cell, asked)
         self.gradebook.db.commit()
+
+
+class SaveLabCells(SaveCells):  # type: ignore[misc]
+    """nbgrader's stage that notes a lab's cells, which by itself refuses a lab that has grades and other cells now."""
+
+    def fit(self, notebook: Any, new: dict[str, dict[str, Any]]) -> None:
+        """Give the notebook in the gradebook, which has grades, the cells that the lab has now.
+
+        Args:
+            notebook: as the gradebook has it.
+            new: what nbgrader notes of each cell, by kind (`grade`, `solution`, `task`, `source`) and name.
+        """
+        raise NotImplementedError
+
+    def _create_notebook(self, nb: Any) -> None:
+        kinds = ("grade", "solution", "task", "source")
+        new = {kind: getattr(self, f"new_{kind}_cells") for kind in kinds}
+        try:
+            notebook = self.gradebook.find_notebook(self.notebook_id, self.assignment_id)
+        except MissingEntry:
+            notebook = None
+        if notebook is not None and notebook.submissions:
+            self.fit(notebook, new)
+        super()._create_notebook(nb)
 
 
 def replace_execution(validate: Callable[[Path, bool], Verdicts], refuse: Callable[[], Exception]) -> None:

@@ -2,27 +2,36 @@
 
 from __future__ import annotations
 
-import math
-import os
-import shutil
+import re
 from pathlib import Path
 from typing import Any
 
-from autograder.core.files import modified
+from autograder.core.errors import KitError
+from autograder.core.files import write_beside
 from autograder.course.lab import Lab
 from autograder.course.paths import CoursePaths
+from autograder.gradebook import notes
 from autograder.gradebook.api import answered, last_error, open_api
+from autograder.gradebook.keeping import make_room
+from autograder.gradebook.reading import digests
 from autograder.gradebook.release import register
-from autograder.gradebook.settings import gradebook_file
-from autograder.grading.store import ResultStore
-from autograder.submission import timestamp
+from autograder.gradebook.scores import ask
+from autograder.gradebook.settings import gradebook_place
+
+MARK = ".grades"
+"""The file beside a feedback page that says which grades it shows."""
+_NO_ROOM = re.compile(
+    r"(No space left on device|database or disk is full|disk I/O error|Disk quota exceeded"
+    r"|readonly database|Read-only file system|unable to open database file)"
+)
+"""What the machine says, through nbgrader, that will not be otherwise for the next student."""
 
 
 class Recorder:
     """Records results in the gradebook and writes feedback, one student at a time, for those that changed."""
 
     def __init__(self, root: Path, lab: Lab, force: bool) -> None:
-        """Look at what is recorded already; nothing is loaded or written before something is to be.
+        """Nothing is loaded or written before something is to be recorded.
 
         Args:
             root: of the course.
@@ -30,55 +39,66 @@ class Recorder:
             force: record also what did not change.
         """
         self._root, self._lab, self._force = root, lab, force
-        self._paths, self._store = CoursePaths(root), ResultStore(root)
+        self._paths = CoursePaths(root)
         self._api: Any = None
-        self._written: list[Path] = []
+        self._known: tuple[dict[str, str], dict[str, str]] | None = None
         self.failures: dict[str, str] = {}
         """Why it failed, by student; the others are recorded."""
-        gradebook = gradebook_file(root)
-        if gradebook is not None and not gradebook.exists():
-            # What was recorded went with the gradebook.
-            shutil.rmtree(self._paths.autograded, ignore_errors=True)
-        # Of a gradebook on a server nobody knows when somebody graded by hand, so every page is written again.
-        self._last_grade = math.inf if gradebook is None else modified(gradebook)
-
-    def __enter__(self) -> Recorder:
-        """Return itself."""
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        """Note that the feedback knows the gradebook as it is now, also when the rest of the class was given up."""
-        for path in self._written:
-            os.utime(path)
+        self.told: list[str] = []
+        """What was changed about the gradebook itself, as sentences."""
 
     def record(self, student: str) -> None:
         """Record one student's result.
 
         Raises:
-            KitError: the gradebook has grades for other cells.
+            KitError: nothing can be recorded at all.
             KeyboardInterrupt: the student counts as not recorded.
         """
-        feedback = self._paths.feedback_page(student, self._lab.name)
+        page = self._paths.feedback_page(student, self._lab.name)
         steps = self._due(student)
-        if steps and self._api is None:
-            register(self._root, self._lab.name)
+        if not steps:
+            return
+        if self._api is None:
+            self.told += register(self._root, self._lab.name)
             self._api = open_api(self._root)
-        if steps:
-            feedback.unlink(missing_ok=True)
+        page.unlink(missing_ok=True)
         for step in steps:
             answer = answered(getattr(self._api, step)(self._lab.name, student, force=True))
             if not answer["success"]:
-                self.failures[student] = last_error(answer)
+                self._failed(student, answer)
                 return
-        self._written.append(feedback)
+        write_beside(page.with_name(MARK), self._shown(student).get(student, ""))
+
+    def _failed(self, student: str, answer: dict[str, Any]) -> None:
+        why = last_error(answer)
+        refused = _NO_ROOM.search(why)
+        if refused:
+            raise KitError(
+                f"Recording {student} failed, since the machine said: {refused[0]}. The gradebook is"
+                f" {gradebook_place(self._root)}.",
+                "See that the disk has room and that you may write there, and run again: what is finished is kept.",
+            )
+        self.failures[student] = why
 
     def _due(self, student: str) -> list[str]:
-        """The steps of nbgrader's that a student needs; none if neither the result nor a grade changed."""
-        recorded = self._paths.autograded_notebook(student, self._lab.name)
-        result = self._store.path(self._lab.name, student)
-        handed_in = self._paths.submitted_notebook(student, self._lab.name).with_name(timestamp.FILE_NAME)
-        if self._force or modified(recorded) < max(map(modified, (result, self._lab.notebook, handed_in))):
+        """The steps of nbgrader's that a student needs; none if neither the result nor a grade changed.
+
+        The gradebook itself says what was recorded in it, so that one that was put back gets what it lacks.
+        """
+        if self._known is None:
+            make_room(self._root)
+            self._known = self._recorded(), self._shown()
+        recorded, shown = self._known
+        there = self._paths.autograded_notebook(student, self._lab.name).is_file()
+        if self._force or not there or recorded.get(student) != notes.recordable(self._root, self._lab, student):
             return ["autograde", "generate_feedback"]
-        # The gradebook was younger than the feedback where somebody graded by hand since.
-        stale = modified(self._paths.feedback_page(student, self._lab.name)) < self._last_grade
-        return ["generate_feedback"] if stale else []
+        page = self._paths.feedback_page(student, self._lab.name)
+        mark = page.with_name(MARK)
+        fresh = page.is_file() and mark.is_file() and mark.read_text(encoding="utf-8") == shown.get(student)
+        return [] if fresh else ["generate_feedback"]
+
+    def _recorded(self) -> dict[str, str]:
+        return ask(self._root, lambda connection: notes.recorded(connection, self._lab.name), {})
+
+    def _shown(self, student: str = "") -> dict[str, str]:
+        return ask(self._root, lambda connection: digests(connection, self._lab.name, student), {})

@@ -6,8 +6,10 @@ import tempfile
 from pathlib import Path
 
 from autograder.core.errors import KitError
+from autograder.course.lab import load_lab
 from autograder.gradebook.api import answered, last_error, open_api
-from autograder.gradebook.settings import gradebook_place
+from autograder.gradebook.keeping import bring_up_to_date, make_room
+from autograder.gradebook.settings import gradebook_address
 
 
 def generate(root: Path, lab: str, into: Path, gradebook: bool) -> Path:
@@ -22,11 +24,6 @@ def generate(root: Path, lab: str, into: Path, gradebook: bool) -> Path:
     api = open_api(root, gradebook, release_directory=str(into), ignore=_NOT_RELEASED)
     answer = answered(api.generate_assignment(lab, force=True, create=True))
     if not answer["success"]:
-        if "there are submissions associated" in answer.get("log", "") + answer["error"]:
-            raise KitError(
-                f"The graded cells of {lab} are not those that the gradebook has grades for.",
-                f"Move {gradebook_place(root)} away, then grade again.",
-            )
         raise KitError(f"nbgrader could not generate {lab}.", last_error(answer))
     return into / lab
 
@@ -51,11 +48,36 @@ def released_files(root: Path, lab: str) -> dict[Path, bytes]:
     }
 
 
-def register(root: Path, lab: str) -> None:
+def knows(root: Path, lab: str) -> bool:
+    """Whether the gradebook has the cells of a lab as they are now."""
+    from sqlalchemy import create_engine
+
+    from autograder.gradebook.notes import THE_LAB, recorded
+
+    engine = create_engine(gradebook_address(root))
+    try:
+        with engine.connect() as connection:
+            return recorded(connection, lab).get(THE_LAB) == load_lab(root, lab).source_digest
+    finally:
+        engine.dispose()
+
+
+def register(root: Path, lab: str) -> list[str]:
     """Note a lab's cells in the course's gradebook; nbgrader needs them there before it grades.
 
+    Returns:
+        What was changed about a gradebook that has grades for other cells, as sentences.
+
     Raises:
-        KitError: the gradebook has grades for other cells.
+        KitError: nbgrader refuses.
     """
+    make_room(root)
+    bring_up_to_date(root)
+    if knows(root, lab):
+        return []
     with tempfile.TemporaryDirectory() as folder:
         generate(root, lab, Path(folder), gradebook=True)
+    from autograder.gradebook.migration import FitCells
+
+    told, FitCells.told[:] = list(FitCells.told), []
+    return told

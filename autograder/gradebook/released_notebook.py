@@ -15,11 +15,11 @@ from nbgrader.preprocessors import (
     ComputeChecksums,
     LockCells,
     NbGraderPreprocessor,
-    SaveCells,
 )
 
 from autograder.course.lab import blank_mark
 from autograder.course.markers import without_hidden_tests
+from autograder.gradebook.migration import FitCells
 
 
 class HideTests(NbGraderPreprocessor):  # type: ignore[misc]
@@ -61,7 +61,7 @@ RELEASE = [
     ClearOutput,
     CheckCellMetadata,
     ComputeChecksums,
-    SaveCells,
+    FitCells,
     HideTests,
     ClearMarkScheme,
     ComputeChecksums,
@@ -70,5 +70,5 @@ RELEASE = [
 ]
 
 
-WITHOUT_GRADEBOOK = [stage for stage in RELEASE if stage is not SaveCells]
+WITHOUT_GRADEBOOK = [stage for stage in RELEASE if stage is not FitCells]
 """Where labs are generated without a gradebook: making one takes longer than all the rest."""

@@ -2,33 +2,45 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING, TypeVar
 
 from autograder.core.grades import Grade
-from autograder.gradebook.one_grade import grade_of
-from autograder.gradebook.preparation import prepare_nbgrader
+from autograder.gradebook.reading import grades_in
 from autograder.gradebook.settings import gradebook_address, gradebook_file
 from autograder.intake.record import read_class
 
+if TYPE_CHECKING:
+    from sqlalchemy.engine import Connection
 
-def read_grades(root: Path, lab: str | None = None) -> list[Grade]:
+Answer = TypeVar("Answer")
+
+
+def ask(root: Path, question: Callable[[Connection], Answer], nothing: Answer) -> Answer:
+    """Return what a question finds in the gradebook; `nothing` where nbgrader has written none yet."""
+    file = gradebook_file(root)
+    if file is not None and not file.is_file():
+        return nothing
+    from sqlalchemy import create_engine, inspect
+
+    engine = create_engine(gradebook_address(root))
+    try:
+        with engine.connect() as connection:
+            return question(connection) if inspect(connection).has_table("grade") else nothing
+    finally:
+        engine.dispose()
+
+
+def read_grades(root: Path, lab: str = "") -> list[Grade]:
     """Return the grade of each student of the class, sorted by student and lab; who has left the class is not in it.
 
     Args:
         root: of the course.
-        lab: whose grades; None: of all labs.
+        lab: whose grades; empty: of all labs.
     """
-    file = gradebook_file(root)
-    if file is not None and not file.is_file():
-        return []
-    prepare_nbgrader()
-    from nbgrader.api import Gradebook
-
-    grades = []
-    with Gradebook(gradebook_address(root)) as gradebook:
-        for assignment in gradebook.assignments:
-            if lab not in (None, assignment.name):
-                continue
-            left = {student for student, taken in read_class(root, assignment.name).items() if taken.left}
-            grades += [grade_of(one) for one in assignment.submissions if one.student_id not in left]
-    return sorted(grades, key=lambda grade: (grade.student, grade.lab))
+    nobody: list[Grade] = []
+    grades = ask(root, lambda connection: grades_in(connection, lab), nobody)
+    classes = {name: read_class(root, name) for name in {grade.lab for grade in grades}}
+    left = {(name, who) for name, class_ in classes.items() for who, taken in class_.items() if taken.left}
+    return [grade for grade in grades if (grade.lab, grade.student) not in left]

@@ -8,6 +8,7 @@ from typing import Any
 
 from autograder.core.errors import KitError
 from autograder.course.paths import CoursePaths
+from autograder.gradebook.backup import file_of
 
 CONFIG_FILE = "nbgrader_config.py"
 TEMPLATE = Path(__file__).with_name("nbgrader_config.template")
@@ -49,8 +50,7 @@ def gradebook_address(root: Path) -> str:
 
 def gradebook_file(root: Path) -> Path | None:
     """Return the file that is a course's gradebook; None where it lies on a server."""
-    scheme, _, path = gradebook_address(root).partition(":///")
-    return Path(path) if scheme == "sqlite" else None
+    return file_of(gradebook_address(root))
 
 
 def gradebook_place(root: Path) -> str:

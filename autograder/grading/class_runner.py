@@ -23,6 +23,8 @@ def run_class(
     lab: Lab,
     settings: Settings,
     on_result: Callable[[SubmissionResult], None],
+    on_start: Callable[[str], None] = lambda _: None,
+    tried: bool = False,
 ) -> dict[str, SubmissionResult]:
     """Run a class, several submissions at once, and return the results by student.
 
@@ -35,18 +37,26 @@ def run_class(
         lab: that they answer.
         settings: how to run them.
         on_result: called in this thread for each result as it arrives.
+        on_start: called, in any thread, with each student whose submission begins to run, if the executor can tell.
+        tried: keep what is run apart from the results, for nothing of it is to count yet; a later run takes it from
+            there.
 
     Raises:
         KitError: the course's executor cannot be used.
         KeyboardInterrupt: after every run has been stopped; finished results are kept.
     """
     executor = executors.chosen(read_settings(root).executor, settings.at_once)
-    store = ResultStore(root)
+    kept, apart = ResultStore(root), ResultStore(root, tried=True)
+    store = apart if tried else kept
     results: dict[str, SubmissionResult] = {}
     jobs: dict[str, Job] = {}
     for student, path in submissions.items():
         submission = read_submission(path, lab)
-        result = stored(student, submission, lab, settings, store)
+        result = stored(student, submission, lab, settings, kept)
+        if result is None:
+            result = stored(student, submission, lab, settings, apart)
+            if result is not None and not tried:
+                kept.save(result)
         if result is None:
             job = job_of(submission, student, lab, settings)
             if submission.readable:
@@ -56,7 +66,7 @@ def run_class(
             store.save(result)
         results[student] = result
         on_result(result)
-    with closing(executor.run(list(jobs.values()))) as ran:
+    with closing(executor.run(list(jobs.values()), on_start)) as ran:
         for result in ran:
             # It may come from another machine: only what belongs to the job is believed.
             believed = validated(result, jobs[result.student].checks)

@@ -17,11 +17,13 @@ class ResultStore:
 
     Args:
         root: of the course.
+        tried: those that were only tried, of which nothing is recorded.
     """
 
-    def __init__(self, root: Path) -> None:
+    def __init__(self, root: Path, tried: bool = False) -> None:
         """Nothing is read or written before it is asked for."""
-        self._root, self._folder = root, CoursePaths(root).results
+        self._root = root
+        self._folder = CoursePaths(root).tried if tried else CoursePaths(root).results
 
     def path(self, lab: str, student: str) -> Path:
         """Where the result of a submission is kept."""
@@ -47,13 +49,19 @@ class ResultStore:
             isolation: that it must have been run with; None accepts any.
             seed: that it must have been run with; None accepts any.
         """
-        try:
-            result = SubmissionResult.load(self.path(lab.name, student))
-        except (OSError, ValueError):
+        result = self.last(lab.name, student)
+        if result is None:
             return None
         same = result.digest == digest and result.schema_version == SCHEMA_VERSION
         fits = same and isolation in (None, result.isolation) and seed in (None, result.seed)
         return validated(result, lab.checks) if fits else None
+
+    def last(self, lab: str, student: str) -> SubmissionResult | None:
+        """Return the stored result, whatever it is of; None if there is none that can be read."""
+        try:
+            return SubmissionResult.load(self.path(lab, student))
+        except (OSError, ValueError):
+            return None
 
     def all(self, lab: str | None = None) -> list[SubmissionResult]:
         """Return every stored result, or those of one lab, sorted by lab and student.

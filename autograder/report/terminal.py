@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import io
 import unicodedata
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 from rich.console import Console, Group, RenderableType
 from rich.panel import Panel
@@ -167,13 +167,20 @@ def why_lost(result: SubmissionResult) -> str:
     return ""
 
 
-def class_view(results: Sequence[SubmissionResult]) -> RenderableType:
-    """Return a class as a table: a row for each student, a symbol for each check, and why points were lost."""
+def class_view(results: Sequence[SubmissionResult], by_hand: Mapping[str, str]) -> RenderableType:
+    """Return a class as a table: a row for each student, a symbol for each check, and why points were lost.
+
+    Args:
+        results: of the class.
+        by_hand: by student, what people gave and what waits for them.
+    """
     checks = results[0].checks if results else []
     table = Table(box=None, header_style="bold", padding=(0, 1), pad_edge=False, expand=True)
     table.add_column("student", no_wrap=True, max_width=26)
     table.add_column(f"checks 1-{len(checks)}", no_wrap=True)
     table.add_column("points", justify="right", no_wrap=True)
+    if any(by_hand.values()):
+        table.add_column("by hand", no_wrap=True)
     table.add_column("status", no_wrap=True)
     table.add_column("why points were lost", ratio=1, no_wrap=True, overflow="ellipsis")
     for result in results:
@@ -182,6 +189,7 @@ def class_view(results: Sequence[SubmissionResult]) -> RenderableType:
             Text(plain(result.student)),
             _marks(result.checks),
             f"{result.points:g}/{result.max_points:g}",
+            *([by_hand.get(result.student, "")] if any(by_hand.values()) else []),
             Text(f"{SYMBOL[status]} {_WORD[status]}", STYLE[status]),
             Text(why_lost(result)),
         )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from typing import Protocol
 
 from autograder.core.results import SubmissionResult
@@ -12,8 +12,11 @@ from autograder.grading.job import Job
 class Executor(Protocol):
     """Runs jobs wherever it likes: a job is JSON, needs no file of the course, and goes to `run_in_worker`."""
 
-    def run(self, jobs: Sequence[Job]) -> Generator[SubmissionResult, None, None]:
+    def run(self, jobs: Sequence[Job], started: Callable[[str], None]) -> Generator[SubmissionResult, None, None]:
         """Run jobs, several at once, and yield each result as soon as it is there, in whatever order.
+
+        `started` is called with each student whose job begins to run, in any thread; an executor that cannot tell
+        leaves that out.
 
         A job that goes wrong costs no other job its result: it yields `supervisor.unknown`. When the generator
         is closed, as after Ctrl-C, everything is ended that still runs.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Generator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, as_completed
 
 from autograder.core.errors import KitError
@@ -26,12 +26,17 @@ class Local:
         """Nothing runs yet."""
         self._at_once = at_once
 
-    def run(self, jobs: Sequence[Job]) -> Generator[SubmissionResult, None, None]:
+    def run(self, jobs: Sequence[Job], started: Callable[[str], None]) -> Generator[SubmissionResult, None, None]:
         """Run jobs, as `Executor.run` says."""
         stop = threading.Event()
+
+        def run(job: Job) -> SubmissionResult:
+            started(job.student)
+            return run_in_worker(job, stop)
+
         pool = ThreadPoolExecutor(self._at_once, thread_name_prefix="submission")
         try:
-            futures = {pool.submit(run_in_worker, job, stop): job for job in jobs}
+            futures = {pool.submit(run, job): job for job in jobs}
             for future in as_completed(futures):
                 yield _result_of(future, futures[future])
         finally:
