@@ -410,7 +410,7 @@ def test_a_renamed_check_keeps_its_grades_and_a_removed_one_stays_in_a_copy(cour
     path.write_text(json.dumps(notebook | {"cells": [*notebook["cells"], more]}))
     own.lab = load_lab(own.root, toy.LAB)
     told = register(own.root, toy.LAB)
-    assert "check_speaker is no longer graded, with the points that 1 students had by hand" in told[0]
+    assert "check_speaker is no longer graded, with the points by hand of 1 student;" in told[0]
     own.grade("ann")
     assert own.grades("ann") == {"check_answers": (2, False), "why": (None, False), "why_not": (0, False)}
     copies = sorted((own.root / "gradebook" / "backups").glob("*.db"))
@@ -428,6 +428,8 @@ def test_a_gradebook_moves_to_where_clean_does_not_reach_and_gets_the_newest_for
     root = tmp_path / "course"
     shutil.copytree(course.root / "solutions", root / "solutions")
     (root / "build").mkdir()
+    course.hand_in("moved", course.cells())
+    course.grade("moved")
     earlier = root / "build" / "gradebook.db"
     shutil.copy(course.root / "gradebook" / "gradebook.db", earlier)
     with contextlib.closing(sqlite3.connect(earlier)) as old:  # as nbgrader 0.6 made it

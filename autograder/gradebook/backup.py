@@ -28,7 +28,8 @@ def back_up(address: str, reason: str) -> Path | None:
     file = file_of(address)
     if file is None or not file.exists():
         return None
-    copy = file.parent / BACKUPS / f"{time.strftime('%Y-%m-%d_%H-%M-%S')}_{reason.replace(' ', '_')}.db"
+    moment = f"{time.strftime('%Y-%m-%d_%H-%M-%S')}.{time.time_ns() // 1000 % 1_000_000:06d}"  # never that of another
+    copy = file.parent / BACKUPS / f"{moment}_{reason.replace(' ', '_')}.db"
     copy.parent.mkdir(exist_ok=True)
     beside = copy.with_name(f".{copy.name}.{os.getpid()}")
     try:

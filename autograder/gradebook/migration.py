@@ -76,7 +76,7 @@ class FitCells(SaveLabCells):
         for cell in [cell for cell in _graded(notebook) if cell.name in gone]:
             by_hand = sum(grade.manual_score is not None for grade in cell.grades)
             if by_hand or cell.name not in said:
-                also = f", with the points that {by_hand} students had by hand" if by_hand else ""
+                also = f", with the points by hand of {by_hand} student{'s' * (by_hand > 1)}" if by_hand else ""
                 said[cell.name] = f"{cell.name} is no longer graded{also}"
             for record in (*cell.grades, *cell.comments, cell):
                 self.gradebook.db.delete(record)
