@@ -227,3 +227,26 @@ def test_who_is_gone_from_the_source_leaves_the_class_until_they_are_back(graded
     assert [entry.student for entry in class_entries(graded.root)] == ["ann", "bob"]
     gone.rename(graded.source / FILES["cem"])
     assert "cem,toy,,9,2" in grade(graded.root, graded.source).grades.read_text()
+
+
+def test_both_pages_can_be_read_by_everybody_on_a_phone_and_on_paper(graded: Graded, browser: Any) -> None:
+    axe = pytest.importorskip("axe_playwright_python.sync_playwright")
+    page = graded.root / "build" / "report" / "toy.html"
+    write_class_page(page, class_entries(graded.root, toy.LAB), datetime.date(2026, 11, 22))
+    window = browser.new_page(viewport={"width": 390, "height": 800})
+    outside: list[str] = []
+    window.on("request", lambda request: None if request.url.startswith("file:") else outside.append(request.url))
+    for path in (page, graded.root / "build" / "feedback" / "bob" / "toy" / "toy.html"):
+        window.goto(path.as_uri())
+        assert window.evaluate("document.documentElement.scrollWidth <= innerWidth")
+        found = axe.Axe().run(window, options={"preload": False}).response["violations"]
+        assert [f"{rule['id']}: {rule['nodes'][0]['html'][:150]}" for rule in found] == []
+    window.goto(page.as_uri())
+    window.fill("#search", "müller")
+    assert window.inner_text("#shown") == "1 shown"
+    window.fill("#search", "")
+    window.click("#students th:nth-child(2) button")
+    first = "#students tbody tr:first-child td:first-child a"
+    assert window.inner_text(first) == "cem"
+    window.close()
+    assert outside == []

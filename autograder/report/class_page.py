@@ -43,6 +43,17 @@ class _Person:
     why: str
 
 
+def _together(persons: Sequence[_Person]) -> list[dict[str, object]]:
+    """What is the same for several students stands once."""
+    students: dict[tuple[str, str], list[str]] = {}
+    for person in persons:
+        students.setdefault((person.what, person.why), []).append(person.student)
+    return [
+        {"what": what, "why": why, "count": len(names), "students": ", ".join(dict.fromkeys(names))}
+        for (what, why), names in students.items()
+    ]
+
+
 def write_class_page(path: Path, entries: Sequence[Entry], written: datetime.date) -> Path:
     """Write the page of one lab and return its path.
 
@@ -66,7 +77,7 @@ def write_class_page(path: Path, entries: Sequence[Entry], written: datetime.dat
         lowest=points(min(scores)),
         highest=points(max(scores)),
         bars=_distribution(scores, top),
-        persons=_persons(entries),
+        persons=_together(_persons(entries)),
         checks=_checks(entries),
         students=[_student(entry, path) for entry in entries],
         script=Markup(script),

@@ -72,9 +72,15 @@ def feedback_html(
     shown = result_for(result, "student") if result is not None else None
     checks = {check.grade_id: check for check in shown.checks} if shown is not None else {}
     cells = {cell.grade_id: cell for cell in grade.cells}
+    repairs = _repairs(tasks, cells, checks)
+    first = {repair["check"] for repair in repairs}
     sections = []
     for number, task in enumerate(tasks, start=1):
-        graded = [_graded(cells[name], checks.get(name), task) for name in task.graded if name in cells]
+        graded = [
+            _graded(cells[name], checks.get(name), task, fold=name not in first)
+            for name in task.graded
+            if name in cells
+        ]
         of_task = [cells[name] for name in task.graded if name in cells]
         sections.append(
             {
@@ -94,7 +100,7 @@ def feedback_html(
         waiting=_waiting(grade),
         problems=shown.problems if shown is not None else [],
         sections=sections,
-        repairs=_repairs(tasks, cells, checks),
+        repairs=repairs,
         written=f"{written.day} {written:%B %Y}",
         version=result.kit_version if result is not None else VERSION,
         digest=result.digest[:12] if result is not None else "",
@@ -138,12 +144,10 @@ def _verdict(cells: Sequence[CellGrade], checks: Sequence[CheckResult]) -> Verdi
     return Verdict.PASSED if earned >= top else Verdict.PARTLY if earned else Verdict.FAILED
 
 
-def _graded(cell: CellGrade, check: CheckResult | None, task: Task) -> _Graded:
+def _graded(cell: CellGrade, check: CheckResult | None, task: Task, fold: bool) -> _Graded:
     look = _verdict([cell], [check] if check is not None else [])
-    several = len(task.graded) > 1
-    report = Markup()
-    if check is not None:
-        report = Markup(check_html(check, title=f"Check {task.graded.index(cell.grade_id) + 1}" if several else ""))
+    title = f"Check {task.graded.index(cell.grade_id) + 1}" if len(task.graded) > 1 else ""
+    report = Markup(check_html(check, title=title, fold_pictures=fold) if check is not None else "")
     remark = ""
     if cell.is_check and check is None:
         remark = "What the check found is not stored any more."
@@ -173,11 +177,12 @@ def _repairs(
             failure = check.first_failure
             why = reason(failure) if failure is not None else ""
             said = words.not_attempted(check) or why or check.status.value
-            lost.append((cell.max_points - cell.points, task.title, f"task-{number}", said, failure))
+            hint = failure.hint if failure is not None else ""
+            lost.append((cell.max_points - cell.points, task.title, f"task-{number}", said, hint, name))
     lost.sort(key=lambda one: -one[0])
     return [
-        {"lost": _number(points), "title": title, "anchor": anchor, "why": why, "hint": failure.hint if failure else ""}
-        for points, title, anchor, why, failure in lost[:_FIRST]
+        {"lost": _number(points), "title": title, "anchor": anchor, "why": why, "hint": hint, "check": name}
+        for points, title, anchor, why, hint, name in lost[:_FIRST]
     ]
 
 

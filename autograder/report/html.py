@@ -79,6 +79,7 @@ def check_html(
     title: str = "",
     remarks: Sequence[str] = (),
     origin: str = "",
+    fold_pictures: bool = False,
 ) -> str:
     """Return one check's report as an HTML fragment: what was found first, then what holds, folded.
 
@@ -88,8 +89,9 @@ def check_html(
         title: of the check, where no heading stands above it.
         remarks: what the student should know about the cells that the programs came from.
         origin: those cells, in words.
+        fold_pictures: where there are many checks, and others matter more.
     """
-    shown = check_for(check, audience)
+    shown = _each_picture_once(check_for(check, audience))
     verdict, found = words.verdict(shown), words.findings(shown)
     cut = [log.model_copy(update={"text": last_lines(log.text, LOG_LINES)}) for log in shown.logs if log.text.strip()]
     return render(
@@ -100,7 +102,7 @@ def check_html(
         points=words.points(shown),
         not_attempted=words.not_attempted(shown),
         remarks=remarks,
-        findings=Markup(render("findings.html", **vars(found))),
+        findings=Markup(render("findings.html", fold_pictures=fold_pictures, **vars(found))),
         folded=verdict is Verdict.NOT_ATTEMPTED,
         passed=found.passed,
         held=found.held,
@@ -108,6 +110,19 @@ def check_html(
         logs=cut if shown.status is not Status.PASSED else [],
         origin=origin,
     )
+
+
+def _each_picture_once(check: CellResult) -> CellResult:
+    """Leave out a picture that a finding above has: several expectations may look at one run."""
+    seen: set[str] = set()
+    outcomes = []
+    for outcome in check.outcomes:
+        if outcome.picture is not None and outcome.picture.svg in seen:
+            outcome = outcome.model_copy(update={"picture": None})
+        elif outcome.picture is not None:
+            seen.add(outcome.picture.svg)
+        outcomes.append(outcome)
+    return check.model_copy(update={"outcomes": outcomes})
 
 
 def submission_html(result: SubmissionResult, audience: Audience = "student") -> str:
