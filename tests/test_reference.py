@@ -21,6 +21,7 @@ import reference  # noqa: E402
 from autograder.checks.codes import GROUPS  # noqa: E402
 from autograder.checks.launch import Launch  # noqa: E402
 from autograder.diagnosis.codes import CODES  # noqa: E402
+from autograder.report.reading import LECTURES, SECTIONS  # noqa: E402
 
 LISTED = [*CODES, *(code for group in GROUPS.values() for code in group)]
 PAGES = sorted((ROOT / "lectures" / "instructors").glob("*.md"))
@@ -93,3 +94,13 @@ def test_hints_lead_to_sections_that_the_lectures_have() -> None:
     for number, section in named:
         lecture = next((ROOT / "lectures").glob(f"0{number}_*.md")).read_text(encoding="utf-8")
         assert re.search(rf"^##+ {re.escape(section)}$", lecture, re.MULTILINE), (number, section)
+
+
+@pytest.mark.parametrize("where", SECTIONS, ids=lambda where: f"{where[0]}-{where[1]}")
+def test_a_reason_leads_to_a_section_that_its_lecture_has(where: tuple[int, str]) -> None:
+    number, section = where
+    lecture = (ROOT / "lectures" / f"{LECTURES[number]}.md").read_text(encoding="utf-8")
+    assert re.search(rf"^##+ {re.escape(section)}$", lecture, re.MULTILINE)
+    known = {code for group in GROUPS.values() for code in group} | CODES.keys()
+    known |= set(re.findall(r'code=\\?"([a-z-]+)', "".join(p.read_text() for p in ROOT.glob("solutions/*/*.ipynb"))))
+    assert set(SECTIONS[where].split()) <= known

@@ -19,6 +19,7 @@ from autograder.report.export.entry import Entry
 from autograder.report.export.gradescope import results_json
 from autograder.report.export.junit import junit_xml
 from autograder.report.html import check_html, submission_html
+from autograder.report.reading import hints
 from autograder.report.terminal import check_text, check_view, class_view, submission_view, undecided_view
 
 NASTY = "<img src=x onerror=alert(1)>\x1b[31m\x00 `code` & [link](javascript:alert(2))"
@@ -234,3 +235,24 @@ def test_what_contradicts_itself_is_shown_to_instructors_only() -> None:
     assert "One thread only." in text_of(submission_view(flagged, "instructor"))
     assert "One thread only." not in text_of(submission_view(flagged, "student"))
     assert "ann: One thread only." in text_of(undecided_view([flagged]))
+
+
+def test_in_a_notebook_hints_open_one_after_the_other_and_lead_to_the_book() -> None:
+    failed = Outcome(
+        status=Status.FAILED, title="beats", because="The timer waits.", code="one-group",
+        hint="Give them two groups; lecture 2, section 'How many threads?'. Then count threads.",
+    )  # fmt: skip
+    said = [hint.text for hint in hints(failed)]
+    assert said == ["Lecture 2, section 'How many threads?'.", "Give them two groups.", "Then count threads."]
+    check = CheckResult(grade_id="c", title="c", max_points=1, points=0, outcomes=[failed])
+    html = check_html(check, on_demand=True, book="../../lectures")
+    assert 'href="../../lectures/02_executors.html#how-many-threads"' in html
+    inside = html[html.index("Hint (1 of 3)") :]
+    assert inside.index("Another hint (2 of 3)") < inside.index("Give them") < inside.index("Another hint (3 of 3)")
+    assert inside.index("Another hint (3 of 3)") < inside.index("</details>")  # in each other: no later one is in sight
+    assert "<a" not in check_html(check, on_demand=True)
+    assert "<details" not in check_html(check) and "→ Give them" in check_html(check)
+    # A reason without a pointer of its own has the section that explains it.
+    bare = failed.model_copy(update={"hint": ""})
+    assert [hint.text for hint in hints(bare)] == ["Lecture 2, section 'Second repair: a callback group'."]
+    assert "Second repair" in check_text(check.model_copy(update={"outcomes": [bare]}), [], "")

@@ -54,6 +54,12 @@ def is_students_kit() -> bool:
     return _is_course(ROOT / KIT_FOLDER)
 
 
+def book_of_kit() -> Path | None:
+    """Return the folder of the lectures in a student's kit; None if this is none, or it came without."""
+    folder = ROOT / "lectures"
+    return folder if is_students_kit() and (folder / "index.html").is_file() else None
+
+
 def _is_course(folder: Path) -> bool:
     """Whether it has a course's settings, or a lab; many folders called `labs` hold something else."""
     return (folder / SETTINGS_FILE).is_file() or any(

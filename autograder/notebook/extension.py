@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from autograder.core import front_end
 from autograder.course.cell_file import CELL_BYTES, BadNameError, CellFile, check_free, check_name, parse
+from autograder.course.folder import book_of_kit
 from autograder.notebook import ros2_magic
 from autograder.notebook.kernel import Kernel, now
 from autograder.notebook.program_folder import Written, shown
@@ -71,8 +72,18 @@ def shown_score(score: Score, **_: object) -> dict[str, str]:
     graded = "NBGRADER_EXECUTION" in os.environ
     return {
         "text/plain": repr(score) if graded else check_text(score.result, score.remarks, score.origin),
-        "text/html": check_html(score.result, remarks=score.remarks, origin=score.origin),
+        "text/html": check_html(
+            score.result, remarks=score.remarks, origin=score.origin, on_demand=not graded, book=_book()
+        ),
     }
+
+
+def _book() -> str:
+    """Link from the notebook to the lectures of a student's kit; elsewhere empty: no server would show them."""
+    here = front_end.active
+    notebook = here.folder.notebook if isinstance(here, Kernel) else None
+    lectures = book_of_kit()
+    return "" if notebook is None or lectures is None else os.path.relpath(lectures, notebook.parent)
 
 
 def _writer(kernel: Kernel, magic: str, text: str) -> Any:

@@ -17,6 +17,7 @@ from autograder.core.output import last_lines
 from autograder.core.results import CellResult, Status, SubmissionResult
 from autograder.report import words
 from autograder.report.audience import Audience, check_for, result_for
+from autograder.report.reading import hints
 from autograder.report.words import Verdict
 
 _LOOK = {
@@ -63,7 +64,7 @@ def _environment() -> Environment:
     environment.filters["code"] = _code
     environment.filters["shown"] = lambda picture: Markup(picture.html())
     environment.globals |= {"looks": _LOOK, "symbols": words.SYMBOL, "words": _VERDICT, "code_style": _CODE_STYLE}
-    environment.globals |= {"ink": _INK, "faint": _FAINT, "line": _LINE}
+    environment.globals |= {"hints_of": hints, "ink": _INK, "faint": _FAINT, "line": _LINE}
     return environment
 
 
@@ -80,6 +81,8 @@ def check_html(
     remarks: Sequence[str] = (),
     origin: str = "",
     fold_pictures: bool = False,
+    on_demand: bool = False,
+    book: str = "",
 ) -> str:
     """Return one check's report as an HTML fragment: what was found first, then what holds, folded.
 
@@ -90,6 +93,8 @@ def check_html(
         remarks: what the student should know about the cells that the programs came from.
         origin: those cells, in words.
         fold_pictures: where there are many checks, and others matter more.
+        on_demand: whether hints open one after the other, for a student who still works on it.
+        book: link to the folder of the lectures as HTML; empty if there is none.
     """
     shown = _each_picture_once(check_for(check, audience))
     verdict, found = words.verdict(shown), words.findings(shown)
@@ -102,7 +107,9 @@ def check_html(
         points=words.points(shown),
         not_attempted=words.not_attempted(shown),
         remarks=remarks,
-        findings=Markup(render("findings.html", fold_pictures=fold_pictures, **vars(found))),
+        findings=Markup(
+            render("findings.html", on_demand=on_demand, book=book, fold_pictures=fold_pictures, **vars(found))
+        ),
         folded=verdict is Verdict.NOT_ATTEMPTED,
         passed=found.passed,
         held=found.held,

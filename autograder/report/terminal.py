@@ -17,6 +17,7 @@ from autograder.core.output import last_lines
 from autograder.core.results import CellResult, CheckResult, NodeLog, Outcome, Status, SubmissionResult
 from autograder.report import words
 from autograder.report.audience import Audience, check_for, reason, result_for
+from autograder.report.reading import section_for
 from autograder.report.words import Verdict
 
 SYMBOL = {Status.PASSED: "✓", Status.FAILED: "✗", Status.NOT_CHECKED: "-", Status.UNKNOWN: "?"}
@@ -148,6 +149,7 @@ def _details(outcome: Outcome) -> list[RenderableType]:
         ("expected", outcome.expected),
         ("observed", outcome.observed),
         ("try", outcome.hint),
+        ("read on", "" if outcome.hint else str(section_for(outcome.code) or "")),
     ]
     table = Table.grid(padding=(0, 1))
     table.add_column(justify="right", style="dim", min_width=12)
