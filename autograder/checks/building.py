@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import re
 from collections.abc import Mapping
 from contextlib import AbstractContextManager
@@ -12,9 +13,14 @@ from autograder.checks.parts import part
 from autograder.checks.scoring import Score, score
 from autograder.diagnosis import Diagnosis
 from autograder.graph.names import nearest
-from autograder.packages.explain import why_not_built
+from autograder.packages.explain import needed_packages, not_described, why_not_built
 from autograder.packages.interfaces import InterfaceError, interface_parts
 from autograder.packages.workspace import Built
+
+_RECORDS = re.compile(r"(egg-info|dist-info|__pycache__|/colcon-core/|/hook/)|(^|/)package\.(d?sv|sh|ps1|bash|zsh)$")
+"""Files that colcon, setuptools and Python write for themselves."""
+_MISSPELT = 0.85
+"""How alike two names of programs have to be for one to be the other misspelt: `speed_sensor` is no `speed_monitor`."""
 
 
 class Package:
@@ -60,6 +66,11 @@ class Package:
         """What the build printed."""
         return self._build().log
 
+    @property
+    def installed(self) -> list[str]:
+        """What the build installs, as paths below the package's folder in `install`, but for Python's own records."""
+        return sorted(path for path in self._build().files if not _RECORDS.search(path))
+
     def expect_built(self, hint: str = "") -> None:
         """`colcon build` builds the package.
 
@@ -74,6 +85,31 @@ class Package:
         """
         self._ready(f"`{self.name}` is built", hint)
         outcomes.passed(f"`{self.name}` is built")
+
+    def expect_depends(self, *packages: str, hint: str = "") -> None:
+        """package.xml says that the programs need these packages: `<depend>` or `<exec_depend>`.
+
+        Args:
+            packages: such as `rclpy`.
+            hint: a pointer for the student.
+
+        Example:
+            `package.expect_depends("rclpy", "std_msgs")`
+
+        Codes:
+            `package-depend`.
+        """
+        title = f"package.xml names {', '.join(f'`{one}`' for one in packages)} as needed at run time"
+        reason = missing_package(self.name) or not_described(runtime.current.workspace.source(self.name), self.name)
+        if reason is not None:
+            self._fail(title, reason, hint)
+        has = needed_packages(runtime.current.workspace.source(self.name))
+        lacking = [one for one in packages if one not in has]
+        if lacking:
+            told = ", ".join(f"`{one}`" for one in has) or "none"
+            because = f"package.xml does not name `{lacking[0]}` as needed at run time. It names: {told}."
+            self._fail(title, Diagnosis(because, "package-depend"), hint)
+        outcomes.passed(title)
 
     def expect_executable(self, name: str, hint: str = "") -> None:
         """`ros2 run` finds an executable of this name: it lies in `lib/PACKAGE`, and leads to a function.
@@ -119,6 +155,9 @@ class Package:
                 because = f"The build installs no `{path}`."
                 because += f" A file of that name lies at `{same[0]}`." if same else ""
                 self._fail(title, Diagnosis(because, "not-installed"), hint)
+            if _by_colcon_alone(path, built.log):
+                because = f"setup.py does not install `{path}`. colcon still does it in its place, and warns in its log"
+                self._fail(title, Diagnosis(f"{because} that it will not do so for long.", "not-installed"), hint)
             outcomes.passed(title)
 
     def expect_interface(self, name: str, *parts: Mapping[str, str], hint: str = "") -> None:
@@ -204,10 +243,19 @@ def _no_executable(built: Built, name: str) -> Diagnosis:
         wanted = f"setup.cfg says where scripts go: `install_scripts=$base/lib/{built.name}`."
         return Diagnosis(because, "executable-place", wanted)
     points = _entry_points(built)
-    near = nearest(name, points)
+    near = next(iter(difflib.get_close_matches(name, points, 1, _MISSPELT)), "")
     has = ", ".join(f"`{one}`" for one in sorted(points)) or "none"
     because = f"setup.py has no entry point of the name `{name}`; its console_scripts are: {has}."
     return Diagnosis(because + (f" Is `{near}` meant to be it?" if near else ""), "entry-point")
+
+
+def _by_colcon_alone(path: str, log: str) -> bool:
+    """Whether a file is there only because colcon makes good for what setup.py left out, which it says in its log."""
+    said = (
+        "install the 'package.xml' file" if path.endswith("/package.xml") else "install a marker in the package index"
+    )
+    marked = path.endswith("/package.xml") or "/resource_index/packages/" in path
+    return marked and f"doesn't explicitly {said}" in " ".join(log.split())
 
 
 def build(package: str) -> Package:
@@ -235,8 +283,8 @@ def _lost_target(built: Built, target: str) -> str:
     path = next((one for one in built.files if one.endswith(f"/site-packages/{module.replace('.', '/')}.py")), "")
     if not path:
         return f"The entry point names the module `{module}`, and no such module is installed."
-    name = re.escape(function)
-    if not re.search(rf"^(def {name}\b|{name}\s*=|.*\bimport\b.*\b{name}\b)", built.text(path), re.MULTILINE):
+    name = re.escape(function.partition(".")[0])
+    if not re.search(rf"^((def|class) {name}\b|{name}\s*=|.*\bimport\b.*\b{name}\b)", built.text(path), re.MULTILINE):
         return f"The entry point names `{function}`, and the module `{module}` has no function of that name."
     return ""
 

@@ -88,6 +88,7 @@ GROUPS: dict[str, dict[str, str]] = {
         "entry-point": "setup.py has no entry point of this name",
         "entry-point-target": "the entry point leads to a module or function that is not installed",
         "not-installed": "the build installs no file at this place",
+        "package-depend": "package.xml does not name a package that the programs need",
         "no-interface": "the build installs no interface of this name",
         "interface-fields": "the interface has other fields or types than asked for",
     },

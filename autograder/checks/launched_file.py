@@ -9,6 +9,7 @@ from pathlib import Path
 from autograder.checks import runtime
 from autograder.checks.program import Program
 from autograder.launch_files import declared_arguments, read_launch_file
+from autograder.packages.workspace import Built
 
 
 @dataclass(frozen=True)
@@ -36,8 +37,8 @@ class LaunchedFile:
         Raises:
             LaunchFileError: it cannot be read.
         """
-        built = runtime.current.workspace.build(self.package) if self.packages() else None
-        folder = built.folder / "share" / self.package if built else runtime.current.folder.resolve()
+        built, home = self._built(), runtime.current.folder.resolve()
+        folder = self._folder()
 
         def find(wanted: str) -> Path:
             if wanted != self.package:
@@ -45,15 +46,14 @@ class LaunchedFile:
             return folder
 
         programs = set(built.executables if built else self.stand_ins) or {path.stem for path in folder.glob("*.py")}
-        name = built.shared(self.name) if built else self.name
         runtime.current.use(self.name)
-        found = read_launch_file(folder / name, self.arguments, find, programs, self.includes, self.namespace)
+        found = read_launch_file(self._path(), self.arguments, find, programs, self.includes, self.namespace)
         return [
             self._stand_in(
                 Program(
                     one.program,
                     package=self.package if built else "",
-                    ros_arguments=one.ros_arguments(),
+                    ros_arguments=_seen_from(home, one.model_copy(update={"folder": home}).ros_arguments()),
                     arguments_of_its_own=one.arguments,
                     environment=one.environment,
                     warnings=one.warnings,
@@ -64,8 +64,20 @@ class LaunchedFile:
 
     def unused(self) -> list[str]:
         """The given arguments that the file does not declare, which `ros2 launch` passes over."""
-        declared = declared_arguments(runtime.current.folder.resolve() / self.name)
+        declared = declared_arguments(self._path())
         return [name for name in self.arguments if name not in declared]
+
+    def _built(self) -> Built | None:
+        return runtime.current.workspace.build(self.package) if self.packages() else None
+
+    def _folder(self) -> Path:
+        """The folder of the package's files: the installed one, if the package is built."""
+        built = self._built()
+        return built.folder.resolve() / "share" / self.package if built else runtime.current.folder.resolve()
+
+    def _path(self) -> Path:
+        built = self._built()
+        return self._folder() / (built.shared(self.name) if built else self.name)
 
     def _stand_in(self, node: Program) -> Program:
         """The course's own program in place of the student's, if the check has one, started with the same words."""
@@ -74,3 +86,8 @@ class LaunchedFile:
             return node
         own = [*course.arguments_of_its_own, *node.arguments_of_its_own]
         return replace(node, program=course.program, arguments_of_its_own=own)
+
+
+def _seen_from(home: Path, words: list[str]) -> list[str]:
+    """The words with paths as the programs see them, which run in that folder."""
+    return [word.removeprefix(f"{home}/") for word in words]

@@ -99,7 +99,19 @@ class Doing:
         text = self.text(key)
         near = nearest(text.rsplit("/", 1)[-1], {*self.context.packages.stand_ins, *_beside(self.place.folder)})
         hint = f" Is `{near}` meant?" if near else ""
-        return self.place.error(_no_file(text), f"Write `$(dirname)/NAME.yaml`; NAME is a cell's `%%file`.{hint}")
+        return self.place.error(self.no_file(text), f"Write `$(dirname)/NAME.yaml`; NAME is a cell's `%%file`.{hint}")
+
+    def no_file(self, text: str) -> str:
+        """Why a path leads to no file."""
+        if not text.startswith("/"):
+            return f"there is no file `{text}`: `ros2 launch` looks for it in the folder that it is called from."
+        installed = self.context.packages.in_installed(text)
+        if installed:
+            return f"the build installs no `{installed}` below the package's `share` folder."
+        name = text.rsplit("/", 1)[-1]
+        return (
+            f"there is no file `{name}` there; a package of a lab has its files in `launch/`, and others are not read."
+        )
 
     def parameters(self, node: LaunchedNode) -> None:
         """Add the parameters of a node's own."""
@@ -111,11 +123,11 @@ class Doing:
             text = self.perform(entry["from"], place.at("from"))
             path = self.context.packages.file(text, self.place.folder)
             if path is None:
-                node.warnings.append(f"{place.file}, {place.where}: {_no_file(text)}")
+                node.warnings.append(f"{place.file}, {place.where}: {self.no_file(text)}")
             elif entry.get("allow_substs"):
                 node.parameters.append(self.substituted(path, place))
             else:
-                node.parameters.append(ParamsFile(file=path.name))
+                node.parameters.append(ParamsFile(file=self.context.packages.called_in_words(path)))
 
     def inline(self, entry: dict[str, Any], prefix: str, place: Place) -> list[Inline]:
         """The parameters of one `param` entry; those of entries inside it get dotted names."""
@@ -162,13 +174,6 @@ class Doing:
 
 def _beside(folder: Path) -> list[str]:
     return [path.name for path in folder.glob("*.yaml")]
-
-
-def _no_file(text: str) -> str:
-    if not text.startswith("/"):
-        return f"there is no file `{text}`: `ros2 launch` looks for it in the folder that it is called from."
-    name = text.rsplit("/", 1)[-1]
-    return f"there is no file `{name}` there; a package of a lab has its files in `launch/`, and others are not read."
 
 
 def namespace(outer: str | None, inner: str | None, place: Place) -> str | None:

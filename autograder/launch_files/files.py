@@ -1,7 +1,8 @@
 """Where a launch file finds other files: a package's share folder as it is installed, seen from the lab's one folder.
 
 An installed package has its launch files and parameter files in `share/PACKAGE/launch`; a lab has them all in one
-folder. `$(dirname)` is that folder, and `$(find-pkg-share PACKAGE)/launch` leads to it.
+folder. `$(dirname)` is that folder, and `$(find-pkg-share PACKAGE)/launch` leads to it. Of a package that was built,
+the folder is the one that it is installed in, `…/share/PACKAGE`, with its files where they are.
 """
 
 from __future__ import annotations
@@ -43,12 +44,23 @@ class Packages:
         return self._folders[name]
 
     def share(self, name: str) -> str:
-        """What `$(find-pkg-share NAME)` stands for; only `launch/` below it holds files.
+        """What `$(find-pkg-share NAME)` stands for; unless it was built, only `launch/` below it holds files.
 
         Raises:
             KeyError: there is no such package.
         """
-        return f"{self.folder(name)}/share/{name}"
+        place = self.folder(name)
+        return str(place) if _is_installed(place, name) else f"{place}/share/{name}"
+
+    def in_installed(self, text: str) -> str:
+        """The path below the folder that a package was installed in; empty if it is in no such folder."""
+        path = os.path.normpath(text)
+        places = [str(place) for name, place in self._folders.items() if _is_installed(place, name)]
+        return next((path[len(place) + 1 :] for place in places if path.startswith(f"{place}/")), "")
+
+    def called_in_words(self, path: Path) -> str:
+        """How a command line names a file: by its name in the lab's folder, by its path in an installed package."""
+        return str(path) if self.in_installed(str(path)) else path.name
 
     def called(self, path: Path) -> str:
         """The name by which the launch files know a file: of a stand-in, the one that it stands for."""
@@ -67,6 +79,9 @@ class Packages:
         """
         if not text.startswith("/"):
             return None  # looked for in the folder that `ros2 launch` is called from
+        if self.in_installed(text) and Path(text).name not in self.stand_ins:
+            built = Path(os.path.normpath(text))
+            return built if built.is_file() else None
         installed = {str(folder.resolve()): "/share//launch"}
         for name, place in self._folders.items():
             installed[f"{place}/share/{name}"] = f"/share/{name}"
@@ -80,3 +95,8 @@ class Packages:
         holder = {"/r/share/launch": folder.resolve(), **places}.get(parent)
         path = holder / self.stand_ins.get(name, name) if holder else None
         return path if path and path.is_file() and path.resolve().parent == holder else None
+
+
+def _is_installed(place: Path, name: str) -> bool:
+    """Whether a package's folder is the one that building it made."""
+    return place.parts[-2:] == ("share", name)

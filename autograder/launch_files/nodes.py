@@ -36,7 +36,7 @@ class ParamsFile(BaseModel):
 
     model_config = ConfigDict(extra="forbid")
     file: str
-    """Its name in the folder of the launch file."""
+    """Its name in the folder of the launch file; its path if it is in a package that was built."""
 
 
 class ParamsText(BaseModel):

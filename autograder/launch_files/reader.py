@@ -138,7 +138,9 @@ class _Reader:
         path = do.file("filename")
         if path is None:
             raise do.missing("filename")
-        do.context.configurations.setdefault(PARAMETERS, []).append(ParamsFile(file=path.name))
+        do.context.configurations.setdefault(PARAMETERS, []).append(
+            ParamsFile(file=do.context.packages.called_in_words(path))
+        )
 
     def _set_env(self, do: Doing, depth: int) -> None:
         name = do.text("name")

@@ -42,7 +42,7 @@ def why_not_built(built: Built, sources: Path) -> Diagnosis | None:
         built: what came of it.
         sources: the package's folder below `src`.
     """
-    wrong = _package_xml(sources, built.name)
+    wrong = not_described(sources, built.name)
     if wrong is not None:
         return wrong
     if built.timed_out:
@@ -58,7 +58,14 @@ def why_not_built(built: Built, sources: Path) -> Diagnosis | None:
     return _quoted(built.log)
 
 
-def _package_xml(sources: Path, name: str) -> Diagnosis | None:
+def needed_packages(sources: Path) -> list[str]:
+    """The packages that package.xml names as needed at run time; it has to be one that can be read."""
+    from catkin_pkg.package import parse_package
+
+    return [str(one) for one in parse_package(str(sources / "package.xml")).exec_depends]
+
+
+def not_described(sources: Path, name: str) -> Diagnosis | None:
     """What in package.xml keeps colcon from building the package, or from building it under its name."""
     from catkin_pkg.package import InvalidPackage, parse_package
 
