@@ -1,4 +1,4 @@
-"""Commands that show the stored results: `report` and `export`."""
+"""Commands about a class that is graded: `report`, `export` and `similar`."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from autograder.cli.app import app
+from autograder.cli.app import JsonOption, app
 from autograder.core.errors import KitError
 from autograder.report.export import FORMATS, SEVERAL_LABS  # small, and the command's help names them all
 
@@ -84,3 +84,37 @@ def _say(left_out: list[str], entries: list[Entry]) -> None:
         print(f"{told}; those count 0 until then.", file=sys.stderr)
     for sentence in left_out:
         print(plain(sentence), file=sys.stderr)
+
+
+@app.command()
+def similar(
+    lab: Annotated[str, typer.Argument(help="The lab, such as lab2_executors.")],
+    at_least: Annotated[int, typer.Option(min=1, max=100, help="Likeness of a pair that is shown, in percent.")] = 60,
+    most: Annotated[int, typer.Option(min=1, help="How many pairs are shown.")] = 20,
+    as_json: JsonOption = False,
+) -> None:
+    """List pairs of submissions that are alike beyond what the lab hands out: for a person to read, never a verdict."""
+    import json
+    from dataclasses import asdict
+
+    from autograder.course.folder import course_root
+    from autograder.course.lab import load_lab
+    from autograder.course.paths import CoursePaths
+    from autograder.grading.store import ResultStore
+    from autograder.report.terminal import console, similar_view
+    from autograder.submission.reader import read_submission
+    from autograder.submission.similar import similar as find
+
+    root = course_root()
+    found = load_lab(root, lab)
+    given = {name: answer.blank for name, answer in found.answers.items()}
+    students = [result.student for result in ResultStore(root).all(lab)]
+    if not students:
+        raise KitError("There are no submissions yet.", f"Grade a class first: autograder grade {lab}")
+    paths = {student: CoursePaths(root).submitted_notebook(student, lab) for student in students}
+    sources = {student: read_submission(path, found).sources for student, path in paths.items()}
+    pairs = find(sources, given, at_least / 100)[:most]
+    if as_json:
+        print(json.dumps([asdict(pair) for pair in pairs], indent=1))
+    else:
+        console().print(similar_view(pairs, len(students)))

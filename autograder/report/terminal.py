@@ -19,6 +19,7 @@ from autograder.report import words
 from autograder.report.audience import Audience, check_for, reason, result_for
 from autograder.report.reading import section_for
 from autograder.report.words import Verdict
+from autograder.submission.similar import Pair
 
 SYMBOL = {Status.PASSED: "✓", Status.FAILED: "✗", Status.NOT_CHECKED: "-", Status.UNKNOWN: "?"}
 STYLE = {Status.PASSED: "blue", Status.FAILED: "bold red", Status.NOT_CHECKED: "dim", Status.UNKNOWN: "bold magenta"}
@@ -244,6 +245,31 @@ def undecided_view(results: Sequence[SubmissionResult]) -> RenderableType | None
     if flagged:
         found += [Text("These keep their points, and a person should look at them:", "bold magenta"), *flagged]
     return Group(*found) if found else None
+
+
+_LINES = 3
+"""Equal lines of a pair that are shown."""
+
+
+def similar_view(pairs: Sequence[Pair], count: int) -> RenderableType:
+    """Return pairs of submissions that are alike, with what a person should look at first.
+
+    Args:
+        pairs: the most alike first.
+        count: of all submissions that were compared.
+    """
+    lines: list[RenderableType] = [Text(f"{count} submissions were compared.", "dim")]
+    for pair in pairs:
+        one, other = (plain(student) for student in pair.students)
+        lines.append(Text.assemble((f"{100 * pair.likeness:3.0f} %  ", "bold"), f"{one}  and  {other}"))
+        lines.append(Text(f"       in {', '.join(map(plain, pair.answers))}"))
+        if pair.lines:
+            number = f"{len(pair.lines)} line{'' if len(pair.lines) == 1 else 's'}"
+            lines.append(Text(f"       {number} that only these two have, letter for letter:"))
+            lines += [Text(f"         {plain(line[:90])}", "dim") for line in pair.lines[:_LINES]]
+    end = "A task has few solutions, and people may work together: read both before you ask anybody."
+    lines.append(Text(end if pairs else "No pair is alike beyond that.", "dim"))
+    return Group(*lines)
 
 
 def console() -> Console:
