@@ -39,11 +39,20 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     """Add what `make test-all` asks for."""
-    parser.addoption("--complete", action="store_true", help="run every check on every sample student")
+    parser.addoption("--complete", action="store_true", help="every check on every sample student, and all long tests")
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+def pytest_configure(config: pytest.Config) -> None:
+    """Declare the mark of what only `make test-all` runs."""
+    config.addinivalue_line("markers", "complete: runs in `make test-all` only; `make test` has a cheaper one of its kind")
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Begin with what takes longest, so that no worker is left alone with it in the end."""
+    if not config.getoption("complete"):
+        left_out = [item for item in items if item.get_closest_marker("complete")]
+        config.hook.pytest_deselected(items=left_out)
+        items[:] = [item for item in items if item not in left_out]
     items.sort(key=lambda item: (*LONGEST, item.path.stem).index(item.path.stem))
 
 

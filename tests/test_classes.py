@@ -1,11 +1,13 @@
 """Every student of every sample class is graded in the sandbox and gets exactly the expected points and reasons.
 
-Where a student's changed answers reach only some of the checks, the others are not run: they are the solution's, on the
-solution's files, and must be expected to pass. `--complete` (`make test-all`) runs every check of everybody.
+A check is not run for a student whose files that reach it are all the solution's, or all as students receive them: what
+it makes of these is found out with the solution and with the blank notebook. Nor is one run that a student's mistake
+reaches without costing points. `--complete` (`make test-all`) runs every check of everybody.
 """
 
 from __future__ import annotations
 
+import tempfile
 import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -16,13 +18,14 @@ import pytest
 import sample_class
 from sample_class import ROOT
 
-from autograder.authoring.mutation.reach import reached, using
+from autograder.authoring.mutation.reach import using
 from autograder.core.results import CheckResult, SubmissionResult
 from autograder.course.lab import Cell, Lab, load_lab
 from autograder.grading.job import Job
 from autograder.grading.runner import Settings, job_of, without_running
 from autograder.grading.supervisor import run_in_worker
 from autograder.submission.reader import read_submission
+from autograder.submission.submission import Submission
 
 LABS = kill_matrix.labs()
 MEMBERS = [(lab, student) for lab in LABS for student in sample_class.students(lab)]
@@ -36,41 +39,68 @@ for name, text in {files!r}.items():
         (current.folder / name).write_text(text, encoding="utf-8")
 """
 Grade = Callable[[threading.Event], SubmissionResult]
+_read: dict[tuple[str, str], Submission] = {}
 
 
-def grading(lab: Lab, student: str, into: Path, complete: bool) -> Grade:
-    """Write what a student hands in, and return what grades it."""
-    if student == ALONE:
-        sample_class.build_student(lab, "solution", into / ALONE)
-        job = each_check_alone(lab, into / ALONE / "solution" / f"{lab.name}.ipynb")
-        return lambda stop: run_in_worker(job, stop)
-    folder = sample_class.build_student(lab, student, into)
-    path = next(iter(sorted(folder.glob("*.ipynb"))), folder / f"{lab.name}.ipynb")
-    cells = list(lab.cells) if complete else cells_to_run(lab, student, path)
-    submission = read_submission(path, lab)
-    job = job_of(submission, student, lab, SETTINGS).model_copy(update={"cells": cells})
+def grading(lab: Lab, student: str, complete: bool) -> Grade:
+    """Return what grades a student."""
+    submission = handed_in(lab, "solution" if student == ALONE else student)
+    job = job_of(submission, student, lab, SETTINGS)
     if not submission.readable:
         return lambda _: without_running(submission, job)
+    # Who passes with each check's own files alone passes with all of them.
+    if student == ALONE or (student == "solution" and not complete):
+        job = each_check_alone(lab, job)
+    elif not complete:
+        job = job.model_copy(update={"cells": cells_to_run(lab, student, job.files)})
     return lambda stop: run_in_worker(job, stop)
 
 
-def cells_to_run(lab: Lab, student: str, path: Path) -> list[Cell]:
-    """The cells that a student can reach who changed answers of the solution and nothing else; otherwise all."""
-    home = sample_class.class_folder(lab.name) / student
+def handed_in(lab: Lab, student: str) -> Submission:
+    """What a student hands in, read."""
+    if (lab.name, student) not in _read:
+        with tempfile.TemporaryDirectory() as into:
+            folder = sample_class.build_student(lab, student, Path(into))
+            path = next(iter(sorted(folder.glob("*.ipynb"))), folder / f"{lab.name}.ipynb")
+            _read[lab.name, student] = read_submission(path, lab)
+    return _read[lab.name, student]
+
+
+def cells_to_run(lab: Lab, student: str, files: dict[str, str]) -> list[Cell]:
+    """The set-up, and the checks that can say something of this student which no other student's run says."""
+    known = twins(lab, files)
+    if student in ("solution", "blank") or known is None:
+        return list(lab.cells)
     told = sample_class.expected(lab, student)
-    if student == "solution" or not told.from_solution or told.problems or told.flagged:
-        return list(lab.cells)
-    if not {each.name for each in home.iterdir()} <= {"cells", "expected.yaml"}:
-        return list(lab.cells)
-    if student.startswith("x"):  # it is hostile and may harm checks that do not run it
-        return list(lab.cells)
-    cells = reached(lab, {file.stem for file in (home / "cells").iterdir()})
-    return cells if any(cell.points is not None for cell in cells) else list(lab.cells)
+    names = [check.grade_id for check in lab.checks]
+    wanted = [name for name in names if name not in known]
+    if student.startswith("x"):  # it is hostile and may harm the check after those that run it
+        last = names.index(wanted[-1]) if wanted else -1
+        wanted.append(names[(last + 1) % len(names)])
+    elif lost := {check.grade_id for check in lab.checks if told.points[check.grade_id] != check.points}:
+        wanted = [name for name in wanted if name in lost or name in told.flagged]
+    wanted = wanted or names[:1]
+    return [cell for cell in lab.cells if cell.points is None or cell.grade_id in wanted]
 
 
-def each_check_alone(lab: Lab, solution: Path) -> Job:
+def twins(lab: Lab, files: dict[str, str]) -> dict[str, str] | None:
+    """Checks that find just what they find with the solution, or with the blank notebook; each with which of the two.
+
+    None: there are files that the lab knows nothing of, and which checks these reach, nobody can say.
+    """
+    if not files.keys() <= handed_in(lab, "solution").files.keys():
+        return None
+    found = {}
+    for check in lab.checks:
+        names = {file.file_name for name in using(lab, check) if (file := lab.answers[name].file) is not None}
+        for twin in ("blank", "solution"):
+            if all(files.get(name) == handed_in(lab, twin).files[name] for name in names):
+                found[check.grade_id] = twin
+    return found
+
+
+def each_check_alone(lab: Lab, job: Job) -> Job:
     """The solution's job, with only those answers there at each check that are said to reach it."""
-    job = job_of(read_submission(solution, lab), ALONE, lab, SETTINGS)
     files = {name: answer.file.file_name for name, answer in lab.answers.items() if answer.file is not None}
     texts = {name: job.files[name] for name in files.values()}
     cells = []
@@ -83,21 +113,20 @@ def each_check_alone(lab: Lab, solution: Path) -> Job:
 
 
 @pytest.fixture(scope="session")
-def graded(
-    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
-) -> Iterator[dict[tuple[str, str], Future[SubmissionResult]]]:
+def graded(request: pytest.FixtureRequest) -> Iterator[dict[tuple[str, str], Future[SubmissionResult]]]:
     """Everybody whose test runs (`-k` may leave most of them out), several at a time as `autograder grade` does."""
     chosen = [item.callspec.params for item in request.session.items if hasattr(item, "callspec")]
     wanted = [(p["lab_name"], p["student"]) for p in chosen if {"lab_name", "student"} <= p.keys()]
-    into, complete = tmp_path_factory.mktemp("classes"), request.config.getoption("complete")
+    complete = request.config.getoption("complete")
     stop = threading.Event()
     with ThreadPoolExecutor(SETTINGS.at_once) as pool:
         try:
-            jobs = {
-                (name, student): grading(load_lab(ROOT, name), student, into / name, complete)
-                for name, student in wanted
-            }
-            yield {who: pool.submit(grade, stop) for who, grade in jobs.items()}
+            jobs = {(name, student): grading(load_lab(ROOT, name), student, complete) for name, student in wanted}
+            futures: dict[tuple[str, str], Future[SubmissionResult]] = {}
+            for (name, student), grade in jobs.items():
+                same = None if complete or student != ALONE else futures.get((name, "solution"))
+                futures[name, student] = same or pool.submit(grade, stop)
+            yield futures
         finally:
             stop.set()
             pool.shutdown(cancel_futures=True)
@@ -114,9 +143,10 @@ def differences(lab: Lab, student: str, result: SubmissionResult) -> list[str]:
     if sorted(check.grade_id for check in result.checks if check.flags) != expected.flagged:
         found.append(f"flags {result.flags}, expected some for {expected.flagged}")
     run = {check.grade_id for check in result.checks}
-    for check in lab.checks:
-        if check.grade_id not in run and expected.points[check.grade_id] != check.points:
-            found.append(f"{check.grade_id}: no changed answer reaches it, and still it is expected to lose points")
+    known = twins(lab, handed_in(lab, student).files) or {}
+    for name in expected.points.keys() - run:
+        if expected.points[name] != sample_class.expected(lab, known.get(name, "solution")).points[name]:
+            found.append(f"{name}: no changed answer reaches it, and still it is expected to lose points")
     for check in result.checks:
         name, first = check.grade_id, check.first_failure
         told = f"{first.code}: {first.title}: {first.because}" if first else "passed"

@@ -115,6 +115,7 @@ def small(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.complete  # `make test` itself begins with it
 def test_the_whole_lock_makes_a_working_command_from_anywhere(tmp_path: Path) -> None:
     folder = check_out(tmp_path / "my course", whole_lock=True)
     done = make(folder, "setup")
