@@ -44,7 +44,9 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 def pytest_configure(config: pytest.Config) -> None:
     """Declare the mark of what only `make test-all` runs."""
-    config.addinivalue_line("markers", "complete: runs in `make test-all` only; `make test` has a cheaper one of its kind")
+    config.addinivalue_line(
+        "markers", "complete: runs in `make test-all` only; `make test` has a cheaper one of its kind"
+    )
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
