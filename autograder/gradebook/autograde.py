@@ -30,6 +30,7 @@ from autograder.core.errors import KitError
 from autograder.core.results import CheckResult, Isolation
 from autograder.course.lab import Lab, load_lab
 from autograder.gradebook import notes
+from autograder.gradebook.exchange_files import carry, only_notebooks
 from autograder.gradebook.inert import UNDECIDED, InertAnswers, inert_text
 from autograder.gradebook.private_nbgrader import SaveScores, in_first_pass
 from autograder.grading.runner import Settings, run_submission
@@ -69,6 +70,7 @@ class SubmissionExporter(NotebookExporter):  # type: ignore[misc]
                 "The stages of `nbgrader autograde` are not this course's; nothing was executed.",
                 "Remove Autograde settings from the command line and from other nbgrader_config files.",
             )
+        self.parent.coursedir = only_notebooks(self.parent.coursedir)
 
     def from_filename(self, filename: str, resources: dict[str, Any] | None = None, **kwargs: Any) -> Any:
         """Rebuild the notebook in nbgrader's first pass; read what that pass wrote in the second."""
@@ -77,6 +79,8 @@ class SubmissionExporter(NotebookExporter):  # type: ignore[misc]
         resources = dict(resources or {})
         _, _, lab, path = _submitted(self.parent, resources)
         submission = read_submission(path, lab)
+        course, told = self.parent.coursedir, resources["nbgrader"]
+        carry(path.parent, Path(course.format_path(course.autograded_directory, told["student"], lab.name)))
         resources["metadata"] = {"name": lab.name, "path": str(Path(filename).parent)}
         return self.from_notebook_node(nbformat.from_dict(submission.notebook), resources=resources, **kwargs)
 

@@ -8,8 +8,12 @@ from typing import Any
 from autograder.course.lab import CODE_STUB, TEXT_STUB
 from autograder.course.paths import CoursePaths
 from autograder.gradebook.autograde import AUTOGRADE, SANITIZE, SubmissionExporter
+from autograder.gradebook.exchange_files import CollectNotebooks
 from autograder.gradebook.feedback import FeedbackExporter
 from autograder.gradebook.released_notebook import RELEASE, WITHOUT_GRADEBOOK
+
+NOT_RELEASED = [".ipynb_checkpoints", "*.pyc", "__pycache__", ".*", "nodes"]
+"""Files beside a lab's source, and beside what a student hands in, that are not part of it."""
 
 
 def configure(config: Any, root: Path) -> None:
@@ -28,9 +32,8 @@ def configure(config: Any, root: Path) -> None:
     course.autograded_directory = str(paths.autograded.relative_to(root))
     course.feedback_directory = str(paths.feedback.relative_to(root))
     course.db_url = paths.gradebook_url
-    # Of a submission only the notebook is taken. A file such as ipykernel_launcher.py, lying beside a notebook that an
-    # instructor opens from formgrader, would be imported by that kernel.
-    course.ignore = ["*"]
+    course.ignore = NOT_RELEASED
+    config.ExchangeFactory.collect = CollectNotebooks
     config.Autograde.exporter_class = SubmissionExporter
     config.Autograde.sanitize_preprocessors = SANITIZE
     config.Autograde.autograde_preprocessors = AUTOGRADE

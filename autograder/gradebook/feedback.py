@@ -12,10 +12,12 @@ from typing import Any
 
 from nbconvert.exporters import Exporter
 from nbgrader import utils
+from nbgrader.converters import GenerateFeedback
 
 from autograder.core.errors import KitError
 from autograder.core.results import SubmissionResult
 from autograder.course.lab import Lab, heading_in, load_lab
+from autograder.gradebook.exchange_files import complete, only_notebooks
 from autograder.gradebook.reading import read_grade
 from autograder.grading.store import ResultStore
 from autograder.intake.roster import FILE_NAME, read_roster
@@ -31,6 +33,8 @@ class FeedbackExporter(Exporter):  # type: ignore[misc]
         """It is a page of HTML, whatever it is made of."""
         super().__init__(*args, **kwargs)
         self.file_extension = ".html"
+        if isinstance(self.parent, GenerateFeedback):
+            self.parent.coursedir = only_notebooks(self.parent.coursedir)
 
     def from_notebook_node(
         self, nb: Any, resources: dict[str, Any] | None = None, **kwargs: Any
@@ -42,6 +46,7 @@ class FeedbackExporter(Exporter):  # type: ignore[misc]
         root = Path(course.root)
         folder = Path(course.format_path(course.submitted_directory, student, name))
         lab = load_lab(root, name)
+        complete(folder, Path(course.format_path(course.feedback_directory, student, name)))
         page = feedback_html(
             Heading(_title(lab), student, _name(root, student), _handed_in(folder)),
             _tasks(copied),

@@ -21,15 +21,11 @@ def generate(root: Path, lab: str, into: Path, gradebook: bool) -> Path:
     Raises:
         KitError: nbgrader refuses.
     """
-    api = open_api(root, gradebook, release_directory=str(into), ignore=_NOT_RELEASED)
+    api = open_api(root, gradebook, release_directory=str(into))
     answer = answered(api.generate_assignment(lab, force=True, create=True))
     if not answer["success"]:
         raise KitError(f"nbgrader could not generate {lab}.", last_error(answer))
     return into / lab
-
-
-_NOT_RELEASED = [".ipynb_checkpoints", "*.pyc", "__pycache__", ".*", "nodes"]
-"""Files beside a lab's source that are not part of it."""
 
 
 def released_files(root: Path, lab: str) -> dict[Path, bytes]:
