@@ -206,6 +206,15 @@ def test_the_feedback_page_says_first_what_it_came_to_and_what_to_repair(graded:
         assert "secret" not in page and "http" not in page.replace("http-equiv", "")
 
 
+def test_the_courses_answer_stands_below_the_students_for_who_grades_and_nowhere_else(graded: Graded) -> None:
+    notebook = graded.root / "build" / "autograded" / "ann" / "toy" / "toy.ipynb"
+    sources = ["".join(cell["source"]) for cell in json.loads(notebook.read_text(encoding="utf-8"))["cells"]]
+    answer = sources.index("Because of that.")
+    assert sources[answer + 1].startswith("**For whoever grades") and sources[answer + 1].endswith("Because.")
+    assert sum("For whoever grades" in source for source in sources) == 1
+    assert all("For whoever grades" not in page for page in graded.pages.values())
+
+
 def test_the_class_page_shows_what_needs_a_person(graded: Graded) -> None:
     page = graded.root / "build" / "report" / "toy.html"
     write_class_page(page, class_entries(graded.root, toy.LAB), datetime.date(2026, 11, 22))

@@ -82,6 +82,9 @@ def _say(left_out: list[str], entries: list[Entry]) -> None:
     if waiting:
         told = f"{waiting} of {len(entries)} submissions have answers that nobody has graded yet"
         print(f"{told}; those count 0 until then.", file=sys.stderr)
+    stale = sum(1 for entry in entries if entry.grade is not None and entry.grade.stale)
+    if stale:
+        print(f"{stale} have points by hand for something that has changed since.", file=sys.stderr)
     for sentence in left_out:
         print(plain(sentence), file=sys.stderr)
 

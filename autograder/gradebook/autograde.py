@@ -104,12 +104,24 @@ class AttachResults(NbGraderPreprocessor):  # type: ignore[misc]
             if cell.cell_type == "code" and utils.is_grade(cell) and not utils.is_solution(cell):
                 grade_id = cell.metadata.nbgrader["grade_id"]
                 points[grade_id] = _attach(cell, checks.get(grade_id))
+        nb.cells = [shown for cell in nb.cells for shown in (cell, *_mark_scheme(cell, lab))]
         if result.problems:
             # It quotes the student: no line of it may be the blank one that ends the HTML, and no word a link.
             note = inert_text(" ".join(render("problems.html", problems=result.problems).split()))
             nb.cells.insert(0, nbformat.v4.new_markdown_cell(note, id="problems"))
         resources[_POINTS] = points
         return nb, resources
+
+
+def _mark_scheme(cell: Any, lab: Lab) -> list[Any]:
+    """What formgrader shows below an answer that a person grades: the course's own answer, with its mark scheme."""
+    if not (utils.is_grade(cell) and utils.is_solution(cell)):
+        return []
+    answer = lab.answers[cell.metadata.nbgrader["grade_id"]]
+    if answer.solution == answer.blank:  # of a course without its solutions
+        return []
+    text = f"**For whoever grades: the course's answer, which students do not see**\n\n{answer.solution}"
+    return [nbformat.v4.new_markdown_cell(text, id=f"{cell.id[:50]}-scheme")]
 
 
 def _attach(cell: Any, check: CheckResult | None) -> float | None:

@@ -25,9 +25,11 @@ def class_entries(root: Path, lab: str | None = None) -> list[Entry]:
     paths = CoursePaths(root)
     roster = read_roster(root / FILE_NAME).students if (root / FILE_NAME).is_file() else {}
     grades = {(grade.lab, grade.student): grade for grade in read_grades(root, lab or "")}
+    results = ResultStore(root).all(lab)
+    classes = {name: read_class(root, name) for name in {result.lab for result in results}}
     entries = []
-    for result in ResultStore(root).all(lab):
-        taken = read_class(root, result.lab).get(result.student, Taken(source=""))
+    for result in results:
+        taken = classes[result.lab].get(result.student, Taken(source=""))
         page = paths.feedback_page(result.student, result.lab)
         entries.append(
             Entry(

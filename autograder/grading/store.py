@@ -69,10 +69,10 @@ class ResultStore:
         Unreadable ones are left out, and those of students who have left the class.
         """
         results = []
-        for path in sorted(self._folder.glob(f"{lab or '*'}/*.json")):
-            taken = read_class(self._root, path.parent.name).get(path.stem)
-            if taken is not None and taken.left:
-                continue
-            with contextlib.suppress(OSError, ValueError):
-                results.append(SubmissionResult.load(path))
+        for folder in sorted(self._folder.glob(lab or "*")):
+            left = {student for student, taken in read_class(self._root, folder.name).items() if taken.left}
+            for path in sorted(folder.glob("*.json")):
+                if path.stem not in left:
+                    with contextlib.suppress(OSError, ValueError):
+                        results.append(SubmissionResult.load(path))
         return results

@@ -123,6 +123,9 @@ def _persons(entries: Sequence[Entry]) -> list[_Person]:
             if not cell.is_check:
                 what = f"{cell.grade_id}: {points(cell.max_points)} points"
                 found.append(_Person(entry.student, what, "An answer in words, which nobody has graded yet."))
+        for cell in entry.grade.stale if entry.grade is not None else ():
+            what = f"{cell.grade_id}: {points(cell.points or 0.0)} points by hand"
+            found.append(_Person(entry.student, what, "What you graded has changed since: look at it again."))
         found += [_Person(entry.student, "look at this; the points stay", flag) for flag in entry.result.flags]
         if entry.grade is None:
             found.append(_Person(entry.student, "not in the gradebook", "Grade the class once more."))
