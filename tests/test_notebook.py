@@ -548,3 +548,46 @@ def test_an_unused_extension_does_no_harm(tmp_path: Path) -> None:
     done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, timeout=START)
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
     assert not (tmp_path / "nodes").exists()
+
+
+GUESSES = "%%file predictions.yaml\nbeats_predicted: 7\nbeats_measured: 0\nticks_predicted: pause"
+FILLED = (
+    "from autograder.checks import answers\nwith answers('predictions.yaml') as table:\n"
+    "    table.expect_answer('beats_measured', 0)\ntable.score(3)"
+)
+
+
+def test_lab_says_what_is_done_what_is_open_and_what_was_predicted(notebook: Notebook) -> None:
+    marks = {"grade": True, "solution": False, "locked": True, "task": False, "schema_version": 3}
+    check = {"nbgrader": marks | {"grade_id": "check", "points": 3}}
+    later = {"nbgrader": marks | {"grade_id": "later", "points": 2}}
+    text = {"nbgrader": marks | {"grade_id": "why", "points": 4, "solution": True}}
+    *_, guesses = answer(GUESSES, "predictions")
+    cells = [
+        ("markdown", "# Lab 0: Hearts", {}),
+        ("markdown", "## 1. Beats", {}),
+        ("code", GUESSES, guesses),
+        ("code", FILLED, check),
+        ("markdown", "## 2. Ticks", {}),
+        ("code", f"{CHECK}  # of this notebook", later),
+        ("markdown", "## 3. Explain", {}),
+        ("markdown", "Because.", text),
+    ]
+    made = [
+        {"cell_type": kind, "id": f"c{number}", "source": source, "metadata": metadata}
+        | ({"outputs": [], "execution_count": None} if kind == "code" else {})
+        for number, (kind, source, metadata) in enumerate(cells)
+    ]
+    notebook.path.write_text(json.dumps({"cells": made, "metadata": {}, "nbformat": 4, "nbformat_minor": 5}))
+    notebook.run(GUESSES, "c2")
+    notebook.run(FILLED, "c3")
+    said = notebook.run("%lab")
+    lines = [" ".join(line.split()) for line in said.text.splitlines()]
+    assert lines[0] == "Lab 0: Hearts: 2 of 3 parts done · 3 of 5 points"
+    assert "✓ 1. Beats passed 3 of 3 points" in lines and "Go on with: 2. Ticks" in lines
+    assert "○ 2. Ticks not checked since the kernel started 2 points" in lines
+    assert "✓ 3. Explain written 4 points, given by a person" in lines
+    assert "beats 7 0 otherwise" in lines and "ticks pause open" in lines
+    assert "<b>2. Ticks</b>" in said.html
+    notebook.run(GUESSES, "c2")
+    assert "passed, but a cell above was run again since" in notebook.run("%lab").text

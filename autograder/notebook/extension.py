@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from autograder.core import front_end
 from autograder.course.cell_file import CELL_BYTES, BadNameError, CellFile, check_free, check_name, parse
 from autograder.course.folder import book_of_kit
-from autograder.notebook import ros2_magic
+from autograder.notebook import lab_magic, ros2_magic
 from autograder.notebook.kernel import Kernel, now
 from autograder.notebook.program_folder import Written, shown
 
@@ -42,7 +42,7 @@ After a change run the cell again, and then its check.
 
 
 def register(shell: Any) -> None:
-    """Give an IPython shell the `%%node`, `%%file` and `%ros2` magics, and start each cell's findings afresh.
+    """Give an IPython shell the `%%node`, `%%file`, `%ros2` and `%lab` magics, and start each cell's findings afresh.
 
     Programs of an earlier kernel do not count: one whose cell has been renamed or deleted since would still pass here,
     and be missing when the notebook is graded. Those of this kernel stay, also when the extension is loaded again.
@@ -52,6 +52,7 @@ def register(shell: Any) -> None:
     for magic, text in (("node", _NODE_HELP), ("file", _FILE_HELP)):
         shell.register_magic_function(_writer(kernel, magic, text), magic_kind="cell", magic_name=magic)
     shell.register_magic_function(ros2_magic.magic(kernel), magic_kind="line", magic_name="ros2")
+    shell.register_magic_function(lab_magic.magic(kernel), magic_kind="line", magic_name="lab")
     if kernel is known:
         return
     front_end.active = kernel

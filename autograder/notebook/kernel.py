@@ -16,6 +16,9 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from autograder.core.results import CellResult
+from autograder.course.lab import cell_digest
+from autograder.notebook.lab_state import Report
 from autograder.notebook.program_folder import ProgramFolder, Written, notebook_of, shown
 
 if TYPE_CHECKING:
@@ -40,6 +43,9 @@ class Kernel:
         notebook = notebook_of(shell.user_ns, dict(os.environ))
         self.folder = ProgramFolder(notebook, notebook.parent if notebook else Path.cwd())
         self.cell, self.cell_id = "", ""
+        self._began = 0
+        self.reports: dict[str, Report] = {}
+        """What the checks of this kernel said last, by `cell_digest`."""
         self._watch: Watch | None = None
         self._warmed = threading.Thread(target=_warm_up, name="warm-up")
 
@@ -58,14 +64,18 @@ class Kernel:
         """Note the cell that begins, and forget what the last one found."""
         self.cell = str(info.raw_cell or "")
         self.cell_id = str(getattr(info, "cell_id", "") or "")
+        self._began = self.number
         if self._watch is not None:
             self._watch.new_cell()
         findings = _findings()
         if findings is not None:
             findings.reset()
 
-    def end_cell(self, _result: object) -> None:
-        """Show what was expected in a cell that asked for no score."""
+    def end_cell(self, result: Any) -> None:
+        """Keep what a check said, and show what was expected in a cell that asked for no score."""
+        found = getattr(result.result, "result", None)
+        if isinstance(found, CellResult) and found.max_points:
+            self.reports[cell_digest(self.cell)] = Report(found, self._began)
         findings = _findings()
         if findings is not None and findings.outcomes:
             from autograder.checks.scoring import unscored
