@@ -514,7 +514,7 @@ def test_launches_leave_no_logs_behind(notebook: Notebook) -> None:
 def test_without_the_set_up_cell_it_is_named(tmp_path: Path) -> None:
     made = Notebook(tmp_path)
     try:
-        for cell in (CHECK, TALKER):
+        for cell in (CHECK, TALKER, "%lab"):
             shown = made.run(cell)
             assert "Run the first code cell of the notebook" in shown.text, shown
         assert "Run the first" not in made.run("unknown").text

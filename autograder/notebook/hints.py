@@ -19,6 +19,9 @@ def load_ipython_extension(shell: Any) -> None:
     for magic in ("node", "file"):
         if magic not in shell.magics_manager.magics["cell"]:
             shell.register_magic_function(_not_yet(magic), magic_kind="cell", magic_name=magic)
+    for magic in ("lab", "ros2"):
+        if magic not in shell.magics_manager.magics["line"]:
+            shell.register_magic_function(_not_known, magic_kind="line", magic_name=magic)
     shell.events.register("post_run_cell", _explain)
 
 
@@ -28,6 +31,10 @@ def _not_yet(magic: str) -> Any:
 
     say.__doc__ = f"Write the cell to a {'program' if magic == 'node' else 'file'}. {_SAY}"
     return say
+
+
+def _not_known(_line: str) -> None:
+    print(_SAY)
 
 
 def _explain(result: Any) -> None:
