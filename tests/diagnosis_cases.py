@@ -495,6 +495,16 @@ CASES = {
         because="took the node away",
         never=("spinning-ended",),
     ),
+    "spins_in_vain": Case(
+        SERVER + CLIENT.format("") + "self.asked = 0\nself.create_timer(0.05, self.ask)\n",
+        "def ask(self):\n"
+        "    self.asked += 1\n"
+        "    if self.asked < 3:\n"
+        "        future = self.client.call_async(Trigger.Request())\n"
+        "        rclpy.spin_until_future_complete(self, future, timeout_sec=0.1)\n",
+        says="nested-spin",
+        because="without what it spun for",
+    ),
     "spins_before": Case(
         "self.create_timer(0.05, self.tick)\n",
         "def tick(self):\n    pass\n",

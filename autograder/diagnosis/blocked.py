@@ -98,26 +98,35 @@ def _nobody_offers(client: Thing, services: dict[str, list[str]], said: str) -> 
 
 
 def nested_spin(inside: Inside) -> Diagnosis | None:
-    """Must have seen: a callback that spins, and has not ended since or has lost its node to that spinning."""
+    """Must have seen: a callback that spins, and has not ended since, has lost its node to that, or got nothing."""
     for call in inside.calls:
-        if call.what != "spin" or not call.in_callback:
-            continue
-        callback = inside.things.get(call.callback)
-        within = bool(callback and callback.running)
-        lost = bool(callback and callback.node and not inside.spinning(callback.node))
-        if call.blocks or within or lost:
-            so = (
-                "the callback has not ended since, and what it spins for cannot happen while it holds its thread and "
-                "its group."
-                if call.blocks or (within and not lost)
-                else "it took the node away from the executor that runs it, so the node's other callbacks stop."
-            )
+        if call.what == "spin" and call.in_callback and (harm := _harm_of_spinning(inside, call)):
             return Diagnosis(
-                f"{_at(inside, call)}It spins inside a callback: {so}",
+                f"{_at(inside, call)}It spins inside a callback: {harm}",
                 "nested-spin",
                 "Never spin inside a callback: use `call_async` and a done callback, or `await`.",
             )
     return None
+
+
+def _harm_of_spinning(inside: Inside, call: Call) -> str:
+    callback = inside.things.get(call.callback)
+    within = bool(callback and callback.running)
+    lost = bool(callback and callback.node and not inside.spinning(callback.node))
+    if call.blocks or (within and not lost):
+        return (
+            "the callback has not ended since, and what it spins for cannot happen while it holds its thread and "
+            "its group."
+        )
+    if lost:
+        return "it took the node away from the executor that runs it, so the node's other callbacks stop."
+    if call.vain:
+        times = "once" if call.vain == 1 else f"{call.vain} times"
+        return (
+            f"it came back {times} without what it spun for. Where the answer's callback is in the group of the "
+            "callback that spins, each waits for the other."
+        )
+    return ""
 
 
 def rate_in_callback(inside: Inside) -> Diagnosis | None:

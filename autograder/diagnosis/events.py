@@ -167,6 +167,8 @@ class Call(_AtLine):
     target: int = 0
     begun: int
     ended: int
+    vain: int = 0
+    """How often it spun until a future was done, and came back before that."""
     since: float = 0.0
     """When it last began."""
     thread: int = 0

@@ -23,7 +23,7 @@ class Call:
         """Begin with none; `target` is the number of the thing that is called."""
         self.key = f"call{next(ledger.numbers)}"
         self.what, self.target, self.where, self.callback = what, target, where, callback
-        self.begun = self.ended = 0
+        self.begun = self.ended = self.vain = 0
         self.since = 0.0
         self.thread = 0
 
@@ -37,6 +37,7 @@ class Call:
             "target": self.target,
             "begun": self.begun,
             "ended": self.ended,
+            "vain": self.vain,
             "since": self.since,
             "thread": self.thread,
             **self.where,
@@ -49,10 +50,11 @@ class Call:
             self.since, self.thread = time.monotonic(), _thread.get_ident()
         ledger.touch(self)
 
-    def end(self) -> None:
-        """Note that it came back."""
+    def end(self, vain: bool) -> None:
+        """Note that it came back; `vain` if what it was to wait for had not come."""
         with ledger.lock:
             self.ended += 1
+            self.vain += vain
         ledger.touch(self)
 
 
@@ -70,6 +72,11 @@ def _call(what: str, target: Any) -> Call:
         _calls[key] = Call(what, number, where, here.callback)
         ledger.add(_calls[key])
     return _calls[key]
+
+
+def _not_done(*arguments: Any) -> bool:
+    """Whether there is a future among these, and it has no result."""
+    return any(hasattr(each, "add_done_callback") and not each.done() for each in arguments)
 
 
 def wrap_blocking(
@@ -114,7 +121,7 @@ def wrap_blocking(
             here.depth -= 1
             with quiet():
                 if noted is not None:
-                    noted.end()
+                    noted.end(vain=spins is not None and _not_done(*args, *kwargs.values()))
                 if spun is not None:
                     spun.spin(-1, long)
 

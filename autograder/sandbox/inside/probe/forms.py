@@ -158,6 +158,7 @@ class Call(Where):
     target: int
     begun: int
     ended: int
+    vain: int
     since: float
     thread: int
 
