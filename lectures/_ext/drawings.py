@@ -7,6 +7,7 @@ from typing import Any
 
 import drawings_bringup
 import drawings_lifecycle
+import drawings_nodes
 from docutils import nodes
 from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
@@ -102,6 +103,7 @@ DRAWINGS: dict[str, Callable[[], Picture]] = {
     "two-helpers": drawings_bringup.two_helpers,
     "middleware": drawings_bringup.middleware,
     **drawings_lifecycle.DRAWINGS,
+    **drawings_nodes.DRAWINGS,
 }
 
 
