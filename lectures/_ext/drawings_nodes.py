@@ -32,9 +32,9 @@ def one_loop_or_nodes() -> Picture:
     canvas.words(410, 340, "When “workshop” hangs, its messages wait.", size=17)
     canvas.words(410, 364, "The brake does not notice.", size=17)
     return canvas.picture(
-        "On the left one program that goes round: it measures, brakes if something is near, and reports. When reporting "
-        "hangs, nobody measures and nobody brakes. On the right three nodes: the sonar sends its distance to the brake "
-        "and to the workshop. When the workshop hangs, the brake does not notice."
+        "On the left one program that goes round: it measures, brakes if something is near, and reports. When "
+        "reporting hangs, nobody measures and nobody brakes. On the right three nodes: the sonar sends its distance to the "
+        "brake and to the workshop. When the workshop hangs, the brake does not notice."
     )
 
 
@@ -54,7 +54,9 @@ def topic() -> Picture:
         canvas.oval(720, y, 150, 66)
         canvas.words(795, y + 39, name, anchor="middle")
         canvas.line([(582, 163), (718, y + 33)], arrow=True, line=2)
-    canvas.words(450, 312, "Each message goes to every subscription. Nobody knows who is at the other end.", anchor="middle")
+    canvas.words(
+        450, 312, "Each message goes to every subscription. Nobody knows who is at the other end.", anchor="middle"
+    )
     return canvas.picture(
         "A topic. Two publishers, sonar and lidar, send messages to the topic /distance of the type Range. Three "
         "subscriptions, in brake, workshop and display, get every message. Nobody knows who is at the other end."
@@ -78,8 +80,8 @@ def service() -> Picture:
     canvas.words(450, 228, "One response for each request, if the server is there and answers.", anchor="middle")
     canvas.words(450, 258, "The client decides how long it is ready to wait.", anchor="middle")
     return canvas.picture(
-        "A service. The client, starter, sends a request to the server, brake; the server sends one response back, if it "
-        "is there and answers. The client decides how long it is ready to wait."
+        "A service. The client, starter, sends a request to the server, brake; the server sends one response back, if "
+        "it is there and answers. The client decides how long it is ready to wait."
     )
 
 
@@ -105,9 +107,9 @@ def which_of_four() -> Picture:
             canvas.words(252, y + 87, "no", size=17)
             canvas.words(492, y + 25, "yes", size=17, anchor="middle")
     return canvas.picture(
-        "Which of the four? Does it flow, for whoever listens: a topic, such as distances. If not, is it a setting of one "
-        "node: a parameter, such as a rate. If not, does it take long or should it be possible to stop it: an action, "
-        "such as parking the car. Otherwise it is asked once and done at once: a service, such as checking the brake."
+        "Which of the four? Does it flow, for whoever listens: a topic, such as distances. If not, is it a setting of "
+        "one node: a parameter, such as a rate. If not, does it take long or should it be possible to stop it: an "
+        "action, such as parking the car. Otherwise it is asked once and done at once: a service, such as checking the brake."
     )
 
 
