@@ -33,8 +33,8 @@ def one_loop_or_nodes() -> Picture:
     canvas.words(410, 364, "The brake does not notice.", size=17)
     return canvas.picture(
         "On the left one program that goes round: it measures, brakes if something is near, and reports. When "
-        "reporting hangs, nobody measures and nobody brakes. On the right three nodes: the sonar sends its distance to the "
-        "brake and to the workshop. When the workshop hangs, the brake does not notice."
+        "reporting hangs, nobody measures and nobody brakes. On the right three nodes: the sonar sends its distance "
+        "to the brake and to the workshop. When the workshop hangs, the brake does not notice."
     )
 
 
@@ -109,7 +109,8 @@ def which_of_four() -> Picture:
     return canvas.picture(
         "Which of the four? Does it flow, for whoever listens: a topic, such as distances. If not, is it a setting of "
         "one node: a parameter, such as a rate. If not, does it take long or should it be possible to stop it: an "
-        "action, such as parking the car. Otherwise it is asked once and done at once: a service, such as checking the brake."
+        "action, such as parking the car. Otherwise it is asked once and done at once: a "
+        "service, such as checking the brake."
     )
 
 
