@@ -7,6 +7,9 @@ import datetime
 import io
 import json
 import os
+import shutil
+import subprocess
+import sys
 import zipfile
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -33,6 +36,7 @@ from autograder.intake.roster import read_roster
 from autograder.report.class_page import write_class_page
 from autograder.report.export import FORMATS
 
+KIT = Path(__file__).resolve().parent.parent
 ROSTER = """id,name,email,section,canvas_id,moodle_id
 ann,"Doe, Ann",ann@example.edu,A,12345,501
 bob,Bob Müller,bob@example.edu,B,12346,502
@@ -183,6 +187,19 @@ def test_gradescope_gets_a_result_for_each_submission(graded: Graded) -> None:
     undecided = cem["tests"][0]
     assert "score" not in undecided and "status" not in undecided and "your instructor decides" in undecided["output"]
     assert "secret" not in json.dumps(made) and "not graded yet" in cem["output"]
+
+
+def test_nbgraders_own_export_has_the_same_numbers(graded: Graded, tmp_path: Path) -> None:
+    shutil.copy(KIT / "nbgrader_config.py", graded.root)
+    done = subprocess.run(
+        [sys.executable, "-m", "nbgrader", "export", "--to", str(tmp_path / "all.csv")],
+        cwd=graded.root, env=os.environ | {"PYTHONPATH": str(KIT)}, capture_output=True, text=True, timeout=120,
+        check=False,
+    )  # fmt: skip
+    (graded.root / "nbgrader_config.py").unlink()
+    assert done.returncode == 0, done.stderr
+    scores = {row["student_id"]: float(row["score"]) for row in rows((tmp_path / "all.csv").read_text())}
+    assert (scores["ann"], scores["bob"]) == (9.5, 2.5)
 
 
 def test_junit_has_a_suite_for_each_student(graded: Graded) -> None:

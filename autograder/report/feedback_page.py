@@ -187,6 +187,8 @@ def _repairs(
 
 
 def plain_title(markdown: str) -> str:
-    """Return a heading's text without the marks of Markdown's links and emphasis."""
+    """Return a heading's text without Markdown's links and emphasis, and without saying that it is about a check."""
     text = re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", markdown)
-    return re.sub(r"(\*\*|__)(.+?)\1", r"\2", text)
+    text = re.sub(r"(\*\*|__)(.+?)\1", r"\2", text)
+    about = text.removeprefix("Check: ")
+    return text if about == text else about[:1].upper() + about[1:]

@@ -28,9 +28,10 @@ def to_canvas(entries: Sequence[Entry], column: str) -> Export:
         known = entry.known
         login = known.get("canvas_login") or known.get("email", "")
         name = known.get("name") or entry.student
-        rows.append(
-            (name, known.get("canvas_id", ""), known.get("id", entry.student), login, known.get("section", ""), score)
-        )
+        number = known.get("canvas_id", "")
+        # Where Canvas's number is known and no roster is, the name here is one that Canvas made up for a file.
+        sis = known.get("id") or ("" if number else entry.student)
+        rows.append((name, number, sis, login, known.get("section", ""), score))
     return Export(table(rows), left_out)
 
 
