@@ -42,6 +42,7 @@ def tree() -> list[Path]:
     return sorted(path for path in paths if path.is_file())
 
 
+ARCHAIC = re.compile(r"\b(shall|for ever|dear|hence|whilst|thereof|hitherto|whence)\b", re.IGNORECASE)
 FILES_HERE = tree()
 # What sample students hand in may be broken on purpose.
 HANDED_IN = ROOT / "tests" / "classes"
@@ -86,6 +87,18 @@ def test_no_file_names_a_package_host_or_a_path_of_somebody_elses() -> None:
         except UnicodeDecodeError:
             continue
         found += [f"{name(path)}: {hit.group(0)}" for hit in FOREIGN.finditer(text)]
+    assert found == []
+
+
+def test_no_sentence_uses_a_word_that_students_have_to_look_up() -> None:
+    """Many of them read English as a second language."""
+    found = [
+        f"{name(path)}:{number}: {line[:90]}"
+        for path in FILES_HERE
+        if path.suffix in (".md", ".ipynb", ".py", ".html", ".j2", ".yaml") and path != Path(__file__)
+        for number, line in enumerate(path.read_text(encoding="utf-8", errors="replace").splitlines(), 1)
+        if ARCHAIC.search(line)
+    ]
     assert found == []
 
 
