@@ -8,6 +8,7 @@ from typing import Any
 import drawings_bringup
 import drawings_lifecycle
 import drawings_nodes
+import drawings_qos
 from docutils import nodes
 from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
@@ -104,6 +105,7 @@ DRAWINGS: dict[str, Callable[[], Picture]] = {
     "middleware": drawings_bringup.middleware,
     **drawings_lifecycle.DRAWINGS,
     **drawings_nodes.DRAWINGS,
+    **drawings_qos.DRAWINGS,
 }
 
 
