@@ -32,6 +32,7 @@ INSTRUCTORS = (
     "intake/formats.py",
     "intake/members.py",
     "intake/roster.py",
+    "cli/explain.py",
     "cli/grade.py",
     "cli/instructors.py",
     "cli/labs.py",

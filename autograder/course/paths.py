@@ -81,6 +81,11 @@ class CoursePaths:
         return self.build / "report" / f"{lab}.html"
 
     @property
+    def explained(self) -> Path:
+        """Pictures and messages of single submissions."""
+        return self.build / "explained"
+
+    @property
     def book(self) -> Path:
         """The lectures as HTML."""
         return self.build / "lectures" / "book"

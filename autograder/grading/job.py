@@ -35,6 +35,8 @@ class Job(BaseModel):
     """Of the files that are answers: whether the cell is still as students receive it."""
     cells: list[Cell]
     problems: list[Outcome] = Field(default_factory=list)
+    messages: bool = False
+    """The messages are wanted, too, that the checks received."""
 
     @property
     def build_seconds(self) -> float:

@@ -82,9 +82,9 @@ def _run_share(job: Job, share: Sequence[Cell], stop: threading.Event | None) ->
     while left and len(lost) < LOST:
         cells = [cell for cell in job.cells if cell.points is None or cell in left]
         part = job.model_copy(update={"cells": cells})
-        limit = _limit(len(left)) + job.build_seconds
+        seconds = limit(len(left)) + job.build_seconds
         run = run_in_sandbox(
-            ["autograder.grading.worker"], part.model_dump_json().encode("utf-8"), job.isolation, limit, stop
+            ["autograder.grading.worker"], part.model_dump_json().encode("utf-8"), job.isolation, seconds, stop
         )
         decided += _said(run.stdout)
         known = {check.grade_id for check in decided}
@@ -92,7 +92,7 @@ def _run_share(job: Job, share: Sequence[Cell], stop: threading.Event | None) ->
         if not left:
             break
         if run.timed_out or _STACKS in b"\n" + run.stdout:
-            lost.append(_stuck(left.pop(0), run, limit))
+            lost.append(_stuck(left.pop(0), run, seconds))
         elif died_at == left[0].grade_id:
             lost.append(_died(left.pop(0), run))
         else:
@@ -101,8 +101,8 @@ def _run_share(job: Job, share: Sequence[Cell], stop: threading.Event | None) ->
     return [*decided, *lost, *(undecided(cell, because, code=lost[-1].outcomes[0].code) for cell in left)]
 
 
-def _limit(checks: int) -> float:
-    """Seconds after which a worker with so many checks is ended from outside."""
+def limit(checks: int) -> float:
+    """Return the seconds after which a worker with so many checks is ended from outside."""
     return CELL_SECONDS + 2 * STUCK_SECONDS + SECONDS_PER_CHECK * checks
 
 
@@ -133,10 +133,10 @@ def _died(cell: Cell, run: OuterRun) -> CheckResult:
     return check
 
 
-def _stuck(cell: Cell, run: OuterRun, limit: float) -> CheckResult:
+def _stuck(cell: Cell, run: OuterRun, seconds: float) -> CheckResult:
     stacks = (b"\n" + run.stdout).partition(_STACKS)[2].decode("utf-8", "replace")
     if not stacks:
-        return undecided(cell, f"The grader took longer than {limit:.0f} s.", run.stderr, STUCK)
+        return undecided(cell, f"The grader took longer than {seconds:.0f} s.", run.stderr, STUCK)
     because = f"The grader got stuck in this check and was ended after {CELL_SECONDS + STUCK_SECONDS:.0f} s."
     main_thread = stacks.strip().split("\n\n")[-1].splitlines()  # its newest call comes first
     check = undecided(cell, because, "\n".join(main_thread[: 1 + _LINES]), STUCK)

@@ -1,7 +1,7 @@
 """Runs the trusted check cells of one submission, inside the grading sandbox.
 
-Reads a `Job` as JSON from standard input and writes to standard output, for each check as soon as it is decided, a line
-with its `CheckResult` as JSON. When it is stuck, its stacks are the last thing it writes.
+Reads a `Job` as JSON from standard input. Writes to standard output a line of JSON for each check as soon as it is decided,
+its `CheckResult`, and, where the messages are wanted, a line for each of them. When it is stuck, its stacks come last.
 The student's programs are text until the node sandbox starts them; nothing of theirs is imported here.
 """
 
@@ -25,6 +25,7 @@ from autograder.checks.scoring import Score
 from autograder.core.results import CellResult, CheckResult, NodeLog, Outcome, Status
 from autograder.course.lab import Cell
 from autograder.grading.job import CELL_SECONDS, STUCK_SECONDS, Job
+from autograder.graph import bag
 from autograder.sandbox.inside.warm_up import load_ros
 from autograder.sandbox.limits import MIB
 from autograder.sandbox.scratch import Scratch
@@ -163,12 +164,14 @@ def main() -> int:
     job = Job.model_validate_json(sys.stdin.buffer.read())
     _, hard = resource.getrlimit(resource.RLIMIT_DATA)
     resource.setrlimit(resource.RLIMIT_DATA, (MEMORY if hard == resource.RLIM_INFINITY else min(MEMORY, hard), hard))
+    bag.current.wanted = job.messages
     with Scratch() as scratch:
         scratch.chmod(0o755)
         folder = scratch / "submission"
         folder.mkdir(mode=0o755)
         for check in run_job(job, folder, out):
             out.write(check.model_dump_json() + "\n")
+            out.writelines(message.model_dump_json() + "\n" for message in bag.current.empty(check.grade_id))
             out.flush()
     out.close()
     return 0

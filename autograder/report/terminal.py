@@ -120,11 +120,25 @@ def check_text(check: CellResult, remarks: Sequence[str], origin: str) -> str:
     return "\n".join(line.rstrip() for line in screen.file.getvalue().splitlines())
 
 
-def _output(log: NodeLog) -> RenderableType:
+def evidence_view(check: CheckResult) -> RenderableType:
+    """Return all that is known of a check, for an instructor: what passed, too, and all that its programs printed."""
+    lines: list[RenderableType] = [check_view(check, title=check.title or check.grade_id), Text()]
+    part = ""
+    for outcome in check.outcomes:
+        if outcome.part != part:
+            part = outcome.part
+            lines.append(Text(plain(part) or "all parts", "bold"))
+        mark = Text("  (hidden)", "dim") if outcome.hidden else Text()
+        lines += [Text("  ") + _outcome_line(outcome) + mark, *_details(outcome)]
+    printed = {log.program for log in check.logs if log.text.strip()}
+    return Group(*lines, *(_output(log, None) for log in check.logs if log.program in printed))
+
+
+def _output(log: NodeLog, most: int | None = _LOG_LINES) -> RenderableType:
     ended = f", stopped by the {log.stopped_by}" if log.stopped_by else ""
     if not ended and log.exit_status is not None:
         ended = f", exit status {log.exit_status}"
-    shown = Text(plain(last_lines(log.text, _LOG_LINES)))
+    shown = Text(plain(last_lines(log.text, most or len(log.text) + 1)))
     return Panel(shown, title=Text(f"output of {plain(log.program)}{ended}"), title_align="left", border_style="dim")
 
 

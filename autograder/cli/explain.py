@@ -1,0 +1,120 @@
+"""`autograder explain`: all that is known of one submission, or of one check of it."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from autograder.cli.app import app
+from autograder.core.errors import KitError
+
+if TYPE_CHECKING:
+    from autograder.core.results import CheckResult, SubmissionResult
+
+
+@app.command()
+def explain(
+    student: Annotated[str, typer.Argument(help="Who handed it in.")],
+    check: Annotated[str, typer.Argument(help="The check: its number, its id, or a part of its title.")] = "",
+    lab: Annotated[str, typer.Option(help="The lab, if the student handed in several.")] = "",
+) -> None:
+    """Show all that grading found out: outcomes, evidence, output, flags; pictures, and messages as an MCAP file.
+
+    For the messages the check is run once more, with the same values.
+    """
+    from autograder.course.folder import course_root
+    from autograder.course.paths import CoursePaths
+    from autograder.report.terminal import console, evidence_view, submission_view
+
+    root = course_root()
+    result = _result(root, student, lab)
+    folder = CoursePaths(root).explained / result.lab / student
+    screen = console()
+    if not check:
+        screen.print(submission_view(result, "instructor"))
+        for path in _pictures(result.checks, folder):
+            print(path)
+        screen.print("Name a check for all of its evidence and its messages, such as: ", end="")
+        screen.print(f"autograder explain {student} 1 --lab {result.lab}", markup=False)
+        return
+    chosen = _chosen(result, check)
+    screen.print(evidence_view(chosen))
+    for path in _pictures([chosen], folder):
+        print(path)
+    _messages(root, result, chosen, folder / _name(chosen))
+
+
+def _result(root: Path, student: str, lab: str) -> SubmissionResult:
+    from autograder.grading.store import ResultStore
+
+    found = [result for result in ResultStore(root).all(lab or None) if result.student == student]
+    if not found:
+        raise KitError(f"There is no result of {student!r}.", "Grade the class first: autograder grade LAB SUBMISSIONS")
+    if len(found) > 1:
+        raise KitError(f"{student} has results of {len(found)} labs.", f"Name one: --lab {found[-1].lab}")
+    return found[0]
+
+
+def _chosen(result: SubmissionResult, named: str) -> CheckResult:
+    if named.isdigit() and 0 < int(named) <= len(result.checks):
+        return result.checks[int(named) - 1]
+    by_id = [check for check in result.checks if check.grade_id == named]
+    by_title = [check for check in result.checks if named.casefold() in check.title.casefold()]
+    found = by_id or by_title
+    if len(found) != 1:
+        listed = "".join(f"\n  {n}  {c.grade_id}  {c.title}" for n, c in enumerate(result.checks, start=1))
+        several = f"{len(found)} checks" if found else "No check"
+        raise KitError(f"{several} of {result.lab} can be meant by {named!r}.", f"The checks are:{listed}")
+    return found[0]
+
+
+def _name(check: CheckResult) -> str:
+    return re.sub(r"[^A-Za-z0-9_-]", "-", check.grade_id)
+
+
+def _pictures(checks: list[CheckResult], folder: Path) -> list[Path]:
+    """Write the pictures of checks, and return where they are."""
+    from autograder.core.files import write_beside
+
+    written = []
+    for check in checks:
+        pictures = [outcome.picture for outcome in check.outcomes if outcome.picture is not None]
+        for number, picture in enumerate(pictures, start=1):
+            written.append(folder / f"{_name(check)}_{number}.svg")
+            write_beside(written[-1], picture.svg)
+    return written
+
+
+def _messages(root: Path, result: SubmissionResult, check: CheckResult, bag: Path) -> None:
+    """Run the check once more, write what it received, and say what that is worth."""
+    from autograder.course.lab import load_lab
+    from autograder.course.paths import CoursePaths
+    from autograder.grading.messages import received, write_mcap
+    from autograder.grading.runner import Settings
+    from autograder.report.terminal import console, working
+    from autograder.sandbox.isolation import choose
+    from autograder.submission.reader import read_submission
+
+    screen = console()
+    lab = load_lab(root, result.lab)
+    notebook = CoursePaths(root).submitted_notebook(result.student, lab.name)
+    if read_submission(notebook, lab).digest != result.digest:
+        screen.print("The submission or the lab has changed since; the messages are those of how it is now.")
+    settings = Settings(isolation=choose(result.isolation), seed=result.seed)
+    with working(f"Running {check.grade_id} once more for its messages"):
+        again, messages = received(notebook, result.student, lab, settings, [check.grade_id])
+    if [one.points for one in again] != [check.points]:
+        now = again[0].points if again else None
+        screen.print(f"Run once more, the check gives {'no verdict' if now is None else f'{now:g} points'} now.")
+    if not messages:
+        screen.print("The check received no messages.")
+        return
+    left_out = write_mcap(messages, bag)
+    topics = sorted({message.topic for message in messages})
+    screen.print(f"{len(messages)} messages on {', '.join(topics)}:", markup=False)
+    for name in left_out:
+        screen.print(f"Those of the type {name} are left out, for its definition is not installed.", markup=False)
+    print(next(bag.glob("*.mcap")))

@@ -1,0 +1,114 @@
+"""Runs checks of a submission once more for the messages that they receive, and writes those as an MCAP file.
+
+That is the format in which ROS 2 records: `ros2 bag`, Foxglove, PlotJuggler and Lichtblick read it.
+"""
+
+from __future__ import annotations
+
+import base64
+import shutil
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from autograder.core.errors import KitError
+from autograder.core.results import CheckResult
+from autograder.course.lab import Lab
+from autograder.grading.runner import Settings, job_of
+from autograder.grading.supervisor import limit
+from autograder.graph.bag import BagMessage
+from autograder.ros2.interfaces import source_of
+from autograder.sandbox.outer import run_in_sandbox
+from autograder.submission.reader import read_submission
+
+
+def received(
+    notebook: Path, student: str, lab: Lab, settings: Settings, wanted: Sequence[str]
+) -> tuple[list[CheckResult], list[BagMessage]]:
+    """Run some checks of a submission in the sandbox, and return what they came to, and what they received.
+
+    Args:
+        notebook: that was handed in.
+        student: who handed it in.
+        lab: that it answers.
+        settings: how to run it; with the seed of a result, the same values are drawn.
+        wanted: the checks, by grade_id.
+    """
+    job = job_of(read_submission(notebook, lab), student, lab, settings)
+    cells = [cell for cell in job.cells if cell.points is None or cell.grade_id in wanted]
+    job = job.model_copy(update={"cells": cells, "messages": True})
+    seconds = limit(len(wanted)) + job.build_seconds
+    run = run_in_sandbox(["autograder.grading.worker"], job.model_dump_json().encode("utf-8"), job.isolation, seconds)
+    checks, messages = [], []
+    for line in run.stdout.splitlines():
+        try:
+            if line.startswith(b'{"grade_id"'):
+                messages.append(BagMessage.model_validate_json(line))
+            else:
+                checks.append(CheckResult.model_validate_json(line))
+        except ValidationError:
+            break  # the last line of a worker that died may be half of one
+    return checks, messages
+
+
+def write_mcap(messages: Sequence[BagMessage], folder: Path) -> list[str]:
+    """Write messages as a bag of ROS 2: a folder with an MCAP file in it. An earlier one there is replaced.
+
+    Returns:
+        The types that are left out, since nobody knows how they are defined.
+
+    Raises:
+        KitError: the library that writes it is not installed.
+    """
+    try:
+        from rosbags.rosbag2 import StoragePlugin, Writer
+        from rosbags.typesys import Stores, get_typestore
+    except ImportError as error:
+        raise KitError("Writing MCAP files needs the package rosbags.", "pip install rosbags") from error
+    types = get_typestore(Stores.ROS2_JAZZY)
+    left_out = sorted(name for name in {message.type for message in messages} if not _defined(types, name))
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    with Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        topics: dict[tuple[str, str], Any] = {}
+        for message in sorted(messages, key=lambda one: one.stamp):
+            key = message.topic, message.type
+            if message.type in left_out:
+                continue
+            if key not in topics:
+                topics[key] = writer.add_connection(*key, typestore=types)
+            writer.write(topics[key], message.stamp, base64.b64decode(message.data))
+    return left_out
+
+
+def _defined(types: Any, name: str) -> bool:
+    """Whether the library knows a type, or can be told by the file that defines it, with all that it is made of."""
+    from rosbags.typesys import get_types_from_msg
+
+    if name in types.fielddefs:
+        return True
+    try:
+        text = source_of(name)
+        found = get_types_from_msg(text, name)
+    except Exception:  # no such file, or one that the library does not understand
+        return False
+    parts = {
+        part
+        for _, fields in found.values()
+        for _, (_, described) in fields
+        for part in _names(described)
+        if part != name
+    }
+    if all(_defined(types, part) for part in sorted(parts)):
+        types.register(found)
+        return True
+    return False
+
+
+def _names(described: Any) -> list[str]:
+    """The types that a field is made of, as the library describes fields."""
+    if isinstance(described, str):
+        return [described] if "/" in described else []
+    return [name for part in described for name in _names(part)] if isinstance(described, tuple) else []
