@@ -1,7 +1,7 @@
 """Runs the trusted check cells of one submission, inside the grading sandbox.
 
-Reads a `Job` as JSON from standard input. Writes to standard output a line of JSON for each check once it is decided, its
-`CheckResult`, and, where the messages are wanted, a line for each of them. When it is stuck, its stacks come last.
+Reads a `Job` as JSON from standard input. Writes to standard output a line of JSON for each check once it is decided,
+the `CheckResult`, and, where the messages are wanted, a line for each of them. When it is stuck, its stacks come last.
 The student's programs are text until the node sandbox starts them; nothing of theirs is imported here.
 """
 
