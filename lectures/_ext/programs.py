@@ -18,7 +18,7 @@ from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
 
 _LIB = Path(__file__).resolve().parent.parent / "_lib"
-LANGUAGES = {"py": "python3", "yaml": "yaml", "json": "json"}
+LANGUAGES = {"py": "python3", "yaml": "yaml", "json": "json", "xml": "xml", "cfg": "ini"}
 
 
 def programs_of(page: Path) -> dict[str, str]:

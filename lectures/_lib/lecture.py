@@ -1,4 +1,4 @@
-"""What a lecture's cells share: the programs of another page, so that a talk runs what the book shows."""
+"""What a lecture's cells share: the programs of another page, and cells that need a compiler."""
 
 from __future__ import annotations
 
@@ -30,3 +30,25 @@ def write_programs(page: str) -> None:
         magic, argument = ("node", name.removesuffix(".py")) if name.endswith(".py") else ("file", name)
         with contextlib.redirect_stdout(io.StringIO()):
             get_ipython().run_cell_magic(magic, argument, text)
+
+
+def skip_without_compiler(word: str) -> None:
+    """Where nothing can compile interfaces, let each cell with a word in it say so in a sentence, and do nothing else.
+
+    Args:
+        word: the name of the package that is compiled.
+    """
+    from IPython import get_ipython
+
+    from autograder.packages.workspace import INSTALL, missing_tools
+
+    lacking = missing_tools()
+    if not lacking:
+        return
+    sentence = f"Not run here: building `{word}` needs {', '.join(lacking)}, which this machine lacks. {INSTALL}"
+
+    def spoken(lines: list[str]) -> list[str]:
+        writes_a_file = lines and lines[0].startswith("%%")
+        return lines if writes_a_file or word not in "".join(lines) else [f"print({sentence!r})\n"]
+
+    get_ipython().input_transformers_cleanup.append(spoken)
