@@ -55,7 +55,7 @@ def held(sources: list[str], folder: Path) -> dict[str, bool]:
     notebook = nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell(source) for source in sources])
     path = os.pathsep.join([str(LECTURES / "_lib"), os.environ.get("PYTHONPATH", "")])
     client = NotebookClient(
-        notebook, timeout=120, allow_errors=True, kernel_name="python3", resources={"metadata": {"path": str(folder)}}
+        notebook, timeout=300, allow_errors=True, kernel_name="python3", resources={"metadata": {"path": str(folder)}}
     )
     client.execute(env={**os.environ, "PYTHONPATH": path, "LECTURES": str(LECTURES)})
     said: list[Any] = [output.get("text", "") for output in notebook.cells[-1].outputs]

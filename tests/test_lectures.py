@@ -68,7 +68,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
         command = [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", "-b", builder, "-c", ROOT / "lectures"]
         command += ["-d", f"{folder}/doctrees-{output}", "-D", f"nb_execution_cache_path={folder}/cache"]
         command += [ROOT / "lectures" / source, f"{folder}/{output}"]
-        done = subprocess.run(command, capture_output=True, text=True, timeout=600)
+        done = subprocess.run(command, capture_output=True, text=True, timeout=1800)
         assert done.returncode == 0, done.stderr.partition("Versions\n")[0]
     return folder
 

@@ -9,6 +9,7 @@ import drawings_bringup
 import drawings_lifecycle
 import drawings_nodes
 import drawings_qos
+import drawings_packages
 from docutils import nodes
 from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
@@ -100,12 +101,11 @@ DRAWINGS: dict[str, Callable[[], Picture]] = {
     "executor-loop": executor_loop,
     "groups-and-threads": groups_and_threads,
     "waiting-for-itself": waiting_for_itself,
-    "robot-layers": drawings_bringup.robot_layers,
-    "two-helpers": drawings_bringup.two_helpers,
-    "middleware": drawings_bringup.middleware,
     **drawings_lifecycle.DRAWINGS,
     **drawings_nodes.DRAWINGS,
     **drawings_qos.DRAWINGS,
+    **drawings_packages.DRAWINGS,
+    **drawings_bringup.DRAWINGS,
 }
 
 

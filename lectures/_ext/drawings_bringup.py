@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from autograder.core.picture import Picture
 from autograder.pictures.svg import Canvas
 
@@ -85,3 +87,10 @@ def middleware() -> Picture:
         "shared memory within one machine. First each says to all who listen: I am here. Then they tell each other "
         "what they publish and subscribe to. Then the pictures come."
     )
+
+
+DRAWINGS: dict[str, Callable[[], Picture]] = {
+    "robot-layers": robot_layers,
+    "two-helpers": two_helpers,
+    "middleware": middleware,
+}
