@@ -8,8 +8,8 @@ from typing import Any
 import drawings_bringup
 import drawings_lifecycle
 import drawings_nodes
-import drawings_qos
 import drawings_packages
+import drawings_qos
 from docutils import nodes
 from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
