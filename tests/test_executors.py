@@ -75,7 +75,7 @@ def test_another_executor_finds_what_the_kits_own_finds(
 
 def test_an_executor_that_there_is_not_is_refused(lab: Lab, tmp_path: Path) -> None:
     (tmp_path / "course" / "course.toml").write_text('executor = "dusk"\n')
-    with pytest.raises(KitError, match="'dusk', which there is not"):
+    with pytest.raises(KitError, match="There is no executor 'dusk'"):
         run_class({}, tmp_path / "course", lab, SETTINGS, lambda _: None)
 
 

@@ -36,6 +36,9 @@ def grade(
     jobs: Annotated[int, typer.Option(min=0, help="How many run at once; 0 lets the machine decide.")] = 0,
     seed: SeedOption = None,
     as_json: JsonOption = False,
+    scheduler: Annotated[
+        str, typer.Option(metavar="ADDRESS", help="Send the jobs to the Dask cluster of this scheduler, tcp://…")
+    ] = "",
     diff: Annotated[
         bool, typer.Option("--diff", help="Only show what would change, such as after a change of a check.")
     ] = False,
@@ -66,7 +69,7 @@ def grade(
     from autograder.gradebook.class_run import grade_class, try_class
     from autograder.sandbox.isolation import choose
 
-    settings = Settings(choose(isolation), seed, force, jobs)
+    settings = Settings(choose(isolation), seed, force, jobs, executor=f"dask://{scheduler}" if scheduler else "")
     if diff:
         from autograder.gradebook.differences import difference_view
         from autograder.report.terminal import console

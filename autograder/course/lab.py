@@ -32,7 +32,7 @@ _HEADING = re.compile(r"^#{1,6}\s+(.*?)\s*#*\s*$", re.MULTILINE)
 
 
 @cache
-def _kit_digest() -> str:
+def kit_digest() -> str:
     """SHA-256 over the kit's own source: its version stays the same between two releases, its checks do not."""
     package = Path(__file__).resolve().parent.parent
     files = sorted(path for path in package.rglob("*") if path.suffix in (".py", ".html", ".xml"))
@@ -106,7 +106,7 @@ class Lab:
     def digest(self) -> str:
         """SHA-256 over everything that can change a result: the trusted cells, the files they use, and the kit."""
         parts = [
-            _kit_digest(),
+            kit_digest(),
             [cell.model_dump(exclude={"title"}) for cell in self.cells],
             sorted(self.given.items()),
             [[answer.grade_id, answer.blank] for answer in self.answers.values()],

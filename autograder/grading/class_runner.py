@@ -45,7 +45,7 @@ def run_class(
         KitError: the course's executor cannot be used.
         KeyboardInterrupt: after every run has been stopped; finished results are kept.
     """
-    executor = executors.chosen(read_settings(root).executor, settings.at_once)
+    executor = executors.chosen(settings.executor or read_settings(root).executor, settings.at_once)
     kept, apart = ResultStore(root), ResultStore(root, tried=True)
     store = apart if tried else kept
     results: dict[str, SubmissionResult] = {}

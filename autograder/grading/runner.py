@@ -35,6 +35,8 @@ class Settings:
     """Run again even what did not change."""
     jobs: int = 0
     """How many run at once; 0 lets the machine decide."""
+    executor: str = ""
+    """Who runs them, as the course's setting of that name; empty: what that says."""
 
     @property
     def at_once(self) -> int:

@@ -1,0 +1,119 @@
+"""Runs jobs on an existing Dask cluster: a scheduler, and workers on machines that have this very kit."""
+
+from __future__ import annotations
+
+import hashlib
+import logging
+from collections.abc import Callable, Generator, Sequence
+from typing import Any
+
+from autograder.core.errors import KitError
+from autograder.core.results import SubmissionResult
+from autograder.course.lab import kit_digest
+from autograder.grading.job import Job
+from autograder.grading.supervisor import run_in_worker, unknown
+
+_SECONDS_TO_ANSWER = 10.0
+"""Seconds in which a scheduler has to answer, and as many in which it has to have a worker."""
+
+
+class OtherKit(Exception):
+    """A worker has another kit than the one that grades: its verdicts may be others."""
+
+
+class Dask:
+    """Sends each job to whichever worker is free. Of a worker that dies, another one takes the jobs over.
+
+    How many run at once is the cluster's business: as many as its workers have threads.
+
+    Args:
+        address: of the scheduler, such as `tcp://grading:8786`.
+    """
+
+    def __init__(self, address: str) -> None:
+        """Nothing is connected yet."""
+        self._address = address
+
+    def run(self, jobs: Sequence[Job], started: Callable[[str], None]) -> Generator[SubmissionResult, None, None]:
+        """Run jobs, as `Executor.run` says; a cluster does not tell when one begins."""
+        if not jobs:
+            return
+        client = self._client()
+        try:
+            from distributed import as_completed
+
+            kit = kit_digest()
+            texts = {job.student: job.model_dump_json() for job in jobs}
+            futures = {
+                client.submit(run_there, text, hashlib.sha256(text.encode()).hexdigest(), kit, pure=False): student
+                for student, text in texts.items()
+            }
+            by_student = {job.student: job for job in jobs}
+            for future in as_completed(futures, loop=client.loop):
+                yield self._result_of(future, by_student[futures[future]])
+        finally:
+            client.close()  # which takes back what has not begun
+
+    def _client(self) -> Any:
+        try:
+            from distributed import Client
+        except ImportError as error:
+            raise KitError("Sending jobs to Dask needs the package distributed.", "pip install distributed") from error
+        for name in ("distributed", "distributed.client", "distributed.core"):
+            logging.getLogger(name).setLevel(logging.CRITICAL)  # what it says is said here, as sentences
+        try:
+            client = Client(self._address, timeout=_SECONDS_TO_ANSWER, set_as_default=False)
+        except (OSError, ValueError) as error:
+            raise KitError(
+                f"No Dask scheduler answers at {self._address}.", "Start one: dask scheduler; dask worker ADDRESS"
+            ) from error
+        try:
+            client.wait_for_workers(1, timeout=_SECONDS_TO_ANSWER)
+            kits = client.run(kit_digest, on_error="return")
+        except (OSError, TimeoutError) as error:
+            client.close()
+            raise KitError(
+                f"The Dask scheduler at {self._address} has no worker.", "Start: dask worker ADDRESS"
+            ) from error
+        other = [worker for worker, kit in kits.items() if kit != kit_digest()]
+        if other:
+            client.close()
+            raise KitError(
+                f"{len(other)} of {len(kits)} workers have no kit, or another one than this: {', '.join(other[:3])}.",
+                "Install the same version of the kit there, and start them again.",
+            )
+        return client
+
+    def _result_of(self, future: Any, job: Job) -> SubmissionResult:
+        from distributed import CancelledError
+
+        try:
+            return SubmissionResult.model_validate_json(future.result())
+        except KitError:
+            raise
+        except CancelledError as error:
+            raise KitError(
+                f"The Dask scheduler at {self._address} is gone.", "Start it, and run again: what is finished is kept."
+            ) from error
+        except OtherKit as error:
+            raise KitError(str(error), "Install the same version of the kit there, and start it again.") from error
+        except Exception as error:  # whatever became of that run, the class goes on
+            return unknown(job, f"The grading process failed: {type(error).__name__}.", str(error))
+
+
+def run_there(text: str, digest: str, kit: str) -> str:
+    """Run one job on a worker of the cluster, and return its result as JSON.
+
+    Args:
+        text: the job as JSON: the submission, and the lab's cells.
+        digest: of that text, which must have arrived as it was sent.
+        kit: the digest of the kit that the verdicts have to come from.
+
+    Raises:
+        OtherKit: this machine has another one, or got another job.
+    """
+    from distributed import get_worker
+
+    if hashlib.sha256(text.encode()).hexdigest() != digest or kit_digest() != kit:
+        raise OtherKit(f"The Dask worker at {get_worker().address} has another kit than this, or got another job.")
+    return run_in_worker(Job.model_validate_json(text)).model_dump_json()
