@@ -216,6 +216,8 @@ def test_a_class_is_graded_once_and_only_what_changed_again(root: Path) -> None:
     assert run(root, "export", "csv")[1].count("\n") == 13
     status, out, _ = run(root, "export", "junit", "-o", str(root / "build" / "all.xml"))
     assert JUnitXml.fromfile(str(root / "build" / "all.xml")).tests == 13
+    status, out, _ = run(root, "similar", "toy")
+    assert status == 0 and "4 submissions were compared" in out
     zipped = root / "build" / "gradescope.zip"
     assert run(root, "export", "gradescope", "-o", str(zipped))[0] == 0
     assert len(zipfile.ZipFile(zipped).namelist()) == 4

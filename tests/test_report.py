@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime
 import io
 import json
 import re
@@ -12,13 +13,15 @@ import pytest
 from junitparser import JUnitXml
 from rich.console import Console
 
+from autograder.core.grades import CellGrade, Grade
 from autograder.core.results import CheckResult, Isolation, NodeLog, Outcome, Part, Status, SubmissionResult
 from autograder.report.audience import Audience, result_for
 from autograder.report.export.csv_table import to_csv
 from autograder.report.export.entry import Entry
 from autograder.report.export.gradescope import results_json
 from autograder.report.export.junit import junit_xml
-from autograder.report.html import check_html, submission_html
+from autograder.report.feedback_page import Heading, Task, feedback_html
+from autograder.report.html import check_html
 from autograder.report.reading import hints
 from autograder.report.terminal import check_text, check_view, class_view, submission_view, undecided_view
 
@@ -75,7 +78,6 @@ class Page(HTMLParser):
 def test_every_view_masks_hidden_checks_for_students_only(audience: Audience) -> None:
     shown = result(check(0, HIDDEN))
     views = [
-        submission_html(shown, audience),
         check_html(shown.checks[0], audience),
         junit_xml([shown], audience),
         text_of(submission_view(shown, audience)),
@@ -89,11 +91,20 @@ def test_every_view_masks_hidden_checks_for_students_only(audience: Audience) ->
 
 
 def test_html_lets_nothing_of_a_students_act() -> None:
-    page = Page(submission_html(result(check(0, FAILED))))
+    cells = (CellGrade("check", 0.0, 3.0, True, False), CellGrade("why", 1.0, 2.0, False, True, NASTY))
+    heading, task = Heading("lab", NASTY, NASTY, NASTY), Task(NASTY, ["check", "why"], {"why": NASTY, "talker": NASTY})
+    text = feedback_html(
+        heading, [task], result(check(0, FAILED, HIDDEN)), Grade(NASTY, "lab", cells, 0.0), datetime.date(2026, 11, 22)
+    )
+    assert "secret" not in text
+    page = Page(text)
     known = {"html", "head", "meta", "title", "body", "h1", "p", "b", "div", "span", "br", "code", "details", "summary"}
-    assert {tag for tag, _ in page.tags} <= known | {"pre"}
+    known |= {"pre", "style", "main", "section", "h2", "ol", "li", "a", "table", "thead", "tbody", "tr", "th", "td"}
+    assert {tag for tag, _ in page.tags} <= known
+    assert all(str(attributes.get("href", "#")).startswith("#") for _, attributes in page.tags)
     assert {name for _, attributes in page.tags for name in attributes} <= {
-        "lang", "charset", "http-equiv", "content", "style", "role", "aria-label"
+        "lang", "charset", "http-equiv", "content", "style", "role", "aria-label", "aria-labelledby", "name", "class",
+        "id", "href", "scope",
     }  # fmt: skip
     assert "onerror=alert(1)" in page.text and "last line" in page.text
 

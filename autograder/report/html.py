@@ -14,9 +14,9 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
 from autograder.core.output import last_lines
-from autograder.core.results import CellResult, Status, SubmissionResult
+from autograder.core.results import CellResult, Status
 from autograder.report import words
-from autograder.report.audience import Audience, check_for, result_for
+from autograder.report.audience import Audience, check_for
 from autograder.report.reading import hints
 from autograder.report.words import Verdict
 
@@ -130,10 +130,3 @@ def _each_picture_once(check: CellResult) -> CellResult:
             seen.add(outcome.picture.svg)
         outcomes.append(outcome)
     return check.model_copy(update={"outcomes": outcomes})
-
-
-def submission_html(result: SubmissionResult, audience: Audience = "student") -> str:
-    """Return a submission's whole report as one HTML page that needs no other file."""
-    shown = result_for(result, audience)
-    fragments = [Markup(check_html(check, audience, title=check.title)) for check in shown.checks]
-    return render("submission.html", result=shown, fragments=fragments)

@@ -46,21 +46,22 @@ def points(number: float) -> str:
 
 
 def scores(entries: Sequence[Entry], left_out: list[str]) -> list[tuple[Entry, str, str]]:
-    """Return each entry with its score and maximum; an undecided score is empty, and the platform's stays as it is.
+    """Return each entry that has a score, with it and its maximum.
+
+    An undecided submission has no row: an empty cell would take away the score that the platform has.
 
     Args:
         entries: of one lab.
-        left_out: gets a sentence about each that has no grade.
+        left_out: gets a sentence about each that has no score.
     """
     found = []
     for entry in entries:
         if entry.grade is None:
             left_out.append(f"{entry.student} is not in the gradebook: run autograder grade {entry.lab} once more.")
-            continue
-        if entry.grade.score is None:
+        elif entry.grade.score is None:
             left_out.append(f"{entry.student} has no score yet: a check waits for your verdict in formgrader.")
-        score = "" if entry.grade.score is None else points(entry.grade.score)
-        found.append((entry, score, points(entry.grade.max_score)))
+        else:
+            found.append((entry, points(entry.grade.score), points(entry.grade.max_score)))
     return found
 
 

@@ -1,0 +1,218 @@
+"""A class without a platform: a folder or a zip with a folder, or a zip, for each student."""
+
+from __future__ import annotations
+
+import contextlib
+import stat
+import zipfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path, PurePosixPath
+
+from autograder.core.errors import KitError
+from autograder.core.files import read_plain
+from autograder.intake.members import member_name, members
+from autograder.submission import timestamp
+from autograder.submission.notebook_file import NOTEBOOK_BYTES
+
+_PACKERS_PREFIXES = (".", "__MACOSX")
+"""What the name of a folder begins with that a system or a packer made."""
+_MOST_ENTRIES = 20_000
+"""More entries than this in a zip are no class."""
+_NAMED = 5
+"""Of more bad names than this only their number is said."""
+
+
+class _NotUnderstood(Exception):
+    """Something was handed in, and not in a way that says which notebook counts. Nobody gets a zero for that."""
+
+
+@dataclass
+class HandedIn:
+    """What lies in a student's folder."""
+
+    notebook: bytes = b""
+    """Empty: there is none that can be used."""
+    timestamp: bytes = b""
+    """Empty: nothing says when it was handed in."""
+    file: str = ""
+    owner: Mapping[str, str] = field(default_factory=dict)
+    late: bool = False
+    """These three as in `Taken`."""
+
+
+def plain_class(source: Path, lab: str, refused: list[str]) -> dict[str, HandedIn]:
+    """Return what lies in each student's folder, by its name.
+
+    Args:
+        source: a folder or a zip.
+        lab: whose notebooks are wanted.
+        refused: gets a sentence about each thing that is left out.
+
+    Raises:
+        KitError: it is neither, or no class.
+    """
+    return (_from_folder if source.is_dir() else _from_zip)(source, lab, refused)
+
+
+def _from_folder(source: Path, lab: str, refused: list[str]) -> dict[str, HandedIn]:
+    found: dict[str, HandedIn] = {}
+    for entry in sorted(source.iterdir()):
+        if entry.name.startswith(_PACKERS_PREFIXES):
+            continue
+        if entry.is_symlink():
+            refused.append(f"{_shown(entry)} is a link; links are not followed, so it was left out.")
+        elif entry.is_file() and entry.suffix.lower() == ".zip":
+            try:
+                found[entry.stem] = HandedIn(_notebook_in_zip(entry, lab))
+            except _NotUnderstood as reason:
+                refused.append(f"{_shown(entry)} {reason}; it was left out.")
+        elif entry.is_dir():
+            try:
+                found[entry.name] = HandedIn(_notebook_in(source, entry.name, lab), _stamp_in(source, entry.name, lab))
+            except OSError as error:  # such as a folder that may not be entered: the class goes on
+                refused.append(f"{_shown(entry)} cannot be read ({error.strerror}); it was left out.")
+            except _NotUnderstood as reason:
+                refused.append(f"{_shown(entry)} {reason}; it was left out.")
+    return found
+
+
+def _shown(path: Path) -> str:
+    return str(path).encode("utf-8", "replace").decode()
+
+
+def _notebook_in(source: Path, student: str, lab: str) -> bytes:
+    """Return a student's notebook; empty if there is nothing at all.
+
+    Raises:
+        OSError: the folder or the notebook may not be read, or a part of the way is a link or something else.
+        _NotUnderstood: nothing says which notebook counts.
+    """
+    folder = source / student
+    inner = folder / lab
+    paths: list[tuple[str, ...]] = [(path.name,) for path in sorted(folder.iterdir()) if path != inner]
+    if inner.is_symlink() or (inner.exists() and not inner.is_dir()):
+        paths.append((lab, f"{lab}.ipynb"))  # reading it says what is in the way
+    elif inner.is_dir():
+        paths += [(lab, path.name) for path in sorted(inner.iterdir())]
+    chosen = _choose(paths, lab)
+    return read_plain(source, [student, *chosen], NOTEBOOK_BYTES + 1) if chosen else b""
+
+
+def _notebook_in_zip(path: Path, lab: str) -> bytes:
+    """Return the notebook in one student's zip.
+
+    Raises:
+        _NotUnderstood: the zip cannot be read, or nothing says which notebook counts.
+    """
+    try:
+        files = {member.path: member for member in members(path)}
+        while files and len({parts[0] for parts in files}) == 1 and all(len(parts) > 1 for parts in files):
+            if next(iter(files))[0] == lab:
+                break
+            files = {parts[1:]: member for parts, member in files.items()}
+        chosen = _choose([parts for parts in files if len(parts) == 1 or parts[:-1] == (lab,)], lab)
+        return files[chosen].read(NOTEBOOK_BYTES + 1) if chosen else b""
+    except _NotUnderstood:
+        raise
+    except Exception as error:  # a damaged zip raises many kinds
+        raise _NotUnderstood(f"cannot be read ({error})") from error
+
+
+def _choose(paths: Sequence[tuple[str, ...]], lab: str) -> tuple[str, ...]:
+    """Which of a student's files is the notebook: by its name, or the only one, for downloads get renamed.
+
+    Raises:
+        _NotUnderstood: there are several, or only other files.
+    """
+    for exact in ((f"{lab}.ipynb",), (lab, f"{lab}.ipynb")):
+        if exact in paths:
+            return exact
+    notebooks = [path for path in paths if path[-1].casefold().endswith(".ipynb")]
+    notebooks = [path for path in notebooks if len(path) == 1] or notebooks
+    named = [path for path in notebooks if path[-1].casefold() == f"{lab}.ipynb".casefold()]
+    if len(named) == 1 or len(notebooks) == 1:
+        return (named or notebooks)[0]
+    if notebooks:
+        raise _NotUnderstood(f"holds {len(notebooks)} notebooks, of which none is called {lab}.ipynb")
+    strange = [path[-1] for path in paths if path[-1] != timestamp.FILE_NAME and not path[-1].startswith(".")]
+    if strange:
+        raise _NotUnderstood(f"holds {strange[0][:80]!r} and no notebook")
+    return ()
+
+
+def _stamp_in(source: Path, student: str, lab: str) -> bytes:
+    for folders in ([], [lab]):
+        with contextlib.suppress(OSError):
+            return read_plain(source, [student, *folders, timestamp.FILE_NAME], timestamp.MOST_BYTES)
+    return b""
+
+
+def _open_zip(source: Path, lab: str) -> zipfile.ZipFile:
+    try:
+        return zipfile.ZipFile(source)
+    except Exception as error:  # a damaged directory raises more than BadZipFile
+        raise KitError(
+            f"{source} is neither a folder nor a zip that can be read ({error}).",
+            f"Give a folder that holds `<student>/{lab}.ipynb` for each student, or a whole zip of it.",
+        ) from error
+
+
+def _from_zip(source: Path, lab: str, refused: list[str]) -> dict[str, HandedIn]:
+    found: dict[str, HandedIn] = {}
+    students: dict[str, dict[tuple[str, ...], zipfile.ZipInfo]] = {}
+    with _open_zip(source, lab) as archive:
+        members = archive.infolist()
+        if len(members) > _MOST_ENTRIES:
+            raise KitError(f"{source} has {len(members)} entries; that is no class.", "Check the file.")
+        paths = _paths(members, refused)
+        depth = _depth([parts for parts, _ in paths], lab)
+        for parts, member in paths:
+            inside = parts[depth:]
+            if len(inside) < 2:
+                continue
+            students.setdefault(inside[0], {})[inside[1:]] = member
+        for student, files in students.items():
+            try:
+                chosen = _choose([rest for rest in files if len(rest) == 1 or rest[:-1] == (lab,)], lab)
+                stamp = files.get((timestamp.FILE_NAME,)) or files.get((lab, timestamp.FILE_NAME))
+                found[student] = HandedIn(
+                    _member(archive, files[chosen]) if chosen else b"",
+                    _member(archive, stamp)[: timestamp.MOST_BYTES] if stamp else b"",
+                )
+            except _NotUnderstood as reason:
+                refused.append(f"{student[:80]!r} {reason}; it was left out.")
+    return found
+
+
+def _paths(members: Sequence[zipfile.ZipInfo], refused: list[str]) -> list[tuple[tuple[str, ...], zipfile.ZipInfo]]:
+    """The files in a zip by their paths; what a packer adds is left out, and names that no file may have are said."""
+    paths = []
+    bad = []
+    for member in members:
+        path = PurePosixPath(member_name(member).replace("\\", "/"))
+        if not path.parts or path.is_absolute() or ".." in path.parts or "\0" in member.orig_filename:
+            bad.append(repr(member.orig_filename[:60]))
+        elif not member.is_dir() and not any(part.startswith(_PACKERS_PREFIXES) for part in path.parts):
+            paths.append((path.parts, member))
+    if bad:
+        names = ", ".join(bad[:_NAMED]) + (f" and {len(bad) - _NAMED} more" if len(bad) > _NAMED else "")
+        refused.append(f"The zip has entries whose names lead nowhere in it; they were left out: {names}.")
+    return paths
+
+
+def _depth(paths: list[tuple[str, ...]], lab: str) -> int:
+    """How many folders to skip: 1 if everything lies in one folder that holds the students' folders."""
+    one_top = len({path[0] for path in paths}) == 1
+    is_student = any(path[1:] == (f"{lab}.ipynb",) or path[1:2] == (lab,) for path in paths)
+    return 1 if one_top and not is_student and any(len(path) >= 3 for path in paths) else 0
+
+
+def _member(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> bytes:
+    try:
+        if stat.S_IFMT(member.external_attr >> 16) not in (0, stat.S_IFREG):
+            raise OSError("it is a link or something else that is no file")
+        with archive.open(member) as file:
+            return file.read(NOTEBOOK_BYTES + 1)
+    except Exception as error:  # each way of packing fails in its own way (zlib.error, LZMAError); the class goes on
+        raise _NotUnderstood(f"holds {member.filename[:200]!r}, which cannot be read ({error})") from error
