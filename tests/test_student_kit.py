@@ -12,6 +12,8 @@ import shutil
 import subprocess
 import sys
 import time
+import urllib.error
+import urllib.request
 import zipfile
 from pathlib import Path
 
@@ -116,8 +118,42 @@ def test_a_lab_that_would_tell_its_solution_is_not_given_out(course: Path, tmp_p
     assert not list((tmp_path / "out").rglob("*.ipynb"))
 
 
+def the_book_is_served(kit: Path, tmp_path: Path) -> None:
+    """To who is logged in, with nothing else of the kit below its address."""
+    log = tmp_path / "jupyter.log"
+    options = ["--no-browser", "--ServerApp.port=0", "--ServerApp.ip=127.0.0.1", "--IdentityProvider.token=lab"]
+    options += ["--allow-root"] if os.getuid() == 0 else []
+    environment = ENVIRON | {"HOME": str(tmp_path), "JUPYTER_RUNTIME_DIR": str(tmp_path / "runtime")}
+    with log.open("w") as file:
+        server = subprocess.Popen(
+            [kit / ".venv" / "bin" / "autograder", "jupyter", *options],
+            cwd=kit, env=environment, stdout=file, stderr=file,
+        )  # fmt: skip
+    try:
+        deadline = time.monotonic() + 120
+        while not list(tmp_path.glob("runtime/jpserver-*.json")) and time.monotonic() < deadline:
+            assert server.poll() is None, log.read_text()
+            time.sleep(0.1)
+        address = json.loads(next(tmp_path.glob("runtime/jpserver-*.json")).read_text())["url"]
+        with urllib.request.urlopen(f"{address}lectures/index.html?token=lab", timeout=60) as answer:
+            assert answer.read() == b"<h1>Lectures</h1>"
+            assert "sandbox" not in answer.headers["Content-Security-Policy"]
+        for path in ("lectures/index.html", "lectures/..%2Fkit/course.toml?token=lab"):
+            try:
+                with urllib.request.urlopen(address + path, timeout=60) as answer:
+                    assert "login" in answer.url
+            except urllib.error.HTTPError as error:
+                assert error.code in (403, 404)
+    finally:
+        server.terminate()
+        server.wait(timeout=60)
+
+
 def test_from_an_unpacked_zip_to_a_verdict(course: Path, tmp_path: Path) -> None:
-    with zipfile.ZipFile(write_kit(course, None, tmp_path)) as archive:
+    book = tmp_path / "book"
+    book.mkdir()
+    (book / "index.html").write_text("<h1>Lectures</h1>", encoding="utf-8")
+    with zipfile.ZipFile(write_kit(course, book, tmp_path)) as archive:
         archive.extractall(tmp_path / "für Übungen")
     kit = tmp_path / "für Übungen" / NAME
     write_lock(kit, "requirements.lock", "uv")
@@ -154,6 +190,7 @@ def test_from_an_unpacked_zip_to_a_verdict(course: Path, tmp_path: Path) -> None
         and "of 5 points, up to 3 more decided at" in receipt
     )
 
+    the_book_is_served(kit, tmp_path)
     refused = subprocess.run(
         [kit / ".venv" / "bin" / "autograder", "grade", "toy"], cwd=kit, env=ENVIRON, capture_output=True, text=True
     )
@@ -193,7 +230,7 @@ def test_submit_says_what_is_unsaved_outdated_ignored_or_empty_and_intake_takes_
     os.utime(notebook, (0, time.time() - 60))
     told = submit()
     assert "with a text that is not in the saved notebook. Save the notebook" in told
-    assert "The cell `%%file answers.yaml` is still as you received it." in told
+    assert "The cells `%%file answers.yaml`, `why` are still as you received them." in told
     assert "A cell above was run again after the check of “The talker”" in told
     assert "`%%node talker`" in told and "ignore" in told
     os.utime(notebook, (0, time.time() + 60))

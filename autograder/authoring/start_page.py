@@ -27,19 +27,27 @@ _BOTTOM = """
 - After a restart of the kernel run the first code cell again, and then the cells of your programs.
 - Your programs lie in the folder `nodes` of the lab, below the name of the notebook. What you write in cells is what is
   graded; a file that you put into that folder yourself stays yours, but is not handed in.
-- Hand in the notebook, the file with the ending `.ipynb`, once you have saved it.
+- `%lab` at a lab's end shows what is done and what is open.
+- Hand in the notebook, the file with the ending `.ipynb`, once you have saved it. In a terminal `autograder submit
+  NOTEBOOK` puts a copy with a receipt into the folder `handed_in`, and says what to know before.
 """
 
 
 def start_page(labs: Path) -> str:
-    """Return the page for the labs in a folder, by the first heading of each and the line below it."""
+    """Return the page for the labs in a folder, by the first heading of each and the sentence below it."""
     rows = []
     for path in [labs / name / f"{name}.ipynb" for name in lab_names(labs.parent)]:
         if not path.is_file():
             continue
         first = source_of(json.loads(path.read_text(encoding="utf-8"))["cells"][0])
         heading = re.search(r"^#\s+(.+?)\s*$", first, re.MULTILINE)
-        below = first[heading.end() :].strip().split("\n")[0] if heading else ""
+        below = _sentence(first[heading.end() :]) if heading else ""
         title = heading[1] if heading else path.stem
         rows.append(f"| [{title}]({path.stem}/{path.name}) | {below} |\n")
     return _TOP.format(title=read_settings(labs.parent).title) + "".join(rows) + _BOTTOM
+
+
+def _sentence(text: str) -> str:
+    """The first sentence of a paragraph, in one line."""
+    paragraph = " ".join(text.strip().split("\n\n")[0].split())
+    return re.split(r"(?<=\.)\s", paragraph, maxsplit=1)[0]

@@ -80,11 +80,15 @@ def shown_score(score: Score, **_: object) -> dict[str, str]:
 
 
 def _book() -> str:
-    """Link from the notebook to the lectures of a student's kit; elsewhere empty: no server would show them."""
+    """Link to the lectures of a student's kit: below the server's address, in VS Code a path; elsewhere empty."""
+    lectures = book_of_kit()
     here = front_end.active
     notebook = here.folder.notebook if isinstance(here, Kernel) else None
-    lectures = book_of_kit()
-    return "" if notebook is None or lectures is None else os.path.relpath(lectures, notebook.parent)
+    if lectures is None or notebook is None:
+        return ""
+    if "JPY_SESSION_NAME" not in os.environ:
+        return os.path.relpath(lectures, notebook.parent)
+    return os.environ.get("JUPYTERHUB_SERVICE_PREFIX", "/") + "lectures"
 
 
 def _writer(kernel: Kernel, magic: str, text: str) -> Any:

@@ -48,20 +48,32 @@ def look_over(notebook: Path, lab: Lab, packed: Path) -> HandIn:
     except UnreadableError:
         return found
     saved_at = notebook.stat().st_mtime
+    untouched: list[str] = []
     runs = read_runs(notebook.parent / NODES / notebook.stem)
     for answer in lab.answers.values():
         cell = cells.get(answer.grade_id)
         if cell is not None:
-            _look_at_answer(answer, cell, runs, saved_at, found)
+            _look_at_answer(answer, cell, runs, saved_at, found, untouched)
+    if untouched:
+        one = len(untouched) == 1
+        cells_are = f"cell {untouched[0]} is" if one else f"cells {', '.join(untouched)} are"
+        found.empty.append(f"The {cells_are} still as you received {'it' if one else 'them'}.")
     found.outdated += _older_checks(lab, cells)
     return found
 
 
-def _look_at_answer(answer: Answer, cell: dict[str, Any], runs: dict[str, Ran], saved_at: float, found: HandIn) -> None:
+def _look_at_answer(
+    answer: Answer,
+    cell: dict[str, Any],
+    runs: dict[str, Ran],
+    saved_at: float,
+    found: HandIn,
+    untouched: list[str],
+) -> None:
     source = source_of(cell)
     name = f"`%%{answer.file.magic} {answer.file.name}`" if answer.file else f"`{answer.grade_id}`"
     if cell_digest(source) in (blank_mark(answer.blank)["blank"], cell_digest("")):
-        found.empty.append(f"The cell {name} is still as you received it.")
+        untouched.append(name)
     elif answer.file is None:
         return
     elif (ran := runs.get(answer.file.file_name)) is None:
