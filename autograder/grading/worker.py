@@ -58,9 +58,9 @@ def run_job(job: Job, folder: Path, stacks: TextIO = sys.stderr) -> Iterator[Che
     namespace: dict[str, Any] = {"__name__": "check_cells"}
     logs_kept = LOGS_KEPT // max(1, len(job.checks))
     broken_set_up = ""
-    limit = CELL_SECONDS + job.build_seconds
     try:
         for number, cell in enumerate(job.cells):
+            limit = CELL_SECONDS + job.build_seconds
             started = time.monotonic()
             findings.current.reset()
             runtime.current.vary_for(f"{job.seed} {cell.grade_id}")

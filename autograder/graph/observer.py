@@ -89,6 +89,7 @@ class Observer:
         self._room = RECORDED
         self.meanwhile: Callable[[], None] | None = None
         """Called now and then in the thread of whoever waits."""
+        self._closing = False
         self._thread = threading.Thread(target=self._spin, name="observer", daemon=True)
         self._thread.start()
 
@@ -103,11 +104,18 @@ class Observer:
         raise KitError("The observer does not find itself in the ROS graph.", "Run the command again.")
 
     def _spin(self) -> None:
-        with contextlib.suppress(ExternalShutdownException):
+        try:
             self._executor.spin()
+        except ExternalShutdownException:
+            pass
+        except Exception:
+            # An executor that is shut down as it begins to wait finds what it waits on gone.
+            if not self._closing:
+                raise
 
     def close(self) -> None:
         """Leave the domain. The thread is joined: a daemon thread that still spins at exit aborts the process."""
+        self._closing = True
         self._executor.shutdown(timeout_sec=2.0)
         rclpy.try_shutdown(context=self._context)
         self._thread.join(timeout=5.0)
