@@ -20,6 +20,8 @@ from nbgrader.converters import Autograde  # noqa: E402
 from nbgrader.preprocessors import Execute, SaveAutoGrades  # noqa: E402
 from nbgrader.validator import Validator  # noqa: E402
 
+from autograder.gradebook import private_nbgrader  # noqa: E402
+
 GRADEBOOK = Path(__file__).resolve().parent.parent / "autograder" / "gradebook"
 OTHERS = [path for path in sorted(GRADEBOOK.glob("*.py")) if not path.name.startswith("private_")]
 
@@ -46,6 +48,12 @@ def test_a_name_that_the_kit_relies_on_is_as_it_was(
     if arguments is not None:
         found = list(inspect.signature(inspect.unwrap(getattr(owner, name))).parameters)
         assert found == arguments, f"{said} Its arguments are {found}, and were {arguments}."
+
+
+def test_nbgrader_asks_for_the_version_of_its_tables_where_the_kit_answers() -> None:
+    assert "alembic_version = get_alembic_version()" in inspect.getsource(nbgrader.api.Gradebook.__init__)
+    newest = Path(private_nbgrader.ALEMBIC_DIR, "versions").glob(f"{private_nbgrader.version_of_tables()}_*.py")
+    assert len(list(newest)) == 1
 
 
 @pytest.mark.parametrize("path", OTHERS, ids=lambda path: path.stem)

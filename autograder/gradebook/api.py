@@ -26,8 +26,10 @@ def open_api(root: Path, gradebook: bool = True, **directories: Any) -> Any:
     from nbgrader.coursedir import CourseDirectory
 
     from autograder.gradebook.config import leave_gradebook_alone
+    from autograder.gradebook.private_nbgrader import know_version_of_tables
     from autograder.gradebook.settings import settings_of
 
+    know_version_of_tables()
     config = copy.deepcopy(settings_of(root))
     if not gradebook:
         leave_gradebook_alone(config)
