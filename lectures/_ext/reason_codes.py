@@ -19,11 +19,13 @@ READ_ON = {
     "Expectations: messages and callbacks": "2",
     "Expectations: lifecycle, parameters, actions": "34",
     "Files of answers, parameters and launches": "3",
+    "Packages: building them": "7",
+    "Packages: what was built": "7",
     "Remap and parameter rules: their form": "3",
     "Remap rules: their effect": "3",
 }
 """The lectures that explain what a group of reasons is about."""
-LECTURES = {"2": "02_executors", "3": "03_remapping", "4": "04_lifecycle", "5": "05_qos"}
+LECTURES = {"2": "02_executors", "3": "03_remapping", "4": "04_lifecycle", "5": "05_qos", "7": "07_interfaces"}
 
 
 def reason_codes() -> str:
