@@ -28,7 +28,7 @@ CODE_STUB = "# YOUR CODE HERE"
 """What students find in place of a solution: a comment in Python and in YAML."""
 TEXT_STUB = "YOUR ANSWER HERE"
 
-_HEADING = re.compile(r"^#{1,6}\s+(.*?)\s*#*\s*$", re.MULTILINE)
+_HEADING = re.compile(r"^(#{1,6})\s+(.*?)\s*#*\s*$", re.MULTILINE)
 
 
 @cache
@@ -178,10 +178,9 @@ def source_of(cell: dict[str, Any]) -> str:
     return encodable(source).replace("\r\n", "\n").replace("\r", "\n")
 
 
-def heading_in(markdown: str) -> str:
-    """Return the last heading in a cell's text; empty if there is none."""
-    found: list[str] = _HEADING.findall(markdown)
-    return found[-1] if found else ""
+def headings(markdown: str) -> list[tuple[int, str]]:
+    """Return the headings in a cell's text, each with its level, from 1."""
+    return [(len(marks), text) for marks, text in _HEADING.findall(markdown)]
 
 
 def lab_names(root: Path) -> list[str]:
@@ -233,7 +232,7 @@ def _read(name: str, notebook: Path, raw: dict[str, Any], released_only: bool) -
         if grade_id:
             seen.add(grade_id)
         if cell["cell_type"] == "markdown" and not nbgrader.get("solution"):
-            title = heading_in(source) or title
+            title = next((text for _, text in reversed(headings(source))), title)
         blank = source
         points = float(nbgrader["points"]) if nbgrader.get("grade") else None
         if nbgrader.get("solution"):

@@ -16,7 +16,7 @@ from nbgrader.converters import GenerateFeedback
 
 from autograder.core.errors import KitError
 from autograder.core.results import SubmissionResult
-from autograder.course.lab import Lab, heading_in, load_lab
+from autograder.course.lab import Lab, headings, load_lab
 from autograder.gradebook.exchange_files import complete, only_notebooks
 from autograder.gradebook.reading import read_grade
 from autograder.grading.store import ResultStore
@@ -24,6 +24,9 @@ from autograder.intake.roster import FILE_NAME, read_roster
 from autograder.report.feedback_page import Heading, Task, feedback_html, plain_title
 from autograder.submission import timestamp
 from autograder.submission.reader import read_submission
+
+_PART = 2
+"""The level of the headings of a lab's parts."""
 
 
 class FeedbackExporter(Exporter):  # type: ignore[misc]
@@ -58,8 +61,9 @@ class FeedbackExporter(Exporter):  # type: ignore[misc]
 
 
 def _title(lab: Lab) -> str:
-    titles = (heading_in("".join(cell.get("source", ""))) for cell in lab.released if cell["cell_type"] == "markdown")
-    return plain_title(next(filter(None, titles), lab.name))
+    texts = ("".join(cell.get("source", "")) for cell in lab.released if cell["cell_type"] == "markdown")
+    titles = (text for markdown in texts for _, text in headings(markdown))
+    return plain_title(next(titles, lab.name))
 
 
 def _name(root: Path, student: str) -> str:
@@ -82,15 +86,17 @@ def _result(root: Path, lab: Lab, student: str, path: Path) -> SubmissionResult 
 def _tasks(nb: Any) -> list[Task]:
     """What stands between two headings, where it has points; answers without points belong to the next that has."""
     tasks: list[Task] = []
-    title, answers = "", {}
+    title, part, answers = "", "", {}
     for cell in nb.cells:
         if cell.cell_type == "markdown" and not utils.is_solution(cell):
-            title = plain_title(heading_in(cell.source)) or title
+            for level, text in headings(cell.source):
+                title = plain_title(text)
+                part = title if level <= _PART else part
         if utils.is_solution(cell):
             answers[cell.metadata.nbgrader["grade_id"]] = cell.source
         if utils.is_grade(cell):
             if not tasks or tasks[-1].title != title:
-                tasks.append(Task(title))
+                tasks.append(Task(title, part=part))
             tasks[-1].graded.append(cell.metadata.nbgrader["grade_id"])
             tasks[-1].answers |= answers
             answers = {}

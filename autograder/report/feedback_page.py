@@ -6,6 +6,7 @@ import datetime
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import groupby
 
 from markupsafe import Markup
 
@@ -30,6 +31,8 @@ class Task:
     """The grade_ids of its graded cells, in order."""
     answers: dict[str, str] = field(default_factory=dict)
     """What the student wrote, by grade_id."""
+    part: str = ""
+    """The part of the lab that it belongs to; its own title, if the lab has no smaller ones."""
 
 
 @dataclass(frozen=True)
@@ -100,12 +103,28 @@ def feedback_html(
         waiting=_waiting(grade),
         problems=shown.problems if shown is not None else [],
         sections=sections,
+        parts=_parts(tasks, cells, sections),
         repairs=repairs,
         written=f"{written.day} {written:%B %Y}",
         version=result.kit_version if result is not None else VERSION,
         digest=result.digest[:12] if result is not None else "",
         isolation=result.isolation.value if result is not None else "",
     )
+
+
+def _parts(
+    tasks: Sequence[Task], cells: Mapping[str, CellGrade], sections: Sequence[Mapping[str, object]]
+) -> list[dict[str, object]]:
+    """The sections by part of the lab; a part of one section of that very name needs no line of its own."""
+    parts = []
+    pairs = zip(tasks, sections, strict=True)
+    for title, group in groupby(pairs, key=lambda pair: pair[0].part):
+        inside = list(group)
+        named = bool(title) and [task.title for task, _ in inside] != [title]
+        graded = [cells[name] for task, _ in inside for name in task.graded if name in cells]
+        of_part = [section for _, section in inside]
+        parts.append({"title": title if named else "", "points": _points(graded), "sections": of_part})
+    return parts
 
 
 def _number(points: float) -> str:
