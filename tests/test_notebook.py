@@ -438,6 +438,10 @@ def test_a_nodes_output_streams_while_a_cell_explores(notebook: Notebook) -> Non
     )
     assert shown.text.count("talker | tick <b>\n") >= 3 and "\x1b" not in shown.text
     assert "tick <b>" in notebook.run('ros.log("talker")').text
+    assert "<details open><summary>Output of <code>talker</code>" in shown.html
+    notebook.run("%%node levels\nprint('[WARN] [1.0] [a]: low\\n[INFO] [1.0] [a]: <fine>')")
+    levels = notebook.run('with launch("levels") as ros:\n    ros.wait(lambda: False, within=1)').html
+    assert ">[WARN] [1.0] [a]: low</span>" in levels and "\n[INFO] [1.0] [a]: &lt;fine&gt;" in levels
     many = notebook.run("%%node many\nfor number in range(1000):\n    print(number)\n")
     assert "written" in many.text
     flood = notebook.run('with launch("many") as ros:\n    ros.wait(lambda: False, within=1)').text

@@ -172,7 +172,7 @@ def test_a_robot_goes_on_from_cell_to_cell(notebook: Notebook) -> None:
     # A check has programs and a domain of its own, and the robot goes on.
     inside = notebook.run('with launch("talker", name="other") as ros:\n    ros.wait_for_graph(lambda: ros.nodes())\n'
                           "    %ros2 node list")  # fmt: skip
-    assert inside.text.startswith("/other\n")
+    assert "/other\n" in inside.text  # on a busy machine with what the talker has printed before it
     assert notebook.run("%ros2 node list").text == "/talker\n"
     assert notebook.run("robot.stop()\n%ros2 node list").text.endswith('robot = launch("NAME").start()\n')
 

@@ -42,11 +42,11 @@ class Robot:
         return self._running.observer
 
     def wait_for_nodes(self) -> None:
-        """Wait until each program has a node, or one has ended."""
+        """Wait until each program that has not ended has a node."""
 
         def there() -> bool:
             running = [program for _, program in self._running.programs if program.running()]
-            return len(running) < len(self._running.programs) or len(self.observer.nodes()) >= len(running)
+            return len(self.observer.nodes()) >= len(running)
 
         self.observer.wait(there, _THERE_WITHIN)
 

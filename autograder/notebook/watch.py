@@ -8,16 +8,14 @@ from collections.abc import Callable, Sequence
 from html import escape
 from typing import Any
 
-from autograder.core.output import tidy
 from autograder.graph.observer import Observer
+from autograder.notebook.stream import Stream
 from autograder.sandbox.running_program import RunningProgram
 
 _MUTE = 0.7
 """Seconds of waiting after which a line says what for: most waits are over by then."""
 _LOOK_EVERY = 0.25
 """Seconds between two looks at what the programs have printed."""
-_LINES = 100
-"""Lines of one program that are shown while it runs; `ros.log()` has more."""
 
 
 class Watch:
@@ -37,7 +35,7 @@ class Watch:
         self._programs = programs
         self._streams, self._updates = streams, updates
         self._shown: dict[int, int] = {}
-        self._lines: dict[int, int] = {}
+        self._blocks: dict[int, Stream] = {}
         self._sentence, self._since, self._looked = "", 0.0, 0.0
         self._line: Any = None
         self._said = ""
@@ -60,7 +58,7 @@ class Watch:
         """A new cell has begun: it says what is waited for, and shows what is printed from now on."""
         self._line, self._said = None, ""
         self._shown = {number: len(program.output()) for number, program in enumerate(self._programs())}
-        self._lines.clear()
+        self._blocks.clear()
 
     def close(self) -> None:
         """The programs have ended: show the rest of what they printed."""
@@ -92,7 +90,7 @@ class Watch:
             self._line.update(data, raw=True)
 
     def print_new(self, rest: bool = False) -> None:
-        """Print the lines that the programs have printed since; with `rest` also one that has no end yet."""
+        """Show the lines that the programs have printed since; with `rest` also one that has no end yet."""
         for number, program in enumerate(self._programs()):
             if program.truncated():
                 continue
@@ -100,9 +98,6 @@ class Watch:
             new = text[self._shown.get(number, 0) :]
             whole = new if rest else new[: new.rfind("\n") + 1]
             self._shown[number] = self._shown.get(number, 0) + len(whole)
-            for line in tidy(whole).splitlines():
-                count = self._lines[number] = self._lines.get(number, 0) + 1
-                if count <= _LINES:
-                    print(f"{program.name} | {line}")
-                elif count == _LINES + 1:
-                    print(f"{program.name} | [more is in ros.log()]")
+            if whole:
+                block = self._blocks.setdefault(number, Stream(program.name, self._updates))
+                block.add(whole)
