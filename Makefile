@@ -20,7 +20,7 @@ echo "No Python was found. The kit needs Python 3.11 to 3.14." >&2; \
 echo "What to do: sudo apt-get install python3 python3-venv   or name one: make PYTHON=/path/to/python3.12" >&2; exit 2
 endef
 
-.PHONY: help setup setup-dev doctor grade check test test-all lint jupyter lectures release wheel soak mutants bench lock clean distclean
+.PHONY: help setup setup-dev doctor grade check test test-all lint jupyter lectures pdf release wheel soak mutants bench lock clean distclean
 
 help: ## this list
 	@echo 'make TARGET [LAB=$(LAB)] [PYTHON=python3.12] [ARGS="more options"]'; echo
@@ -54,6 +54,9 @@ lectures: setup-dev ## build the book and the slides into build/lectures
 	@$(RUN) python -m sphinx -q -W --keep-going -b html -d build/lectures/doctrees/book lectures build/lectures/book $(ARGS)
 	@$(RUN) python -m sphinx -q -W --keep-going -b revealjs -c lectures -d build/lectures/doctrees/slides lectures/slides build/lectures/slides $(ARGS)
 	@echo build/lectures/book/index.html build/lectures/slides/index.html
+
+pdf: lectures ## print the slides as PDF, a page for each, into build/lectures/slides (needs chromium)
+	@$(RUN) python lectures/_lib/print_talks.py build/lectures/slides
 
 wheel: setup-dev ## build the kit as a wheel, for courses elsewhere, into build/wheel
 	@rm -rf build/lib build/wheel

@@ -5,6 +5,7 @@ The pages are opened in Debian's chromium. Where there is none the browser tests
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -140,6 +141,20 @@ def test_axe_has_nothing_against_the_slides(site: Path, page: Any, name: str, co
     page.goto(f"file://{site}/slides/{name}.html?print-pdf")
     page.wait_for_function("Reveal.isReady() && document.querySelector('.pdf-page')")
     assert violations(page, contrast) == []
+
+
+def test_a_talk_can_be_printed(site: Path, browser: Any, tmp_path: Path) -> None:
+    """A page for each slide; where there is no browser, one sentence."""
+    for name in ("_static", "_images"):
+        (tmp_path / name).symlink_to(site / "slides" / name)
+    deck = tmp_path / f"{TALKS[0]}.html"
+    deck.write_text((site / "slides" / deck.name).read_text())
+    command = [sys.executable, ROOT / "lectures" / "_lib" / "print_talks.py", tmp_path]
+    subprocess.run(command, check=True, timeout=300)
+    pages = re.findall(rb"/Type\s*/Page\b", deck.with_suffix(".pdf").read_bytes())
+    assert len(pages) == deck.read_text().count('<aside class="notes"')
+    without = subprocess.run(command, capture_output=True, text=True, timeout=300, env={"PATH": ""})
+    assert without.returncode == 1 and without.stderr.startswith("No browser was found"), without.stderr
 
 
 @pytest.mark.parametrize("name", [name for name in LECTURES if name[0].isdigit()])

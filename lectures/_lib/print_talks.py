@@ -1,0 +1,43 @@
+"""Print the talks that have been built as PDF, a page for each slide: `python print_talks.py build/lectures/slides`."""
+
+from __future__ import annotations
+
+import shutil
+import sys
+from pathlib import Path
+
+BROWSERS = ("chromium", "chromium-browser", "google-chrome")
+
+
+def print_talks(folder: Path) -> list[Path]:
+    """Print each deck of a folder into a file beside it, and return the files.
+
+    Raises:
+        SystemExit: there is no browser, or there are no decks.
+    """
+    browser = next(filter(None, map(shutil.which, BROWSERS)), None)
+    if browser is None:
+        raise SystemExit(
+            "No browser was found to print the slides with. What to do: sudo apt-get install chromium"
+            " (or print each deck yourself: open it with ?print-pdf behind its address)."
+        )
+    decks = sorted(folder.glob("[0-9]*.html"))
+    if not decks:
+        raise SystemExit(f"There are no slides in {folder}. What to do: make lectures")
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as playwright:
+        started = playwright.chromium.launch(executable_path=browser, args=["--no-sandbox", "--disable-gpu"])
+        window = started.new_page(viewport={"width": 1280, "height": 720})
+        for deck in decks:
+            window.goto(f"{deck.resolve().as_uri()}?print-pdf")
+            window.wait_for_function(
+                "Reveal.isReady() && document.querySelectorAll('.pdf-page').length >= Reveal.getTotalSlides()"
+            )
+            window.pdf(path=deck.with_suffix(".pdf"), prefer_css_page_size=True, print_background=True)
+        started.close()
+    return [deck.with_suffix(".pdf") for deck in decks]
+
+
+if __name__ == "__main__":
+    print(*print_talks(Path(sys.argv[1])), sep="\n")
