@@ -8,7 +8,7 @@ from autograder.core.errors import KitError
 from autograder.course.paths import CoursePaths
 from autograder.gradebook.backup import back_up
 from autograder.gradebook.preparation import prepare_nbgrader
-from autograder.gradebook.settings import gradebook_address
+from autograder.gradebook.settings import gradebook_address, gradebook_file
 
 
 def make_room(root: Path) -> None:
@@ -22,6 +22,22 @@ def make_room(root: Path) -> None:
     earlier = CoursePaths(root).build / file.name
     if earlier.is_file() and not file.exists():
         earlier.replace(file)
+
+
+def name_course(root: Path) -> None:
+    """Note a course without a name in a gradebook on a server, which takes no lab of a course that is not noted.
+
+    nbgrader notes only those with a name, and gets by with that in a file, where nobody looks after such things.
+    """
+    if gradebook_file(root) is not None:
+        return
+    prepare_nbgrader()
+    from nbgrader.api import Course, Gradebook
+
+    with Gradebook(gradebook_address(root)) as gradebook:
+        if gradebook.db.get(Course, "") is None:
+            gradebook.db.add(Course(id=""))
+            gradebook.db.commit()
 
 
 def bring_up_to_date(root: Path) -> None:

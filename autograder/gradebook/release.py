@@ -8,7 +8,7 @@ from pathlib import Path
 from autograder.core.errors import KitError
 from autograder.course.lab import load_lab
 from autograder.gradebook.api import answered, last_error, open_api
-from autograder.gradebook.keeping import bring_up_to_date, make_room
+from autograder.gradebook.keeping import bring_up_to_date, make_room, name_course
 from autograder.gradebook.settings import gradebook_address
 
 
@@ -69,6 +69,7 @@ def register(root: Path, lab: str) -> list[str]:
     """
     make_room(root)
     bring_up_to_date(root)
+    name_course(root)
     if knows(root, lab):
         return []
     with tempfile.TemporaryDirectory() as folder:
