@@ -21,7 +21,7 @@ import pytest
 import toy
 from junitparser import JUnitXml
 
-from autograder.core.files import write_beside
+from autograder.core.files import remove_unfinished, write_beside
 from autograder.core.lock import only_one
 from autograder.core.results import CheckResult, Isolation, Outcome, Status, SubmissionResult
 from autograder.course.lab import load_lab
@@ -173,6 +173,10 @@ def test_a_full_disk_names_the_file_and_leaves_nothing_behind(tmp_path: Path) ->
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
     assert refused.value.filename == str(path)
     assert {file.name: file.read_text() for file in tmp_path.iterdir()} == {"grades.csv": "whole"}
+    for name in (".grades.csv.999999999", f".grades.csv.{os.getpid()}", ".hidden"):  # one that was killed, one at work
+        (tmp_path / name).touch()
+    remove_unfinished(tmp_path)
+    assert {file.name for file in tmp_path.iterdir()} == {"grades.csv", f".grades.csv.{os.getpid()}", ".hidden"}
 
 
 def test_help_on_each_command(root: Path) -> None:

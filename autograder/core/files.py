@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import errno
 import os
+import re
 import stat
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -26,6 +27,18 @@ def write_beside(path: Path, content: str | bytes) -> None:
             beside.unlink()
         error.filename = str(path)  # a full disk names no file, and nobody knows the one beside it
         raise
+
+
+_BESIDE = re.compile(r"\..+\.(\d+)")
+"""The name of a file that `write_beside` has not moved yet, with the number of the process that writes it."""
+
+
+def remove_unfinished(folder: Path) -> None:
+    """Remove the files below a folder that `write_beside` left where its process was killed in the middle."""
+    for path in folder.rglob(".*"):
+        found = _BESIDE.fullmatch(path.name)
+        if found and path.is_file() and not Path("/proc", found[1]).exists():
+            path.unlink(missing_ok=True)
 
 
 def signature(path: Path) -> tuple[int, ...] | None:

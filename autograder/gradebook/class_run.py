@@ -9,6 +9,7 @@ from pathlib import Path
 
 from rich.console import Console
 
+from autograder.core.files import remove_unfinished
 from autograder.core.grades import Grade
 from autograder.core.lock import only_one
 from autograder.core.results import SubmissionResult
@@ -69,6 +70,7 @@ def grade_class(root: Path, lab_name: str, source: Path, settings: Settings) -> 
         KeyboardInterrupt: finished results are kept, and the next run goes on from them.
     """
     with only_one(CoursePaths(root).lock, "A grading"):
+        remove_unfinished(CoursePaths(root).build)
         return _graded(root, load_lab(root, lab_name), source, settings)
 
 
