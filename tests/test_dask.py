@@ -73,7 +73,9 @@ def cluster(folder: Path) -> Iterator[Cluster]:
         yield Cluster(folder, ending)
 
 
-def test_a_killed_worker_costs_no_result_and_another_kit_is_refused(tmp_path: Path) -> None:
+def test_a_killed_worker_costs_no_result_and_another_kit_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     pytest.importorskip("distributed")
     course = toy.make_course(tmp_path / "course")
     lab = load_lab(course, toy.LAB)
@@ -102,5 +104,6 @@ def test_a_killed_worker_costs_no_result_and_another_kit_is_refused(tmp_path: Pa
         dask.worker("third", other)
         with pytest.raises(KitError, match=r"1 of 2 workers have no kit, or another one"):
             run_class(class_, course, lab, Settings(isolation, executor=settings.executor, force=True), lambda _: None)
+    monkeypatch.setattr("autograder.grading.executors.dask._SECONDS_TO_ANSWER", 1.0)
     with pytest.raises(KitError, match="No Dask scheduler answers"):
         run_class(class_, course, lab, Settings(isolation, executor="dask://tcp://127.0.0.1:1", force=True), print)

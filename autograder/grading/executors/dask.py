@@ -13,7 +13,7 @@ from autograder.course.lab import kit_digest
 from autograder.grading.job import Job
 from autograder.grading.supervisor import run_in_worker, unknown
 
-_SECONDS_TO_ANSWER = 10.0
+_SECONDS_TO_ANSWER = 30.0
 """Seconds in which a scheduler has to answer, and as many in which it has to have a worker."""
 
 
