@@ -2,6 +2,7 @@
 
 - Such a cell becomes a listing of its own language under the file's name; what the cell prints is left out.
 - The directive `change` shows what has to be changed in one program of a page to get another one.
+- What programs print is removed with the tag `remove-stdout`, as what a cell prints is.
 - The directive `excerpt` shows a part of a program of a page of the book; slides use it.
 """
 
@@ -18,6 +19,8 @@ from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
 
 _LIB = Path(__file__).resolve().parent.parent / "_lib"
+PRINTED = "<details open><summary>Output of <code>"
+"""How a block begins in which a notebook shows what a program prints; to a page it is standard output."""
 LANGUAGES = {"py": "python3", "yaml": "yaml", "json": "json", "xml": "xml", "cfg": "ini"}
 
 
@@ -96,6 +99,10 @@ def on_doctree(app: Sphinx, doctree: nodes.document) -> None:
         ):
             for output in [c for c in cell.findall(nodes.container) if c.get("nb_element") == "cell_code_output"]:
                 output.parent.remove(output)
+        if "tag_remove-stdout" in cell["classes"]:
+            for shown in [raw for raw in cell.findall(nodes.raw) if raw.astext().startswith(PRINTED)]:
+                bundle = shown.parent if shown.parent.get("nb_element") == "mime_bundle" else shown
+                bundle.parent.remove(bundle)
 
 
 def setup(app: Sphinx) -> dict[str, Any]:
