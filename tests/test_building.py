@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import pytest
 from boxes import ROOT
 
-from autograder.core.results import CheckResult, Isolation
+from autograder.checks import build, runtime
+from autograder.core.results import CheckResult, Isolation, Status
 from autograder.course.lab import Cell
+from autograder.grading.builds import with_interfaces
 from autograder.grading.job import Job
 from autograder.grading.supervisor import run_in_workers
 from autograder.packages.explain import CODES
@@ -151,6 +154,13 @@ CASES: dict[str, tuple[dict[str, str], str, str, str]] = {
         'expect_installed("share/launch_left_out/launch/car.launch.yaml")',
         "not-installed",
         "car.launch.yaml",
+    ),
+    "not_needed": (SENSORS, 'expect_depends("rclpy", "std_msgs")', "package-depend", "`std_msgs`"),
+    "marker_left_out": (
+        changed(SENSORS, "setup.py", '("share/ament_index/resource_index/packages", ["resource/NAME"]),', ""),
+        'expect_installed("share/ament_index/resource_index/packages/marker_left_out")',
+        "not-installed",
+        "setup.py does not install",
     ),
     "float": (changed(INTERFACES, "msg/Thing.msg", "float32", "float"), EXPECT, "interface-line", "float x"),
     "capital": (changed(INTERFACES, "msg/Thing.msg", "label", "Label"), EXPECT, "interface-line", "string Label"),
@@ -348,6 +358,38 @@ def test_a_field_of_another_type_is_named(found: dict[str, CheckResult]) -> None
 
 def test_a_package_that_nobody_wrote_is_said_to_be_missing(found: dict[str, CheckResult]) -> None:
     assert "no package `nothing`" in found["not there"].outcomes[0].because
+
+
+def test_a_build_is_used_again_for_the_same_files_and_for_no_others() -> None:
+    typo = changed(INTERFACES, "CMakeLists.txt", "project(", "projekt(")
+    other = {**typo, "msg/Thing.msg": "string label\n"}
+    cells = [Cell(grade_id="check", points=1, source='with build("things") as package:\n    package.expect_built()')]
+
+    def built(files: Mapping[str, str]) -> dict[str, Any]:
+        what: dict[str, Any] = {"files": package("things", files) | package("unused", files), "cells": cells}
+        isolation = Isolation.FULL if preflight().full else Isolation.NONE
+        return with_interfaces(Job(student="ann", lab="lab", digest="0", isolation=isolation, seed=1, **what), 1).built
+
+    (first,), (again,), (different,) = (list(built(files).items()) for files in (typo, typo, other))
+    assert first[0] == again[0] and first[1] is again[1]
+    assert different[0] != first[0] and different[1] is not first[1]
+
+
+def test_without_a_compiler_nothing_is_decided_and_the_reason_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name, text in package("things", INTERFACES).items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(text)
+    monkeypatch.setenv("PATH", str(tmp_path))
+    runtime.current.configure(tmp_path, Isolation.NONE, 1)
+    with build("things") as things, things.part("a part"):
+        things.expect_built()
+    score = things.score({"a part": 1})
+    runtime.current.configure(tmp_path, Isolation.NONE, 1)
+    assert score.result.points is None
+    assert [one.status for one in score.result.outcomes] == [Status.UNKNOWN]
+    assert "a C compiler" in score.result.outcomes[0].because
 
 
 def test_every_code_of_a_build_has_a_case() -> None:

@@ -14,6 +14,7 @@ from typing import NoReturn
 
 from autograder.checks import findings, runtime
 from autograder.checks.misuse import place_of
+from autograder.core.errors import KitError
 from autograder.core.picture import Picture
 from autograder.core.results import Outcome, Status
 from autograder.course.markers import MORE_AT_GRADING, hidden_lines
@@ -51,6 +52,9 @@ def ends_block(error: BaseException | None) -> bool:
     if isinstance(error, ForgedGraph):
         with contextlib.suppress(LaunchEnded):
             failed_as_a_whole("The ROS graph can be read", because=_FORGED, code="forged-graph")
+        return True
+    if isinstance(error, KitError):  # such as a machine without a compiler
+        unknown("This can be found out on this machine", " ".join(part for part in (error.what, error.do) if part))
         return True
     if runtime.current.front_end is not None or not isinstance(error, Exception):
         return False

@@ -19,6 +19,7 @@ from autograder.core.results import Isolation
 from autograder.graph.domains import free_domains
 from autograder.graph.observer import Observer
 from autograder.packages.workspace import SOURCES, Workspace
+from autograder.sandbox.build import BuildRun
 from autograder.sandbox.node_sandbox import NodeSandbox
 
 
@@ -43,6 +44,7 @@ class Runtime:
         """Start as a student's notebook does."""
         self._folder: Path | None = None
         self._answers: Mapping[str, bool] = {}
+        self._built: Mapping[str, BuildRun] = {}
         self.isolation = Isolation.NONE
         self.random = random.Random()
         self._sandbox: NodeSandbox | None = None
@@ -54,7 +56,12 @@ class Runtime:
         """The launch that goes on from cell to cell: one at a time."""
 
     def configure(
-        self, folder: Path, isolation: Isolation, seed: int, answers: Mapping[str, bool] | None = None
+        self,
+        folder: Path,
+        isolation: Isolation,
+        seed: int,
+        answers: Mapping[str, bool] | None = None,
+        built: Mapping[str, BuildRun] | None = None,
     ) -> None:
         """Say where the programs are and how they are kept apart; the grading worker does so once.
 
@@ -63,10 +70,12 @@ class Runtime:
             isolation: for the programs.
             seed: of all values that vary from run to run.
             answers: the files that are answers, and of each whether its cell is still as students receive it.
+            built: what builds of packages came to before, by the digest of what was built.
         """
         self.close()
         self._folder, self.isolation, self.random = folder, isolation, random.Random(seed)
         self._answers = answers or {}
+        self._built = built or {}
 
     def vary_for(self, seed: str) -> None:
         """Let the values that vary be those of one check: they do not depend on which checks ran before it."""
@@ -117,7 +126,7 @@ class Runtime:
     def workspace(self) -> Workspace:
         """The packages that the student writes, and what has been built of them."""
         if self._workspace is None:
-            self._workspace = Workspace(self.folder.resolve(), self.isolation)
+            self._workspace = Workspace(self.folder.resolve(), self.isolation, self._built)
         return self._workspace
 
     def use_package(self, name: str) -> None:

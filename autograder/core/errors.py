@@ -11,3 +11,7 @@ class KitError(Exception):
         super().__init__(what if not do else f"{what}\n{do}")
         self.what = what
         self.do = do
+
+    def _render_traceback_(self) -> list[str]:
+        """What IPython shows in a notebook: the two sentences, and no traceback."""
+        return str(self).splitlines()

@@ -7,7 +7,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from autograder.core.results import CheckResult, Isolation, Outcome, SubmissionResult
 from autograder.course.lab import Cell
 from autograder.packages.workspace import SOURCES
-from autograder.sandbox.build import BUILD_SECONDS
+from autograder.sandbox.build import BUILD_SECONDS, BuildRun
 
 CELL_SECONDS = 120.0
 """Seconds after which a check cell is ended; all of them together have a limit too (`supervisor.SECONDS_PER_CHECK`)."""
@@ -34,6 +34,8 @@ class Job(BaseModel):
     answers: dict[str, bool] = Field(default_factory=dict)
     """Of the files that are answers: whether the cell is still as students receive it."""
     cells: list[Cell]
+    built: dict[str, BuildRun] = Field(default_factory=dict)
+    """What builds of its packages came to before the worker began, by the digest of what was built."""
     problems: list[Outcome] = Field(default_factory=list)
     messages: bool = False
     """The messages are wanted, too, that the checks received."""
@@ -43,6 +45,16 @@ class Job(BaseModel):
         """Seconds that its packages may take to be built, besides what the checks may take."""
         packages = {name.split("/")[1] for name in self.files if name.startswith(f"{SOURCES}/")}
         return BUILD_SECONDS * min(len(packages), MOST_PACKAGES)
+
+    @property
+    def interfaces(self) -> dict[str, dict[str, str]]:
+        """The packages of interfaces that a cell names: of each its files, by their path in the package."""
+        found: dict[str, dict[str, str]] = {}
+        for name, text in self.files.items():
+            folder, _, path = name.removeprefix(f"{SOURCES}/").partition("/")
+            if f"{SOURCES}/{folder}/CMakeLists.txt" in self.files and f"{SOURCES}/{folder}/{path}" == name:
+                found.setdefault(folder, {})[path] = text
+        return {package: files for package, files in found.items() if any(package in c.source for c in self.cells)}
 
     @property
     def checks(self) -> list[Cell]:

@@ -11,6 +11,7 @@ from pydantic import ValidationError
 
 from autograder.core.results import CheckResult, SubmissionResult
 from autograder.course.lab import Cell
+from autograder.grading.builds import with_interfaces
 from autograder.grading.job import CELL_SECONDS, STUCK_SECONDS, Job
 from autograder.grading.validation import undecided, validated
 from autograder.sandbox.outer import OuterRun, run_in_sandbox
@@ -40,7 +41,7 @@ def run_in_worker(job: Job, stop: threading.Event | None = None) -> SubmissionRe
         Stopped: by `stop`.
     """
     began = time.monotonic()
-    return _result(job, _run_share(job, job.checks, stop), began)
+    return _result(job, _run_share(with_interfaces(job, 1, stop), job.checks, stop), began)
 
 
 def run_in_workers(job: Job, workers: int) -> SubmissionResult:
@@ -50,6 +51,7 @@ def run_in_workers(job: Job, workers: int) -> SubmissionResult:
     many run at once anyway, is cheaper with one each.
     """
     began = time.monotonic()
+    job = with_interfaces(job, workers)
     shares = [share for share in (job.checks[number::workers] for number in range(workers)) if share]
     given_up = threading.Event()
     with ThreadPoolExecutor(max(1, len(shares)), thread_name_prefix="share") as pool:

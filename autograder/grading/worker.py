@@ -52,7 +52,7 @@ def run_job(job: Job, folder: Path, stacks: TextIO = sys.stderr) -> Iterator[Che
     for name, text in job.files.items():
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         (folder / name).write_text(text, encoding="utf-8")
-    runtime.current.configure(folder, job.isolation, job.seed, job.answers)
+    runtime.current.configure(folder, job.isolation, job.seed, job.answers, job.built)
     if job.files:
         _ = runtime.current.sandbox  # it warms up while the set-up cells import their messages
     namespace: dict[str, Any] = {"__name__": "check_cells"}

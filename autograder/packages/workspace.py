@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import shutil
 import sysconfig
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -54,10 +55,12 @@ class Workspace:
     Args:
         folder: with the folder `src` in it.
         isolation: for what the packages' own build files run.
+        known: what builds came to before, by `digest_of` what was built.
     """
 
-    def __init__(self, folder: Path, isolation: Isolation) -> None:
-        """Begin with nothing built."""
+    def __init__(self, folder: Path, isolation: Isolation, known: Mapping[str, BuildRun] | None = None) -> None:
+        """Begin with nothing installed."""
+        self._known = known or {}
         self._folder = folder
         self._isolation = isolation
         self._built: dict[str, tuple[str, Built]] = {}
@@ -78,10 +81,11 @@ class Workspace:
             raise KitError(
                 f"Building `{package}` needs {', '.join(lacking)}, which this machine does not have.", INSTALL
             )
-        digest = _digest(self.source(package))
+        digest = digest_of(package, _contents(self.source(package)))
         known, built = self._built.get(package, ("", None))
         if built is None or known != digest:
-            built = self._install(package, build_packages(self._folder / SOURCES, [package], self._isolation))
+            run = self._known.get(digest) or build_packages(self._folder / SOURCES, [package], self._isolation)
+            built = self._install(package, run)
             self._built[package] = (digest, built)
         return built
 
@@ -105,10 +109,19 @@ def missing_tools() -> list[str]:
     return lacking + ([] if headers.is_file() else ["the headers of Python"])
 
 
-def _digest(folder: Path) -> str:
-    """A word for all that a package's files hold."""
-    found = hashlib.sha256()
-    for path in sorted(path for path in folder.rglob("*") if path.is_file()):
-        content = path.read_bytes()
-        found.update(f"{path.relative_to(folder)}\0{len(content)}\0".encode() + content)
+def _contents(folder: Path) -> dict[str, bytes]:
+    """All files of a package, by their path in it."""
+    return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+def digest_of(package: str, files: Mapping[str, bytes]) -> str:
+    """A word for a package and all that its files hold.
+
+    Args:
+        package: its name.
+        files: content by path in the package.
+    """
+    found = hashlib.sha256(f"{package}\0".encode())
+    for path, content in sorted(files.items()):
+        found.update(f"{path}\0{len(content)}\0".encode() + content)
     return found.hexdigest()

@@ -15,8 +15,9 @@ import sys
 import tarfile
 import threading
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
+
+from pydantic import BaseModel, ConfigDict, Field
 
 from autograder.core.processes import cpu_time, descendants, memory
 from autograder.core.results import Isolation
@@ -42,16 +43,17 @@ _LOOK = 0.2
 """Seconds between two looks at them."""
 
 
-@dataclass(frozen=True)
-class BuildRun:
+class BuildRun(BaseModel):
     """What came of a build."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, ser_json_bytes="base64", val_json_bytes="base64")
 
     status: int
     """Of colcon: 0 if every package was built."""
     log: str
     """All that colcon and what it started have printed."""
     timed_out: bool
-    installed: dict[str, bytes] = field(default_factory=dict)
+    installed: dict[str, bytes] = Field(default_factory=dict)
     """Content by path, such as `car_sensors/lib/car_sensors/speed_sensor`."""
 
 
@@ -143,7 +145,7 @@ def _finished(run: OuterRun) -> BuildRun:
         installed = dict(_files(run.stdout))
     except (tarfile.TarError, ValueError, EOFError):
         installed = {}
-    return BuildRun(run.status, run.stderr, run.timed_out, installed)
+    return BuildRun(status=run.status, log=run.stderr, timed_out=run.timed_out, installed=installed)
 
 
 def _files(archive: bytes) -> Iterator[tuple[str, bytes]]:

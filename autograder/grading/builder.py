@@ -1,0 +1,28 @@
+"""Builds one package of a student's, inside the grading sandbox: reads `Sources`, writes a `BuildRun`, both as JSON."""
+
+from __future__ import annotations
+
+import sys
+
+from autograder.grading.builds import Sources
+from autograder.packages.workspace import SOURCES
+from autograder.sandbox.build import build_packages
+from autograder.sandbox.scratch import Scratch
+
+
+def main() -> int:
+    """Serve one build."""
+    given = Sources.model_validate_json(sys.stdin.buffer.read())
+    with Scratch() as scratch:
+        scratch.chmod(0o755)  # the sandbox inside runs as somebody else
+        folder = scratch / SOURCES / given.package
+        for path, text in given.files.items():
+            (folder / path).parent.mkdir(parents=True, exist_ok=True)
+            (folder / path).write_text(text, encoding="utf-8")
+        run = build_packages(scratch / SOURCES, [given.package], given.isolation)
+    sys.stdout.write(run.model_dump_json())
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
