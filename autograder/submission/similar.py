@@ -112,7 +112,7 @@ def _tokens(text: str) -> list[str]:
     """The tokens of a program; the words of anything else, and of a program that is none."""
     if text.lstrip().startswith("%%node"):
         code = text.replace("%%node", "#", 1)
-        with contextlib.suppress(tokenize.TokenError, SyntaxError):
+        with contextlib.suppress(tokenize.TokenError, SyntaxError, ValueError):
             tokens = list(tokenize.generate_tokens(io.StringIO(code).readline))
             return [_plain(token) for token in tokens if token.type not in _SKIPPED]
     return re.findall(r"\w+", text.lower())
