@@ -7,6 +7,7 @@ reaches without costing points. `--complete` (`make test-all`) runs every check 
 
 from __future__ import annotations
 
+import os
 import tempfile
 import threading
 from collections.abc import Callable, Iterator
@@ -30,7 +31,7 @@ from autograder.submission.submission import Submission
 LABS = kill_matrix.labs()
 MEMBERS = [(lab, student) for lab in LABS for student in sample_class.students(lab)]
 ALONE = "the solution, with each check's own files alone"
-SETTINGS = Settings(force=True)
+SETTINGS = Settings(force=True, jobs=4 * len(os.sched_getaffinity(0)))
 LEAVE_ONLY = """
 from autograder.checks.runtime import current
 for name, text in {files!r}.items():

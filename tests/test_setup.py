@@ -38,8 +38,6 @@ ENVIRON = {
     if not name.startswith(("MAKE", "MFLAGS", "ROS_", "_ROS_", "AMENT_", "LD_LIBRARY_PATH", "PYTHON", "VIRTUAL_ENV"))
 } | {"PATH": os.pathsep.join([str(Path(BASE_PYTHON).parent), SYSTEM_PATH])}
 
-pytestmark = pytest.mark.xdist_group("set-up")
-
 
 def check_out(folder: Path, *, whole_lock: bool = False) -> Path:
     """Copy what a clone of this tree would hold."""
