@@ -20,7 +20,7 @@ echo "No Python was found. The kit needs Python 3.11 to 3.14." >&2; \
 echo "What to do: sudo apt-get install python3 python3-venv   or name one: make PYTHON=/path/to/python3.12" >&2; exit 2
 endef
 
-.PHONY: help setup setup-dev doctor grade check test test-all lint jupyter lectures pdf release wheel soak mutants bench lock clean distclean
+.PHONY: help setup setup-dev doctor grade check submit test test-all lint jupyter lectures pdf release wheel soak mutants bench lock clean distclean
 
 help: ## this list
 	@echo 'make TARGET [LAB=$(LAB)] [PYTHON=python3.12] [ARGS="more options"]'; echo
@@ -42,6 +42,9 @@ grade: setup ## grade a class: the sample class, or SUBMISSIONS=folder-or-zip
 
 check: setup ## report on one notebook: NB=path/to/notebook.ipynb
 	@$(RUN) autograder check "$(NB)" $(ARGS)
+
+submit: setup ## copy one notebook to what is handed in, with a receipt: NB=path/to/notebook.ipynb
+	@$(RUN) autograder submit "$(NB)" $(ARGS)
 
 jupyter: setup ## open the labs in JupyterLab
 	@$(RUN) autograder jupyter $(ARGS)

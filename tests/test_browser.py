@@ -317,7 +317,7 @@ def test_reports_can_be_read_in_every_theme_and_in_a_narrow_window(
 
     page, shown = run_all(window, address, name)
 
-    for number, words in enumerate(("", "written", "failed", "holds so far", "partly passed", "talker | tick")):
+    for number, words in enumerate(("", "written", "failed", "holds so far", "partly passed", "Output of talker")):
         assert words in shown[number]["output"]
     assert "no cell of the saved notebook begins with" in shown[-1]["output"]
     for width in (1400, 600):
