@@ -194,7 +194,7 @@ def stock(folder: Path, students: list[str], at_once: int) -> Measured:
 def recording(root: Path, students: list[str]) -> Measured:
     """Record results that are there already, as after a gradebook was lost: nbgrader's stage and the feedback."""
     shutil.rmtree(root / "build" / "autograded")
-    (root / "build" / "gradebook.db").unlink()
+    (root / "gradebook" / "gradebook.db").unlink()
     seconds, cpu = timed([BIN / "autograder", "grade", LAB, root / "handed_in"], root)
     return Measured(seconds, cpu, {student: {} for student in students})
 
