@@ -266,8 +266,8 @@ with launch("talker") as ros:
 ros.score({"the node has its name": 1, "it publishes": 2})
 ----
 with launch("talker") as ros:
-    ros.listen("/chatter", String)
-    ros.pause(0.5)
+    heard = ros.listen("/a_topic_with_a_name_that_is_too_wide_for_windows/chatter", String)
+    ros.wait(lambda: heard.count > 2, within=60)
 ----
 launch("talkr")"""
 
