@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+import drawings_actions
 import drawings_bringup
 import drawings_lifecycle
 import drawings_nodes
@@ -106,6 +107,7 @@ DRAWINGS: dict[str, Callable[[], Picture]] = {
     **drawings_qos.DRAWINGS,
     **drawings_packages.DRAWINGS,
     **drawings_bringup.DRAWINGS,
+    **drawings_actions.DRAWINGS,
 }
 
 
