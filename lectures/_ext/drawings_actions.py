@@ -29,8 +29,9 @@ def goal_feedback_result() -> Picture:
         canvas.line([(start, y), (end, y)], arrow=True, line=2.2, dashed=dashed)
         canvas.words(450, y - 9, text, anchor="middle")
     return canvas.picture(
-        "An action from top to bottom. The client sends a goal, the server answers that it accepts it. The server sends "
-        "feedback again and again. The client may ask to cancel. In the end the server sends the result and the status."
+        "An action from top to bottom. The client sends a goal, the server answers that it accepts it. The "
+        "server sends feedback again and again. The client may ask to cancel. In the end the server sends the"
+        " result and the status."
     )
 
 
@@ -38,8 +39,8 @@ def goal_states() -> Picture:
     """The states of a goal."""
     canvas = Canvas(390)
     boxes = {
-        "accepted": (20, 150, 0),
-        "executing": (250, 150, 1),
+        "accepted": (10, 150, 0),
+        "executing": (290, 150, 1),
         "canceling": (480, 280, 4),
         "succeeded": (720, 20, 2),
         "aborted": (720, 150, 5),
@@ -48,22 +49,22 @@ def goal_states() -> Picture:
     for name, (x, y, look) in boxes.items():
         canvas.box(x, y, 160, 70, look=look, round=10, line=2.4 if x == 720 else 1.2)
         canvas.words(x + 80, y + 42, name, anchor="middle", bold=x == 720, halo=True)
-    canvas.line([(180, 185), (246, 185)], arrow=True, line=2)
-    canvas.words(213, 172, "execute()", anchor="middle", size=17)
-    canvas.line([(410, 170), (716, 62)], arrow=True, line=2)
+    canvas.line([(170, 185), (286, 185)], arrow=True, line=2)
+    canvas.words(228, 172, "execute()", anchor="middle", size=17)
+    canvas.line([(450, 170), (716, 62)], arrow=True, line=2)
     canvas.words(540, 92, "succeed()", anchor="middle", halo=True)
-    canvas.line([(410, 185), (716, 185)], arrow=True, line=2)
+    canvas.line([(450, 185), (716, 185)], arrow=True, line=2)
     canvas.words(560, 176, "abort()", anchor="middle", halo=True)
-    canvas.line([(370, 220), (478, 300)], arrow=True, line=2)
-    canvas.words(330, 262, "cancel agreed", anchor="middle", size=17, halo=True)
+    canvas.line([(390, 220), (478, 296)], arrow=True, line=2)
+    canvas.words(340, 268, "cancel agreed", anchor="middle", size=17, halo=True)
     canvas.line([(640, 315), (716, 315)], arrow=True, line=2)
     canvas.words(678, 370, "canceled()", anchor="middle")
     canvas.words(20, 340, "An exception, or an end without", size=17)
     canvas.words(20, 364, "a word, is “aborted”.", size=17)
     return canvas.picture(
-        "The states of a goal. Accepted becomes executing with execute(). From executing succeed() leads to succeeded and "
-        "abort() to aborted. If the server agrees to cancel, the goal is canceling, and canceled() leads to canceled. An "
-        "exception, or an end without one of these calls, is aborted."
+        "The states of a goal. Accepted becomes executing with execute(). From executing succeed() leads to "
+        "succeeded and abort() to aborted. If the server agrees to cancel, the goal is canceling, and "
+        "canceled() leads to canceled. An exception, or an end without one of these calls, is aborted."
     )
 
 
@@ -88,8 +89,9 @@ def who_takes_the_request() -> Picture:
     canvas.words(420, 247, "“drive” looks, sees the request, and ends")
     canvas.words(420, 301, "the other thread takes the request at once")
     return canvas.picture(
-        "Above, one thread: drive sleeps and looks in turns; the request to stop waits until the thread is free, which is "
-        "too late. Below, two threads: the second one takes the request at once, drive sees it and ends."
+        "Above, one thread: drive sleeps and looks in turns; the request to stop waits until the thread is "
+        "free, which is too late. Below, two threads: the second one takes the request at once, drive sees it"
+        " and ends."
     )
 
 
@@ -112,8 +114,9 @@ def a_new_goal() -> Picture:
         canvas.line([(350, y + 4), (350, y + 84)], line=1.6, dashed=True)
     canvas.words(360, 376, "the new goal comes", size=17)
     return canvas.picture(
-        "What becomes of a goal that comes while another is executed. If nothing is written, both are executed at once. "
-        "With a queue, one after the other. With preemption the old one ends, and the new one is executed."
+        "What becomes of a goal that comes while another is executed. If nothing is written, both are "
+        "executed at once. With a queue, one after the other. With preemption the old one ends, and the new "
+        "one is executed."
     )
 
 

@@ -86,8 +86,11 @@ class Excerpt(SphinxDirective):
 
 
 def on_doctree(app: Sphinx, doctree: nodes.document) -> None:
-    """Show each cell that writes a file as that file."""
+    """Show each cell that writes a file as that file; leave out the line that said what was waited for, now empty."""
     for listing in list(doctree.findall(nodes.literal_block)):
+        if not listing.astext().strip():
+            listing.parent.remove(listing)
+            continue
         head = re.match(r"%%(node|file) (\S+)\n", listing.astext())
         if head is None:
             continue
