@@ -36,7 +36,8 @@ class Robot:
     """The three nodes, running; and an observer, such as a notebook has."""
 
     def __init__(self, environment: dict[str, str]) -> None:
-        self.domain = next(free_domains())
+        self.domains = free_domains()  # the domain is claimed as long as this is there
+        self.domain = next(self.domains)
         plain = {name: value for name, value in os.environ.items() if not name.startswith("FASTRTPS")}
         self.environment = {**plain, **environment, "ROS_DOMAIN_ID": str(self.domain)}
         self.process = subprocess.Popen([sys.executable, ROBOT / "robot.py"], env=self.environment)
