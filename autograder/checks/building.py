@@ -68,8 +68,12 @@ class Package:
 
     @property
     def installed(self) -> list[str]:
-        """What the build installs, as paths below the package's folder in `install`, but for Python's own records."""
-        return sorted(path for path in self._build().files if not _RECORDS.search(path))
+        """What the build installs, as paths below the package's folder in `install`, but for Python's own records.
+
+        Nothing if it failed.
+        """
+        built = self._build()
+        return [] if built.status else sorted(path for path in built.files if not _RECORDS.search(path))
 
     def expect_built(self, hint: str = "") -> None:
         """`colcon build` builds the package.
