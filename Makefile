@@ -68,10 +68,10 @@ wheel: setup-dev ## build the kit as a wheel, for courses elsewhere, into build/
 
 # Twice as many workers as two cores: most tests wait for messages rather than compute.
 test: setup-dev ## run every test, ruff and mypy among them
-	@$(RUN) python -m pytest -n 4 --dist loadgroup --no-loadscope-reorder $(ARGS)
+	@$(RUN) python -m pytest -n 4 --dist loadfile --no-loadscope-reorder $(ARGS)
 
 test-all: setup-dev ## the same, with every check run on every sample student
-	@$(RUN) python -m pytest -n 4 --dist loadgroup --no-loadscope-reorder --complete $(ARGS)
+	@$(RUN) python -m pytest -n 4 --dist loadfile --no-loadscope-reorder --complete $(ARGS)
 
 lint: setup-dev ## ruff, its formatting, and mypy --strict
 	@$(RUN) ruff check .

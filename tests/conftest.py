@@ -18,6 +18,7 @@ LONGEST = (
     "test_lectures",
     "test_building",
     "test_lecture_claims",
+    "test_checks",
     "test_attacks",
     "test_setup",
     "test_cli",
@@ -29,13 +30,11 @@ LONGEST = (
     "test_ros2",
     "test_diagnosis",
     "test_notebook",
+    "test_graded_attacks",
+    "test_graph",
+    "test_worker_limits",
 )
 """Files that take long from their first test to their last, the longest first."""
-FILLS = ("test_graded_attacks", "test_graph", "test_worker_limits", "test_checks")
-"""Files that come last, in many small pieces, so that the workers end together."""
-ALONE = {"test_lecture_claims", "test_nbgrader_doors", "test_worker_limits", "test_checks"}
-"""Files whose tests share nothing: each test goes to the worker that is free. The others' go to one worker together."""
-
 # A shell starts what it puts into the background deaf to Ctrl-C, and so would be every program that a test interrupts.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
@@ -52,22 +51,13 @@ def pytest_configure(config: pytest.Config) -> None:
     )
 
 
-@pytest.hookimpl(tryfirst=True)  # pytest-xdist reads the groups after that
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Begin with what takes longest, so that no worker is left alone with it in the end."""
     if not config.getoption("complete"):
         left_out = [item for item in items if item.get_closest_marker("complete")]
         config.hook.pytest_deselected(items=left_out)
         items[:] = [item for item in items if item not in left_out]
-    items.sort(key=_place)
-    for item in items:
-        if item.path.stem not in ALONE:
-            item.add_marker(pytest.mark.xdist_group(item.path.stem))
-
-
-def _place(item: pytest.Item) -> int:
-    name = item.path.stem
-    return LONGEST.index(name) if name in LONGEST else len(LONGEST) + 1 + (FILLS.index(name) if name in FILLS else -1)
+    items.sort(key=lambda item: (*LONGEST, item.path.stem).index(item.path.stem))
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
