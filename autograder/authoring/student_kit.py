@@ -25,22 +25,13 @@ from autograder.setup.places import ROOT, STUDENT_LOCK
 
 NAME = "ros2-labs"
 """Of the folder, and of the zip."""
-INSTRUCTORS = (
-    "authoring",
-    "gradebook",
-    "intake/collect.py",
-    "intake/formats.py",
-    "intake/members.py",
-    "intake/roster.py",
-    "cli/explain.py",
-    "cli/grade.py",
-    "cli/instructors.py",
-    "cli/labs.py",
-    "cli/results.py",
-    "report/class_page.py",
-    "report/templates/class.html",
-)
+INSTRUCTORS = ("authoring", "gradebook", "report/class_page.py", "report/templates/class.html")
 """What of the package `autograder` students do without."""
+STUDENTS = {
+    "cli": ("__init__", "app", "check", "doctor", "jupyter", "machine", "main", "package", "ros2", "submit"),
+    "intake": ("__init__", "record"),
+}
+"""The modules of a folder that students need; the others are an instructor's."""
 
 _TEMPLATES = Path(__file__).with_name("templates") / "kit"
 _PLACES = {
@@ -115,7 +106,11 @@ def build_wheel(into: Path) -> Path:
         for file in ("README.md", "LICENSE"):
             shutil.copy(ROOT / file, source)
         shutil.copytree(ROOT / "autograder", source / "autograder", ignore=_NOT_OURS)
-        for path in (source / "autograder" / one for one in INSTRUCTORS):
+        package = source / "autograder"
+        dropped = [package / one for one in INSTRUCTORS]
+        for folder, kept in STUDENTS.items():
+            dropped += [path for path in (package / folder).glob("*.py") if path.stem not in kept]
+        for path in dropped:
             shutil.rmtree(path) if path.is_dir() else path.unlink(missing_ok=True)
         # nbgrader's configuration is an instructor's.
         project = (ROOT / "pyproject.toml").read_text(encoding="utf-8")

@@ -14,7 +14,9 @@ LINES = 100
 _MORE = "[more is in ros.log()]"
 _LEVEL = re.compile(r"\[(WARN|ERROR|FATAL)\]")
 _COLOUR = {"WARN": "#b35900", "ERROR": "#d55e00", "FATAL": "#d55e00"}
-_STYLE = "white-space:pre-wrap; overflow-wrap:anywhere; margin:0 0 0 18px; color:inherit; font-size:13px"
+_STYLE = (
+    "white-space:pre-wrap; word-break:normal; overflow-wrap:anywhere; margin:0 0 0 18px; color:inherit; font-size:13px"
+)
 
 
 class Stream:
