@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import json
 from pathlib import Path
 
 import pytest
@@ -34,6 +35,13 @@ def test_students_receive_neither_solutions_nor_hidden_tests(lab: str) -> None:
     assert CODE_STUB in text
     # Besides the notebook nothing may lie in a lab's folder that its author has not meant to give out.
     assert not [path for path in released_files(ROOT, lab) if path.suffix in (".py", ".pyc", ".db")]
+
+
+@pytest.mark.parametrize("lab", LABS)
+def test_no_cell_of_a_file_is_empty_which_ipython_refuses_to_run(lab: str) -> None:
+    cells = json.loads((ROOT / "labs" / lab / f"{lab}.ipynb").read_text(encoding="utf-8"))["cells"]
+    sources = ["".join(cell["source"]) for cell in cells if cell["cell_type"] == "code"]
+    assert not [source for source in sources if source.startswith("%%") and not source.partition("\n")[2].strip()]
 
 
 @pytest.mark.parametrize("lab", LABS)
