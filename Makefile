@@ -70,7 +70,7 @@ wheel: setup-dev ## build the kit as a wheel, for courses elsewhere, into build/
 test: setup-dev ## run every test, ruff and mypy among them
 	@$(RUN) python -m pytest -n 4 --dist loadfile --no-loadscope-reorder $(ARGS)
 
-test-all: setup-dev ## the same, with every check run on every sample student
+test-all: setup-dev ## the same, with every check run on every sample student, and every lab in a browser
 	@$(RUN) python -m pytest -n 4 --dist loadfile --no-loadscope-reorder --complete $(ARGS)
 
 lint: setup-dev ## ruff, its formatting, and mypy --strict

@@ -35,6 +35,7 @@ LONGEST = (
     "test_worker_limits",
 )
 """Files that take long from their first test to their last, the longest first."""
+
 # A shell starts what it puts into the background deaf to Ctrl-C, and so would be every program that a test interrupts.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
