@@ -26,7 +26,7 @@ Path(os.environ["ROS_LOG_DIR"]).mkdir(parents=True, exist_ok=True)
 # A page that runs the command `autograder` means the one of this environment.
 os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])
 
-project = "ROS 2 in Python: executors, names, lifecycle, quality of service"
+project = "ROS 2 in Python"
 author = "The course kit's authors"
 language = "en"
 extensions = ["myst_nb", "sphinx_revealjs", "slides", "talk", "programs", "drawings", "claims", "reference", "tables"]
