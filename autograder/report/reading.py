@@ -59,6 +59,15 @@ SECTIONS: dict[tuple[int, str], str] = {
     (5, "Deadline"): "qos-deadline",
     (5, "Liveliness"): "qos-liveliness qos-lease",
     (5, "Lifespan"): "qos-lifespan lifespan",
+    (6, "A server"): "execute-return no-succeed goal-return no-feedback",
+    (6, "A second thread"): "goal-holds-thread goal-holds-group",
+    (6, "How a goal ends"): "execute-exception cancel-return no-cancel-callback",
+    (6, "Look into an action"): "no-action action-name",
+    (7, "What makes a folder a package"): "package-xml package-name package-file package-depend",
+    (7, "Interfaces are built"): (
+        "interface-line interface-parts interface-file interface-type interface-dependency interface-group"
+        " interface-fields"
+    ),
 }
 """The section of a lecture, and the codes of the reasons that it explains. A test holds the sections and the codes."""
 
