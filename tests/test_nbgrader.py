@@ -11,6 +11,7 @@ import shutil
 import sqlite3
 import subprocess
 import sys
+from importlib.machinery import PathFinder
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +27,7 @@ from autograder.gradebook.preparation import prepare_nbgrader
 from autograder.gradebook.recorder import Recorder
 from autograder.gradebook.release import register
 from autograder.gradebook.scores import read_grades
-from autograder.gradebook.settings import TEMPLATE
+from autograder.gradebook.settings import TEMPLATE, settings_of
 from autograder.grading import runner
 from autograder.grading.executors import local
 from autograder.grading.runner import Settings
@@ -336,6 +337,16 @@ class PerHour(nbgrader.plugins.BasePlugin):
 
 get_config().AssignLatePenalties.plugin_class = PerHour
 """
+
+
+def test_a_courses_configuration_leaves_the_kit_where_python_finds_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "nbgrader_config.py").write_text(TEMPLATE.read_text(encoding="utf-8") + LATE, encoding="utf-8")
+    monkeypatch.setattr(sys, "path", [str(KIT), *(folder for folder in sys.path if folder != str(KIT))])
+    monkeypatch.chdir(KIT)
+    settings_of(tmp_path)
+    assert PathFinder.find_spec("autograder") is not None
 
 
 def test_who_is_late_has_the_same_score_everywhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,7 @@ from autograder.course.paths import CoursePaths
 from autograder.gradebook.backup import file_of
 
 CONFIG_FILE = "nbgrader_config.py"
+_KIT = str(Path(__file__).resolve().parents[2])
 TEMPLATE = Path(__file__).with_name("nbgrader_config.template")
 """A course's `nbgrader_config.py` as it begins, without settings of its own."""
 
@@ -33,10 +35,13 @@ def settings_of(root: Path) -> Any:
     config = Config()
     configure(config, root)
     if _says_more(root):
+        before = sys.path[:]
         try:
             config.merge(PyFileConfigLoader(CONFIG_FILE, str(root)).load_config())
         except (Exception, SystemExit) as error:
             raise KitError(f"{root / CONFIG_FILE} cannot be used: {error}", "Repair that line of it.") from error
+        finally:  # it takes the working folder out, which may be the one that the kit is imported from
+            sys.path += [folder for folder in before if folder == _KIT and folder not in sys.path]
     return config
 
 
