@@ -13,7 +13,7 @@ class FibonacciServer(Node):
     def __init__(self):
         super().__init__("fibonacci")
         self.declare_parameter("step", 0.5)  # seconds from one number to the next
-        self.step = 0.3
+        self.step = 0.5
         self.count = 0
         self.ticks = self.create_publisher(Int64, "ticks", 10)
         self.create_timer(0.1, self.tick)
