@@ -861,6 +861,47 @@ def test_what_a_message_sets_off_is_heard_from_the_first_one_on(grade: Grade, ec
     assert result.points == 2.0, result
 
 
+LATECOMER = """
+import time
+
+time.sleep(1.5)  # it reads a large map first
+
+import rclpy
+from rcl_interfaces.srv import ListParameters
+from rclpy.node import Node
+from std_msgs.msg import String
+
+
+def told(request, response):
+    print("asked", flush=True)
+    return response
+
+
+rclpy.init()
+node = Node("latecomer", start_parameter_services=False)
+node.create_service(ListParameters, "~/list_parameters", told)
+out = node.create_publisher(String, "late", 1)
+node.create_subscription(String, "again", out.publish, 10)
+rclpy.spin(node)
+"""
+
+
+def test_a_program_that_comes_up_after_the_first_message_is_asked_before_the_next_one(grade: Grade) -> None:
+    result = grade(
+        """\
+        with launch("echo", "latecomer", listen=[("/late", String)]) as ros:
+            ros.publish("/say", String(data="to the other one"))
+            ros.publish("/again", String(data="to it"))
+            ros.expect_messages("/late", String)
+            ros.require("asked" in ros.log("latecomer"), "It was asked whether it knows who listens", code="content")
+        ros.score(2)
+        """,
+        echo__py=ECHO,
+        latecomer__py=LATECOMER,
+    )
+    assert result.points == 2.0, result
+
+
 def test_one_run_of_a_program_is_killed_and_started_again_with_the_same_words(grade: Grade) -> None:
     result = grade(
         """\

@@ -11,7 +11,7 @@ from rcl_interfaces.srv import ListParameters
 from autograder.checks.expect.expectations import Expectations
 from autograder.checks.running import SETTLE
 from autograder.checks.settling import shows_all
-from autograder.diagnosis.events import read
+from autograder.diagnosis.events import Event, NodeSeen, ProbeFailed, read
 from autograder.graph.services import ServiceMissing, call_all
 
 MATCHES_WITHIN = 1.0
@@ -25,7 +25,7 @@ class Meeting(Expectations):
     """Nodes and the observer get to know each other."""
 
     _introduced = (0, 0)
-    """How many recordings and programs there were when all that the programs had made was found."""
+    """How many recordings and programs there were when all programs had made their nodes, and these were asked."""
 
     @cached_property
     def _met(self) -> dict[str, int]:
@@ -71,14 +71,23 @@ class Meeting(Expectations):
         if self._introduced == (recorded, started):
             self._observer.wait(self._observer.hears_all, MATCHES_WITHIN)
             return
-        self._introduced = (recorded, started)
+        complete = self._all_begun()
         for _ in range(2):  # an answer may come from a program that has made more nodes before it
             self._observer.wait(self._hears_programs, MATCHES_WITHIN)
             strangers = [name for name in sorted(set(self._observer.nodes())) if self._met.get(name, 0) < recorded]
             for name in strangers[:_ASKED]:
                 self._settle(name)
+        if complete:  # a program that comes up later is asked before what is sent then
+            self._introduced = (recorded, started)
 
     def _hears_programs(self) -> bool:
         """Whether the observer has found all that the programs have said they made, and hears it."""
-        running = [program for _, program in self._running.programs if program.running()]
-        return self._observer.hears_all() and all(shows_all(self._observer, read(one.events())) for one in running)
+        return self._observer.hears_all() and all(shows_all(self._observer, told) for told in self._told())
+
+    def _all_begun(self) -> bool:
+        """Whether each program has made a node, as far as its probe can tell."""
+        return all(any(isinstance(event, NodeSeen | ProbeFailed) for event in told) for told in self._told())
+
+    def _told(self) -> list[list[Event]]:
+        """What the probe of each program that runs has told."""
+        return [read(program.events()) for _, program in self._running.programs if program.running()]
