@@ -11,7 +11,9 @@ from pathlib import Path
 import toy
 
 from autograder.course.lab import grade_id_of
-from autograder.gradebook.settings import TEMPLATE
+from autograder.gradebook.class_run import grade_class
+from autograder.gradebook.settings import TEMPLATE, settings_of
+from autograder.grading.runner import Settings
 
 KIT = Path(__file__).resolve().parent.parent
 
@@ -66,3 +68,12 @@ def test_a_lab_goes_out_and_feedback_comes_back_through_the_exchange(tmp_path: P
     nbgrader(student, "fetch_feedback", "toy", "--CourseDirectory.student_id=ann")
     (page,) = student.glob("toy/feedback/*/toy.html")
     assert page.read_bytes() == (root / "build" / "feedback" / "ann" / "toy" / "toy.html").read_bytes()
+
+    # The same once more, taken by the kit's own intake: nothing is run again, and the page is found by the new secret.
+    nbgrader(student, "submit", "toy", "--CourseDirectory.student_id=ann")
+    settings_of.cache_clear()
+    run = grade_class(root, toy.LAB, tmp_path / "exchange" / "ros2" / "inbound", Settings())
+    assert run.collected.format == "nbgrader's exchange" and [one.student for one in run.results] == ["ann"]
+    nbgrader(root, "release_feedback", "toy")
+    nbgrader(student, "fetch_feedback", "toy", "--CourseDirectory.student_id=ann")
+    assert len(list(student.glob("toy/feedback/*/toy.html"))) == 2

@@ -100,7 +100,8 @@ PLATFORMS: dict[str, tuple[str, dict[str, str], dict[str, str], dict[str, str]]]
         {
             "inbound/jd01+toy+2026-11-19 10:00:00.000000 UTC+a1/toy.ipynb": "first",
             "inbound/jd01+toy+2026-11-20 10:00:00.000000 UTC+b2/toy.ipynb": "second",
-            "inbound/mm02+toy+2026-11-18 10:00:00.000000 UTC+c3/toy.ipynb": "jm",
+            "inbound/jd01+toy+2026-11-20 10:00:00.000000 UTC+b2/submission_secret.txt": "b2b2",
+            "inbound/mm02+toy+2026-11-18 10:00:00.000000 UTC/toy.ipynb": "jm",
             "inbound/mm02+other+2026-11-18 10:00:00.000000 UTC+c3/other.ipynb": "another lab",
         },
         {"jd01": "second", "mm02": "jm"},
@@ -173,6 +174,14 @@ def test_when_it_was_handed_in_is_kept(tmp_path: Path) -> None:
         collected = collect(lay_out(PLATFORMS[name][1], place, False), toy.LAB, place / "course")
         stamp = collected.notebooks["jd01"].with_name(timestamp.FILE_NAME)
         assert stamp.read_text() == moment
+
+
+def test_by_what_the_exchange_knows_feedback_is_kept_as_long_as_a_submission_is_from_there(tmp_path: Path) -> None:
+    for name, secret in (("exchange", "b2b2"), ("submitted", "")):
+        (tmp_path / name).mkdir()
+        collected = collect(lay_out(PLATFORMS[name][1], tmp_path / name, True), toy.LAB, tmp_path / "course")
+        file = collected.notebooks["jd01"].with_name("submission_secret.txt")
+        assert (file.read_text() if file.is_file() else "") == secret
 
 
 def test_who_is_not_in_the_roster_is_left_out_and_named(tmp_path: Path) -> None:

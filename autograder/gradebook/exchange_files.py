@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import copy
 import datetime
-import re
 import secrets
 from pathlib import Path
 from typing import Any
@@ -13,11 +12,7 @@ from typing import Any
 from nbgrader.exchange.default import ExchangeCollect
 
 from autograder.core.files import read_plain, write_beside
-from autograder.submission import timestamp
-
-SECRET = "submission_secret.txt"
-"""The file by whose text `nbgrader fetch_feedback` knows a student's feedback."""
-_SECRET = re.compile(r"[0-9a-f]{1,512}", re.ASCII)
+from autograder.submission import exchange_secret, timestamp
 
 
 class CollectNotebooks(ExchangeCollect):  # type: ignore[misc]
@@ -28,7 +23,7 @@ class CollectNotebooks(ExchangeCollect):  # type: ignore[misc]
     def do_copy(self, src: str, dest: str, log: Any = None) -> None:
         """Copy one submission."""
         self.coursedir = copy.copy(self.coursedir)
-        self.coursedir.include = ["*.ipynb", timestamp.FILE_NAME, SECRET]
+        self.coursedir.include = ["*.ipynb", timestamp.FILE_NAME, exchange_secret.FILE_NAME]
         super().do_copy(src, dest, log)
 
 
@@ -61,8 +56,8 @@ def complete(submitted: Path, feedback: Path) -> None:
     if not (feedback / timestamp.FILE_NAME).exists():
         now = datetime.datetime.now(datetime.UTC)
         write_beside(feedback / timestamp.FILE_NAME, f"{now:%Y-%m-%d %H:%M:%S} UTC")
-    if not (feedback / SECRET).exists():
-        write_beside(feedback / SECRET, secrets.token_hex(64))
+    if not (feedback / exchange_secret.FILE_NAME).exists():
+        write_beside(feedback / exchange_secret.FILE_NAME, secrets.token_hex(64))
 
 
 def _moment(submitted: Path) -> tuple[str, str]:
@@ -74,6 +69,6 @@ def _moment(submitted: Path) -> tuple[str, str]:
 
 def _secret(submitted: Path) -> tuple[str, str]:
     with contextlib.suppress(OSError):
-        text = read_plain(submitted, [SECRET], 1000).decode("ascii", "replace").strip()
-        return SECRET, text if _SECRET.fullmatch(text) else ""
-    return SECRET, ""
+        content = read_plain(submitted, [exchange_secret.FILE_NAME], exchange_secret.MOST_BYTES)
+        return exchange_secret.FILE_NAME, exchange_secret.secret(content)
+    return exchange_secret.FILE_NAME, ""

@@ -1,6 +1,6 @@
 """Takes in what was handed in: a folder or a zip with a folder for each student, into `build/submitted`.
 
-Of each student only the lab's notebook is taken, as bytes, and when it was handed in. Names are checked, links are not
+Of each student only the lab's notebook is taken, as bytes, and what nbgrader's exchange puts beside it. Names are checked, links are not
 followed, nothing is unpacked to a place that a name in a zip could choose. What is not taken is said, and costs nobody
 else anything.
 """
@@ -24,7 +24,7 @@ from autograder.intake.members import members
 from autograder.intake.plain_class import HandedIn, plain_class
 from autograder.intake.record import Taken, keep_class
 from autograder.intake.roster import FILE_NAME, Roster, read_roster
-from autograder.submission import timestamp
+from autograder.submission import exchange_secret, timestamp
 from autograder.submission.notebook_file import NOTEBOOK_BYTES
 
 _NAME_BYTES = 120
@@ -95,7 +95,11 @@ def collect(source: Path, lab: str, root: Path) -> Collected:
         if _read(paths.submitted, [student, lab, path.name]) != handed_in.notebook:
             _make_room(paths.submitted, student, lab)
             write_beside(path, handed_in.notebook)
-        _keep_timestamp(paths.submitted, student, lab, handed_in.timestamp, collected.refused)
+        said = timestamp.moment(handed_in.timestamp) if handed_in.timestamp else ""
+        if said is None:
+            collected.refused.append(f"{timestamp.FILE_NAME} of {student} is no date and time; it was left out.")
+        _keep(paths.submitted, [student, lab, timestamp.FILE_NAME], said or "")
+        _keep(paths.submitted, [student, lab, exchange_secret.FILE_NAME], handed_in.secret)
         collected.notebooks[student] = path
         taken[student] = Taken(
             source=str(source.resolve()), file=handed_in.file, owner=dict(handed_in.owner), late=handed_in.late
@@ -138,7 +142,9 @@ def _of_platform(source: Path, lab: str, roster: Roster | None, collected: Colle
                 f"{last.member.name[:100]!r} of {student} cannot be read ({error}); it was left out."
             )
             continue
-        found[student] = HandedIn(content, last.handed_in.encode(), "/".join(last.member.path), last.owner, last.late)
+        found[student] = HandedIn(
+            content, last.handed_in.encode(), last.secret, "/".join(last.member.path), last.owner, last.late
+        )
         for claim in earlier:
             collected.notes.append(f"{student}: {last.member.name[:100]!r} replaces {claim.member.name[:100]!r}.")
         if last.late:
@@ -166,16 +172,13 @@ def _by_roster(found: dict[str, HandedIn], roster: Roster, collected: Collected)
     return named
 
 
-def _keep_timestamp(submitted: Path, student: str, lab: str, content: bytes, refused: list[str]) -> None:
-    """Write when a student handed in to where nbgrader looks for it, which decides about penalties."""
-    path = submitted / student / lab / timestamp.FILE_NAME
-    said = timestamp.moment(content) if content else ""
-    if said is None:
-        refused.append(f"{timestamp.FILE_NAME} of {student} is no date and time; it was left out.")
-    if not said:
+def _keep(submitted: Path, parts: Sequence[str], text: str) -> None:
+    """Write what nbgrader looks for beside a notebook: when it was handed in, and how feedback on it is fetched."""
+    path = submitted.joinpath(*parts)
+    if not text:
         path.unlink(missing_ok=True)
-    elif _read(submitted, [student, lab, path.name]) != said.encode():
-        write_beside(path, said)
+    elif _read(submitted, parts) != text.encode():
+        write_beside(path, text)
 
 
 def _student(folder: str) -> str | None:

@@ -6,6 +6,7 @@ which of several submissions of one student is the last. Sources: the platforms'
 
 from __future__ import annotations
 
+import contextlib
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -14,9 +15,9 @@ from typing import Any
 import yaml
 
 from autograder.intake.members import Member
+from autograder.submission import exchange_secret, timestamp
 from autograder.submission.timestamp import moment
 
-_STAMP_BYTES = 200
 _METADATA_BYTES = 8 * 1024 * 1024
 
 
@@ -33,6 +34,8 @@ class Claim:
     """Date and time, as nbgrader reads them; empty if nothing says so."""
     late: bool = False
     """The platform has marked it as late."""
+    secret: str = ""
+    """By what nbgrader's exchange knows the feedback on it; empty if it did not come from there."""
 
 
 @dataclass
@@ -51,8 +54,9 @@ _MOODLE = re.compile(r"(?P<name>.+)_(?P<id>\d+)_assignsubmission_(?P<kind>\w+?)_
 """The folder `Jane Doe_12345_assignsubmission_file_`."""
 _BLACKBOARD = re.compile(r".+?_(?P<user>[^_]+)_attempt_(?P<when>\d{4}(?:-\d\d){5})(?:_(?P<file>.+)|\.txt)")
 """`Lab 2_jdoe_attempt_2026-11-20-18-30-00_lab2_executors.ipynb`, and a text with the same beginning."""
-_INBOUND = re.compile(r"(?P<student>.+?)\+(?P<lab>[^+]+)\+(?P<when>\d{4}-\d\d-\d\d \d\d:\d\d:\d\d(\.\d+)?[^+]*)\+.+")
-"""nbgrader's exchange: `inbound/jane+lab2_executors+2026-11-20 18:30:00.123456 UTC+Hc2x`."""
+_INBOUND = re.compile(r"(?P<student>.+?)\+(?P<lab>[^+]+)\+(?P<when>\d{4}-\d\d-\d\d \d\d:\d\d:\d\d(\.\d+)?[^+]*)(\+.+)?")
+"""nbgrader's exchange: `inbound/jane+lab2_executors+2026-11-20 18:30:00.123456 UTC+Hc2x`. What stands behind the time
+keeps others from guessing the folder's name, and may be switched off; it says nothing about the student."""
 _SUBMISSION = re.compile(r"submission_(?P<number>\d+)")
 """Gradescope's folders; whose they are stands in `submission_metadata.yml`."""
 
@@ -144,24 +148,41 @@ def _gradescope_metadata(member: Member) -> dict[str, tuple[dict[str, str], str]
 def exchange(files: Sequence[Member], lab: str) -> Recognised:
     """nbgrader's exchange, before `collect`: the folder `inbound`."""
     found = Recognised("nbgrader's exchange")
+    secrets = _secrets(files)
     for member in files:
         for part in member.path[:-1]:
             match = _INBOUND.fullmatch(part)
             if match and match["lab"] == lab and member.name == f"{lab}.ipynb":
-                found.claims.append(Claim(member, {"id": match["student"]}, (match["when"],), match["when"]))
+                owner, when, secret = {"id": match["student"]}, match["when"], secrets.get(member.path[:-1], "")
+                found.claims.append(Claim(member, owner, (when,), when, secret=secret))
     return found
 
 
 def submitted(files: Sequence[Member], lab: str) -> Recognised:
     """nbgrader's `submitted` folder, or a whole course with one: `submitted/STUDENT/LAB/LAB.ipynb`."""
     found = Recognised("nbgrader's folder submitted")
-    stamps = {member.path[:-1]: member for member in files if member.name == "timestamp.txt"}
+    stamps = {member.path[:-1]: member for member in files if member.name == timestamp.FILE_NAME}
+    secrets = _secrets(files)
     for member in files:
         if member.path[-4:-3] == ("submitted",) and member.path[-2:] == (lab, f"{lab}.ipynb"):
             stamp = stamps.get(member.path[:-1])
-            when = moment(stamp.read(_STAMP_BYTES)) if stamp is not None else ""
-            found.claims.append(Claim(member, {"id": member.path[-3]}, (), when or ""))
+            when = moment(_start(stamp, timestamp.MOST_BYTES)) if stamp is not None else ""
+            secret = secrets.get(member.path[:-1], "")
+            found.claims.append(Claim(member, {"id": member.path[-3]}, (), when or "", secret=secret))
     return found
+
+
+def _secrets(files: Sequence[Member]) -> dict[tuple[str, ...], str]:
+    """What nbgrader's exchange put beside notebooks, by folder."""
+    named = [member for member in files if member.name == exchange_secret.FILE_NAME]
+    return {member.path[:-1]: exchange_secret.secret(_start(member, exchange_secret.MOST_BYTES)) for member in named}
+
+
+def _start(member: Member, most: int) -> bytes:
+    """How a file begins; nothing if it cannot be read, which in a damaged zip has many kinds."""
+    with contextlib.suppress(Exception):
+        return member.read(most)
+    return b""
 
 
 def classroom(files: Sequence[Member], lab: str) -> Recognised:

@@ -12,7 +12,7 @@ from pathlib import Path, PurePosixPath
 from autograder.core.errors import KitError
 from autograder.core.files import read_plain
 from autograder.intake.members import member_name, members
-from autograder.submission import timestamp
+from autograder.submission import exchange_secret, timestamp
 from autograder.submission.notebook_file import NOTEBOOK_BYTES
 
 _PACKERS_PREFIXES = (".", "__MACOSX")
@@ -35,6 +35,8 @@ class HandedIn:
     """Empty: there is none that can be used."""
     timestamp: bytes = b""
     """Empty: nothing says when it was handed in."""
+    secret: str = ""
+    """As in `Claim`."""
     file: str = ""
     owner: Mapping[str, str] = field(default_factory=dict)
     late: bool = False
@@ -69,7 +71,7 @@ def _from_folder(source: Path, lab: str, refused: list[str]) -> dict[str, Handed
                 refused.append(f"{_shown(entry)} {reason}; it was left out.")
         elif entry.is_dir():
             try:
-                found[entry.name] = HandedIn(_notebook_in(source, entry.name, lab), _stamp_in(source, entry.name, lab))
+                found[entry.name] = _handed_in(source, entry.name, lab)
             except OSError as error:  # such as a folder that may not be entered: the class goes on
                 refused.append(f"{_shown(entry)} cannot be read ({error.strerror}); it was left out.")
             except _NotUnderstood as reason:
@@ -135,17 +137,27 @@ def _choose(paths: Sequence[tuple[str, ...]], lab: str) -> tuple[str, ...]:
         return (named or notebooks)[0]
     if notebooks:
         raise _NotUnderstood(f"holds {len(notebooks)} notebooks, of which none is called {lab}.ipynb")
-    strange = [path[-1] for path in paths if path[-1] != timestamp.FILE_NAME and not path[-1].startswith(".")]
+    ours = (timestamp.FILE_NAME, exchange_secret.FILE_NAME)
+    strange = [path[-1] for path in paths if path[-1] not in ours and not path[-1].startswith(".")]
     if strange:
         raise _NotUnderstood(f"holds {strange[0][:80]!r} and no notebook")
     return ()
 
 
-def _stamp_in(source: Path, student: str, lab: str) -> bytes:
-    for folders in ([], [lab]):
-        with contextlib.suppress(OSError):
-            return read_plain(source, [student, *folders, timestamp.FILE_NAME], timestamp.MOST_BYTES)
-    return b""
+def _handed_in(source: Path, student: str, lab: str) -> HandedIn:
+    """What lies in a student's folder; raises as `_notebook_in`."""
+
+    def beside(name: str, most: int) -> bytes:
+        for folders in ([], [lab]):
+            with contextlib.suppress(OSError):
+                return read_plain(source, [student, *folders, name], most)
+        return b""
+
+    return HandedIn(
+        _notebook_in(source, student, lab),
+        beside(timestamp.FILE_NAME, timestamp.MOST_BYTES),
+        exchange_secret.secret(beside(exchange_secret.FILE_NAME, exchange_secret.MOST_BYTES)),
+    )
 
 
 def _open_zip(source: Path, lab: str) -> zipfile.ZipFile:
@@ -175,10 +187,13 @@ def _from_zip(source: Path, lab: str, refused: list[str]) -> dict[str, HandedIn]
         for student, files in students.items():
             try:
                 chosen = _choose([rest for rest in files if len(rest) == 1 or rest[:-1] == (lab,)], lab)
-                stamp = files.get((timestamp.FILE_NAME,)) or files.get((lab, timestamp.FILE_NAME))
+                stamp, secret = (
+                    files.get((name,)) or files.get((lab, name)) for name in (timestamp.FILE_NAME, exchange_secret.FILE_NAME)
+                )
                 found[student] = HandedIn(
                     _member(archive, files[chosen]) if chosen else b"",
                     _member(archive, stamp)[: timestamp.MOST_BYTES] if stamp else b"",
+                    exchange_secret.secret(_member(archive, secret)) if secret else "",
                 )
             except _NotUnderstood as reason:
                 refused.append(f"{student[:80]!r} {reason}; it was left out.")
