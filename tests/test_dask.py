@@ -94,7 +94,9 @@ def test_a_killed_worker_costs_no_result_and_another_kit_is_refused(
                 family.extend(first.children(recursive=True))
                 first.kill()
 
-        results = run_class(class_, course, lab, settings, kill_the_first)
+        begun: list[str] = []
+        results = run_class(class_, course, lab, settings, kill_the_first, begun.append)
+        assert set(begun) == set(class_)  # whose names are shown while they run
         assert {student: result.points for student, result in results.items()} == dict.fromkeys(class_, 5.0)
         assert psutil.wait_procs(family, timeout=30)[1] == []
 

@@ -9,6 +9,7 @@ from autograder.course.lab import CODE_STUB, TEXT_STUB
 from autograder.course.paths import CoursePaths
 from autograder.gradebook.autograde import AUTOGRADE, SANITIZE, SubmissionExporter
 from autograder.gradebook.exchange_files import CollectNotebooks
+from autograder.gradebook.export_plugin import ExportOfClass
 from autograder.gradebook.feedback import FeedbackExporter
 from autograder.gradebook.released_notebook import RELEASE, WITHOUT_GRADEBOOK
 
@@ -34,6 +35,7 @@ def configure(config: Any, root: Path) -> None:
     course.db_url = paths.gradebook_url
     course.ignore = NOT_RELEASED
     config.ExchangeFactory.collect = CollectNotebooks
+    config.ExportApp.plugin_class = ExportOfClass
     config.Autograde.exporter_class = SubmissionExporter
     config.Autograde.sanitize_preprocessors = SANITIZE
     config.Autograde.autograde_preprocessors = AUTOGRADE

@@ -26,7 +26,8 @@ class Steps:
     def __init__(self, total: int, console: Console) -> None:
         """Show nothing yet."""
         self._console, self.total, self.done, self._ran = console, total, 0, 0
-        self._at_work: list[str] = []
+        self._at_work: dict[str, None] = {}
+        self._finished: set[str] = set()
         self._began = 0.0
         self._lock = threading.Lock()
         columns = (
@@ -48,18 +49,20 @@ class Steps:
         self._progress.stop()
 
     def started(self, student: str) -> None:
-        """A submission has begun to run; may be called in any thread."""
+        """A submission has begun to run; may be called in any thread, more than once, and after its end."""
         with self._lock:
             self._began = self._began or time.monotonic()
-            self._at_work.append(student)
+            if student not in self._finished:
+                self._at_work[student] = None
         self._progress.update(self._task, more=self._more())
 
     def finished(self, result: SubmissionResult) -> None:
         """A result is there and kept."""
         self.done += 1
         with self._lock:
+            self._finished.add(result.student)
             if result.student in self._at_work:
-                self._at_work.remove(result.student)
+                del self._at_work[result.student]
                 self._ran += 1
         self._progress.update(self._task, advance=1, more=self._more())
         trouble = _trouble(result)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, TypeVar
 from autograder.core.grades import Grade
 from autograder.gradebook.reading import grades_in
 from autograder.gradebook.settings import gradebook_address, gradebook_file
-from autograder.intake.record import read_class
+from autograder.intake.record import left_class
 
 if TYPE_CHECKING:
     from sqlalchemy.engine import Connection
@@ -41,6 +41,5 @@ def read_grades(root: Path, lab: str = "") -> list[Grade]:
     """
     nobody: list[Grade] = []
     grades = ask(root, lambda connection: grades_in(connection, lab), nobody)
-    classes = {name: read_class(root, name) for name in {grade.lab for grade in grades}}
-    left = {(name, who) for name, class_ in classes.items() for who, taken in class_.items() if taken.left}
-    return [grade for grade in grades if (grade.lab, grade.student) not in left]
+    left = {name: left_class(root, name) for name in {grade.lab for grade in grades}}
+    return [grade for grade in grades if grade.student not in left[grade.lab]]

@@ -37,7 +37,7 @@ def run_class(
         lab: that they answer.
         settings: how to run them.
         on_result: called in this thread for each result as it arrives.
-        on_start: called, in any thread, with each student whose submission begins to run, if the executor can tell.
+        on_start: called, in any thread, with each student whose submission begins to run.
         tried: keep what is run apart from the results, for nothing of it is to count yet; a later run takes it from
             there.
 

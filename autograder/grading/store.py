@@ -9,7 +9,7 @@ from autograder.core.results import SCHEMA_VERSION, Isolation, SubmissionResult
 from autograder.course.lab import Lab
 from autograder.course.paths import CoursePaths
 from autograder.grading.validation import validated
-from autograder.intake.record import read_class
+from autograder.intake.record import left_class
 
 
 class ResultStore:
@@ -70,7 +70,7 @@ class ResultStore:
         """
         results = []
         for folder in sorted(self._folder.glob(lab or "*")):
-            left = {student for student, taken in read_class(self._root, folder.name).items() if taken.left}
+            left = left_class(self._root, folder.name)
             for path in sorted(folder.glob("*.json")):
                 if path.stem not in left:
                     with contextlib.suppress(OSError, ValueError):

@@ -39,6 +39,11 @@ def read_class(root: Path, lab: str) -> dict[str, Taken]:
         return {}
 
 
+def left_class(root: Path, lab: str) -> set[str]:
+    """Return who has left the class of a lab."""
+    return {student for student, taken in read_class(root, lab).items() if taken.left}
+
+
 def keep_class(root: Path, lab: str, source: Path, taken: Mapping[str, Taken], complete: bool) -> list[str]:
     """Note what was taken in from a source.
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import logging
+import uuid
 from collections.abc import Callable, Generator, Sequence
 from typing import Any
 
@@ -35,17 +36,19 @@ class Dask:
         self._address = address
 
     def run(self, jobs: Sequence[Job], started: Callable[[str], None]) -> Generator[SubmissionResult, None, None]:
-        """Run jobs, as `Executor.run` says; a cluster does not tell when one begins."""
+        """Run jobs, as `Executor.run` says; one that another worker takes over begins once more."""
         if not jobs:
             return
         client = self._client()
         try:
             from distributed import as_completed
 
-            kit = kit_digest()
+            kit, begun = kit_digest(), f"autograder {uuid.uuid4()}"
+            client.subscribe_topic(begun, lambda event: started(event[1]))
             texts = {job.student: job.model_dump_json() for job in jobs}
+            digests = {student: hashlib.sha256(text.encode()).hexdigest() for student, text in texts.items()}
             futures = {
-                client.submit(run_there, text, hashlib.sha256(text.encode()).hexdigest(), kit, pure=False): student
+                client.submit(run_there, text, digests[student], kit, begun, pure=False): student
                 for student, text in texts.items()
             }
             by_student = {job.student: job for job in jobs}
@@ -101,13 +104,14 @@ class Dask:
             return unknown(job, f"The grading process failed: {type(error).__name__}.", str(error))
 
 
-def run_there(text: str, digest: str, kit: str) -> str:
+def run_there(text: str, digest: str, kit: str, begun: str) -> str:
     """Run one job on a worker of the cluster, and return its result as JSON.
 
     Args:
         text: the job as JSON: the submission, and the lab's cells.
         digest: of that text, which must have arrived as it was sent.
         kit: the digest of the kit that the verdicts have to come from.
+        begun: the topic under which it is told whose job begins.
 
     Raises:
         OtherKit: this machine has another one, or got another job.
@@ -116,4 +120,6 @@ def run_there(text: str, digest: str, kit: str) -> str:
 
     if hashlib.sha256(text.encode()).hexdigest() != digest or kit_digest() != kit:
         raise OtherKit(f"The Dask worker at {get_worker().address} has another kit than this, or got another job.")
-    return run_in_worker(Job.model_validate_json(text)).model_dump_json()
+    job = Job.model_validate_json(text)
+    get_worker().log_event(begun, job.student)
+    return run_in_worker(job).model_dump_json()

@@ -15,8 +15,8 @@ class Executor(Protocol):
     def run(self, jobs: Sequence[Job], started: Callable[[str], None]) -> Generator[SubmissionResult, None, None]:
         """Run jobs, several at once, and yield each result as soon as it is there, in whatever order.
 
-        `started` is called with each student whose job begins to run, in any thread; an executor that cannot tell
-        leaves that out.
+        `started` is called with each student whose job begins to run, in any thread; more than once if it
+        has to begin again, and from another machine perhaps late.
 
         A job that goes wrong costs no other job its result: it yields `supervisor.unknown`. When the generator
         is closed, as after Ctrl-C, everything is ended that still runs.
