@@ -236,6 +236,8 @@ def test_the_class_page_shows_what_needs_a_person(graded: Graded) -> None:
     text = page.read_text(encoding="utf-8")
     assert "3 students" in text and "mean <b>4.67</b>" in text and "median <b>2.5</b>" in text
     assert "1 student: " in text and "1 of 3" in text and "An answer in words" in text
+    assert text.count("handed in late") == 1 and text.index("Bob Müller") < text.index("handed in late")
+    assert "late: -1<" in text
     assert "check_talker" in text and "secret reason" in text and "<script>alert" not in text
     for student in FILES:
         assert f'href="../feedback/{student}/toy/toy.html"' in text

@@ -121,7 +121,7 @@ def test_a_class_is_graded_and_a_notebook_checked(environment: Environment, cour
     class_ = tmp_path / "class"
     solved = hand_in(course, class_, "ann", solved=True)
     hand_in(course, class_, "bob", solved=False)
-    environment.run(course, "autograder", "grade", LAB, class_)
+    environment.run(tmp_path, "autograder", "grade", LAB, class_, "--course", course)
     table = (course / "build" / "grades.csv").read_text(encoding="utf-8").splitlines()
     assert table[1:] == [f"ann,{LAB},5,5,0", f"bob,{LAB},0,5,0"]
     assert (course / "build" / "feedback" / "bob" / LAB / f"{LAB}.html").is_file()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -19,6 +20,11 @@ app = typer.Typer(
 IsolationOption = Annotated[
     Isolation, typer.Option(help="How programs are kept apart. Where `full` is missing, the command refuses.")
 ]
+CourseOption = Annotated[
+    Path | None,
+    typer.Option(help="The folder of the course; default: the one that you are in, or else the kit's own."),
+]
+"""Of who keeps a course. What a student handed in is checked by the kit's own course, wherever one is (`check`)."""
 ForceOption = Annotated[bool, typer.Option("--force", help="Run again even what did not change.")]
 SeedOption = Annotated[int | None, typer.Option(help="Repeat a run with the same varying values.")]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON for a program to read.")]

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from autograder.cli.app import app
+from autograder.cli.app import CourseOption, app
 from autograder.core.errors import KitError
 
 if TYPE_CHECKING:
@@ -20,6 +20,7 @@ def explain(
     student: Annotated[str, typer.Argument(help="Who handed it in.")],
     check: Annotated[str, typer.Argument(help="The check: its number, its id, or a part of its title.")] = "",
     lab: Annotated[str, typer.Option(help="The lab, if the student handed in several.")] = "",
+    course: CourseOption = None,
 ) -> None:
     """Show all that grading found out: outcomes, evidence, output, flags; pictures, and messages as an MCAP file.
 
@@ -29,7 +30,7 @@ def explain(
     from autograder.course.paths import CoursePaths
     from autograder.report.terminal import console, evidence_view, submission_view
 
-    root = course_root()
+    root = course_root(course)
     result = _result(root, student, lab)
     folder = CoursePaths(root).explained / result.lab / student
     screen = console()

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from autograder.cli.app import ForceOption, IsolationOption, JsonOption, SeedOption, app
+from autograder.cli.app import CourseOption, ForceOption, IsolationOption, JsonOption, SeedOption, app
 from autograder.core.errors import KitError
 from autograder.core.results import Isolation
 from autograder.course.paths import CoursePaths
@@ -42,6 +42,7 @@ def grade(
     diff: Annotated[
         bool, typer.Option("--diff", help="Only show what would change, such as after a change of a check.")
     ] = False,
+    course: CourseOption = None,
 ) -> None:
     """Grade a class: gradebook, grades, feedback, and a table of who lost points why.
 
@@ -50,7 +51,7 @@ def grade(
     from autograder.course.folder import course_root
     from autograder.grading.runner import Settings
 
-    root = course_root()
+    root = course_root(course)
     source = submissions or CoursePaths(root).sample_class(lab)
     if not source.exists():
         raise KitError(

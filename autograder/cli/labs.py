@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from autograder.cli.app import IsolationOption, app
+from autograder.cli.app import CourseOption, IsolationOption, app
 from autograder.core.results import Isolation
 
 new = typer.Typer(no_args_is_help=True)
@@ -30,12 +30,13 @@ def new_course(
 @new.command("lab")
 def new_lab(
     name: Annotated[str, typer.Argument(help="Such as lab2_talkers: small letters, digits, underscores.")],
+    course: CourseOption = None,
 ) -> None:
     """Write a small lab into the course, complete with checks, to be changed into yours."""
     from autograder.authoring.new import new_lab as write
     from autograder.course.folder import course_root
 
-    for path in write(course_root(), name):
+    for path in write(course_root(course), name):
         print(path)
 
 
@@ -45,6 +46,7 @@ def lint(
     static: Annotated[bool, typer.Option("--static", help="Only read it, and run nothing.")] = False,
     isolation: IsolationOption = Isolation.FULL,
     jobs: Annotated[int, typer.Option(min=1, help="How many runs at once.")] = 4,
+    course: CourseOption = None,
 ) -> None:
     """Say what is wrong with a lab: cells, checks, what students would receive, and what running it shows."""
     from autograder.authoring.lint.runs import run_findings
@@ -54,7 +56,7 @@ def lint(
     from autograder.gradebook.release import released_files
     from autograder.sandbox.isolation import choose
 
-    root = course_root()
+    root = course_root(course)
     errors = 0
     for name in [lab] if lab else lab_names(root):
         found = read_findings(root, name)
@@ -75,6 +77,7 @@ def lint(
 @app.command()
 def release(
     lab: Annotated[str | None, typer.Argument(help="The lab; default: all of them.")] = None,
+    course: CourseOption = None,
 ) -> None:
     """Generate what students receive: `labs/` from `solutions/`; refuses a lab in which `lint` reads an error."""
     from autograder.authoring.release import release as generate
@@ -83,7 +86,7 @@ def release(
     from autograder.course.folder import course_root
     from autograder.course.lab import lab_names
 
-    root = course_root()
+    root = course_root(course)
     for name in [lab] if lab else lab_names(root):
         print(f"{name} → {generate(root, name)}")
     write_beside(root / "labs" / START_PAGE, start_page(root / "labs"))
@@ -95,13 +98,14 @@ def kit(
         Path | None,
         typer.Option(help="A folder with the lectures as HTML; default: build/lectures/book, if it was built."),
     ] = None,
+    course: CourseOption = None,
 ) -> None:
     """Write what students get into build/release, a folder and a zip: labs, this program without solutions, a lock."""
     from autograder.authoring.student_kit import write_kit
     from autograder.course.folder import course_root
     from autograder.course.paths import CoursePaths
 
-    root = course_root()
+    root = course_root(course)
     pages = book or CoursePaths(root).book
     archive = write_kit(root, pages if pages.is_dir() else None, CoursePaths(root).release)
     print(archive)
@@ -115,9 +119,10 @@ def kit(
 def gradescope(
     lab: Annotated[str, typer.Argument(help="The lab, such as lab2_executors.")],
     file: Annotated[Path, typer.Argument(metavar="FILE.zip", help="Where to write it.")],
+    course: CourseOption = None,
 ) -> None:
     """Write a lab's autograder for Gradescope: a zip to upload, which checks each submission as it is handed in."""
     from autograder.authoring.gradescope import write_gradescope
     from autograder.course.folder import course_root
 
-    print(write_gradescope(course_root(), lab, file))
+    print(write_gradescope(course_root(course), lab, file))

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from autograder.cli.app import app
+from autograder.cli.app import CourseOption, app
 from autograder.core.errors import KitError
 
 
@@ -18,6 +18,7 @@ def package(
     notebook: Annotated[
         Path | None, typer.Option(help="The notebook whose programs are taken; default: the lab as it is handed out.")
     ] = None,
+    course: CourseOption = None,
 ) -> None:
     """Write a lab's programs and launch files as a package for an installed ROS 2."""
     if notebook is not None and not notebook.is_file():
@@ -26,7 +27,7 @@ def package(
     from autograder.course.lab import load_lab
     from autograder.packages.ament_package import lab_files, package_name, write_package
 
-    found = load_lab(course_root(), lab)
+    found = load_lab(course_root(course), lab)
     name = package_name(found)
     written = write_package(name, f"Programs and launch files of {lab}", lab_files(found, notebook), folder)
     print(f"{written}\n\nIn a workspace of an installed ROS 2:\n  colcon build --packages-select {name}")

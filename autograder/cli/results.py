@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from autograder.cli.app import JsonOption, app
+from autograder.cli.app import CourseOption, JsonOption, app
 from autograder.core.errors import KitError
 from autograder.report.export import FORMATS, SEVERAL_LABS  # small, and the command's help names them all
 
@@ -20,7 +20,7 @@ LEFT_OUT = 3
 
 
 @app.command()
-def report() -> None:
+def report(course: CourseOption = None) -> None:
     """Write a page about the class for each lab, build/report/LAB.html: for instructors, not for students."""
     import datetime
 
@@ -29,7 +29,7 @@ def report() -> None:
     from autograder.gradebook.class_entries import class_entries
     from autograder.report.class_page import write_class_page
 
-    root = course_root()
+    root = course_root(course)
     entries = class_entries(root)
     if not entries:
         raise KitError("There are no results yet.", "Grade a class first: autograder grade LAB")
@@ -46,6 +46,7 @@ def export(
     column: Annotated[
         str, typer.Option(help="Heading of the column, as the platform's own export names it; default: the lab's name.")
     ] = "",
+    course: CourseOption = None,
 ) -> None:
     """Export a graded class: for Canvas, Moodle, Blackboard, Gradescope, a CI server or a table program.
 
@@ -57,7 +58,7 @@ def export(
 
     if form not in FORMATS:
         raise KitError(f"There is no format `{form}`.", f"Name one of: {', '.join(FORMATS)}.")
-    entries = class_entries(course_root(), lab)
+    entries = class_entries(course_root(course), lab)
     if not entries:
         raise KitError("There are no results to export.", "Grade a class first: autograder grade LAB")
     labs = sorted({entry.lab for entry in entries})
@@ -95,6 +96,7 @@ def similar(
     at_least: Annotated[int, typer.Option(min=1, max=100, help="Likeness of a pair that is shown, in percent.")] = 60,
     most: Annotated[int, typer.Option(min=1, help="How many pairs are shown.")] = 20,
     as_json: JsonOption = False,
+    course: CourseOption = None,
 ) -> None:
     """List pairs of submissions that are alike beyond what the lab hands out: for a person to read, never a verdict."""
     import json
@@ -108,7 +110,7 @@ def similar(
     from autograder.submission.reader import read_submission
     from autograder.submission.similar import similar as find
 
-    root = course_root()
+    root = course_root(course)
     found = load_lab(root, lab)
     given = {name: answer.blank for name, answer in found.answers.items()}
     students = [result.student for result in ResultStore(root).all(lab)]

@@ -16,12 +16,16 @@ KIT_FOLDER = "kit"
 """The folder of a student's kit with what is not the student's to change."""
 
 
-def course_root() -> Path:
-    """Return the course that the working folder lies in, for who works on a course; then the kit's own.
+def course_root(named: Path | None = None) -> Path:
+    """Return the course that was named, or else the one that the working folder lies in, or else the kit's own.
+
+    For who works on a course; whose checks are run on what somebody handed in, `trusted_course` says.
 
     Raises:
         KitError: there is none.
     """
+    if named is not None:
+        return _named(named)
     for folder in (Path.cwd(), *Path.cwd().parents, ROOT):
         if _is_course(folder):
             return folder
@@ -41,12 +45,19 @@ def trusted_course(named: Path | None) -> Path:
         KitError: there is none.
     """
     own = ROOT / KIT_FOLDER if is_students_kit() else ROOT
-    root = own if named is None else named.resolve()
-    if _is_course(root):
-        return root
-    if named is None:
+    if named is not None:
+        return _named(named)
+    if not _is_course(own):
         raise KitError("The kit was installed without a course of its own.", "Name yours: --course FOLDER")
-    raise KitError(f"There is no course in {root}.", "It needs a folder `solutions` (or `labs`) with NAME/NAME.ipynb.")
+    return own
+
+
+def _named(folder: Path) -> Path:
+    root = folder.resolve()
+    if not _is_course(root):
+        needs = "It needs a folder `solutions` (or `labs`) with NAME/NAME.ipynb."
+        raise KitError(f"There is no course in {root}.", needs)
+    return root
 
 
 def is_students_kit() -> bool:

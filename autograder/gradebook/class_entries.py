@@ -39,6 +39,7 @@ def class_entries(root: Path, lab: str | None = None) -> list[Entry]:
                 grade=grades.get((result.lab, result.student)),
                 known=taken.owner | {key: value for key, value in roster.get(result.student, {}).items() if value},
                 file=taken.file,
+                late=taken.late,
                 feedback=page if page.is_file() else None,
             )
         )

@@ -23,6 +23,8 @@ class Entry:
     """What platforms call the student, by kind, such as `name`, `email`, `canvas_id`."""
     file: str = ""
     """The path under which a platform gave the notebook out; empty if none did."""
+    late: bool = False
+    """The platform has marked it as late."""
     feedback: Path | None = None
     """The student's page; None: there is none."""
 
