@@ -84,8 +84,9 @@ soak: setup-dev ## grade every sample student N=20 times, half of them under loa
 mutants: setup-dev ## change LAB's solutions by rule, one change at a time, and grade each: what survives lacks a check
 	@$(RUN) python tests/mutants.py $(LAB) $(ARGS)
 
-bench: setup-dev ## measure this grader against stock nbgrader on the same submissions
+bench: setup-dev ## measure this grader against stock nbgrader, and how it scales with jobs, classes and Dask
 	@$(RUN) python tests/bench.py $(ARGS)
+	@$(RUN) python tests/bench_scale.py
 
 lock: setup-dev ## pin the newest versions of pyproject.toml's dependencies, with hashes
 	@$(RUN) sh -euc 'compile="uv pip compile pyproject.toml --quiet --universal --python-version 3.11 --generate-hashes \

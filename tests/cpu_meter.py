@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import functools
+import itertools
 import os
 import threading
 import time
@@ -15,6 +16,8 @@ from autograder.core.processes import descendants, read_text, stat_fields
 PARTS = (
     "students' programs", "launchers", "workers", "fork server", "bubblewrap", "grading command: nbgrader, feedback"
 )  # fmt: skip
+_NUMBER = itertools.count()
+"""Of the control groups of this process."""
 _LOOK_EVERY = 0.05
 """Seconds between two looks at who has had how much CPU."""
 
@@ -27,7 +30,7 @@ def cpu_meter() -> Iterator[tuple[list[str], Callable[[], float]]]:
     right only if nothing else runs: the kernel forgets the time of processes that end with their process namespace.
     """
     for hierarchy in (Path("/sys/fs/cgroup/cpuacct"), Path("/sys/fs/cgroup")):
-        group = hierarchy / f"bench-{os.getpid()}-{threading.get_native_id()}"
+        group = hierarchy / f"bench-{os.getpid()}-{next(_NUMBER)}"
         if not (hierarchy / "cgroup.procs").exists():
             continue
         try:

@@ -2,19 +2,13 @@
 
 from __future__ import annotations
 
-import json
-import os
 import shutil
-import subprocess
-import sys
-import time
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import psutil
 import pytest
 import toy
+from dask_cluster import KIT, cluster, until
 
 from autograder.core.errors import KitError
 from autograder.core.results import Isolation
@@ -23,54 +17,7 @@ from autograder.grading.class_runner import run_class
 from autograder.grading.runner import Settings
 from autograder.sandbox.isolation import preflight
 
-KIT = Path(__file__).resolve().parent.parent
 SLOW = "%%node talker\nimport time\ntime.sleep(3)\nprint('hello')\n"
-
-
-def until(ready: Callable[[], object], what: str) -> None:
-    deadline = time.monotonic() + 120
-    while not ready():
-        assert time.monotonic() < deadline, what
-        time.sleep(0.05)
-
-
-class Cluster:
-    """A scheduler, and the workers that are started."""
-
-    def __init__(self, folder: Path, ending: ExitStack) -> None:
-        self._file, self._ending, self._folder = folder / "scheduler.json", ending, folder
-        self._start(KIT, "scheduler", "--host", "127.0.0.1", "--port", "0", "--scheduler-file", str(self._file))
-        until(self._file.exists, "the scheduler does not start")
-        self.address = json.loads(self._file.read_text())["address"]
-
-    def worker(self, name: str, kit: Path = KIT) -> psutil.Process:
-        """Start a worker with one thread; it takes jobs as soon as it is known to the scheduler."""
-        options = ("--no-nanny", "--nthreads", "1", "--name", name, "--local-directory", str(self._folder))
-        process = self._start(kit, "worker", self.address, *options)
-        until(lambda: name in self._known(), f"the worker {name} does not start")
-        return psutil.Process(process.pid)
-
-    def _known(self) -> set[str]:
-        from distributed import Client
-
-        with Client(self.address, set_as_default=False) as client:
-            return {str(worker["name"]) for worker in client.scheduler_info(n_workers=-1)["workers"].values()}
-
-    def _start(self, kit: Path, *command: str) -> subprocess.Popen[bytes]:
-        process = subprocess.Popen(
-            [sys.executable, "-m", "dask", *command, "--no-dashboard"],
-            cwd=self._folder, env=os.environ | {"PYTHONPATH": str(kit)},
-            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
-        )  # fmt: skip
-        self._ending.callback(process.wait, 30)
-        self._ending.callback(process.kill)
-        return process
-
-
-@contextmanager
-def cluster(folder: Path) -> Iterator[Cluster]:
-    with ExitStack() as ending:
-        yield Cluster(folder, ending)
 
 
 def test_a_killed_worker_costs_no_result_and_another_kit_is_refused(
