@@ -145,8 +145,8 @@ def plot(runs: list[Run], path: Path) -> None:
     for run in (run for run in runs if run.kind == "dask"):
         here = [one for one in jobs if (one.size, one.jobs) == (run.size, run.jobs)][-1:]
         pair = [*here, run]
-        names = [f"{'Dask' if one.kind == 'dask' else 'local'}" for one in pair]
-        bars = where.bar(names, [60 * one.size / one.seconds for one in pair], color=["#0072B2", "#E69F00"][-len(pair):])
+        names = ["Dask" if one.kind == "dask" else "local" for one in pair]
+        bars = where.bar(names, [60 * one.size / one.seconds for one in pair], color="#0072B2")
         where.bar_label(bars, [f"{one.cpu / one.size:.2f} CPU s each" for one in pair])
     where.set(title="Submissions a minute", xlabel="one machine, as many jobs", ylim=(0, None))
     figure.savefig(path, metadata={"Date": None})

@@ -1,8 +1,8 @@
 """Takes in what was handed in: a folder or a zip with a folder for each student, into `build/submitted`.
 
-Of each student only the lab's notebook is taken, as bytes, and what nbgrader's exchange puts beside it. Names are checked, links are not
-followed, nothing is unpacked to a place that a name in a zip could choose. What is not taken is said, and costs nobody
-else anything.
+Of each student only the lab's notebook is taken, as bytes, and what nbgrader's exchange puts beside it. Names are
+checked, links are not followed, nothing is unpacked to a place that a name in a zip could choose. What is not taken is
+said, and costs nobody else anything.
 """
 
 from __future__ import annotations

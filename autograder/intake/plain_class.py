@@ -187,9 +187,8 @@ def _from_zip(source: Path, lab: str, refused: list[str]) -> dict[str, HandedIn]
         for student, files in students.items():
             try:
                 chosen = _choose([rest for rest in files if len(rest) == 1 or rest[:-1] == (lab,)], lab)
-                stamp, secret = (
-                    files.get((name,)) or files.get((lab, name)) for name in (timestamp.FILE_NAME, exchange_secret.FILE_NAME)
-                )
+                beside = (timestamp.FILE_NAME, exchange_secret.FILE_NAME)
+                stamp, secret = (files.get((name,)) or files.get((lab, name)) for name in beside)
                 found[student] = HandedIn(
                     _member(archive, files[chosen]) if chosen else b"",
                     _member(archive, stamp)[: timestamp.MOST_BYTES] if stamp else b"",
