@@ -361,6 +361,24 @@ def test_what_a_program_prints_is_no_command_and_no_markdown_for_github() -> Non
     assert "<img" not in text and "\\[l\\]" in text and "a \\| b" in text
 
 
+def test_check_prints_a_verdict_while_later_checks_still_run(tmp_path: Path) -> None:
+    course, go_on = tmp_path / "course", tmp_path / "go on"
+    cells = [toy.CELLS[number] for number in (0, 1, 6, 7, 8, 3, 4, 5)]  # the table before the talker
+    talker = f"%%node talker\nimport os, time\nwhile not os.path.exists({str(go_on)!r}):\n    time.sleep(0.05)\n"
+    toy.hand_in(course / "solutions", toy.LAB, cells)
+    answered = [cell if cell is not toy.CELLS[4] else {**cell, "source": talker} for cell in cells]
+    handed_in = toy.hand_in(tmp_path / "class", "ann", answered)
+    process = start(course, "check", str(handed_in), "--course", ".", "--isolation", "none")
+    assert process.stdout is not None
+    try:
+        first = process.stdout.readline()  # it would never come if it waited for the talker
+        go_on.touch()
+        rest, _ = process.communicate(timeout=60)
+    finally:
+        process.kill()
+    assert "passed  The table" in first and "The talker" in rest and "toy: 5 of 5 points" in rest
+
+
 def test_check_goes_on_when_the_notebook_is_saved(root: Path, tmp_path: Path) -> None:
     notebook = tmp_path / "toy.ipynb"
     wrong, right = (hand_in(root, who, text) for who, text in (("gil", "1 / 0"), ("hal", "print('hello')")))

@@ -129,6 +129,24 @@ def test_the_magics_explain_themselves(shell: InteractiveShell) -> None:
         assert example in text and "nodes" in text
 
 
+@pytest.mark.parametrize(
+    ("line", "offered"),
+    [
+        ("%%no", "%%node"),
+        ("%%fi", "%%file"),
+        ('with launch("ta', "talker"),
+        ('launch("other", "ta', "talker"),
+        ("%ros2 to", "topic"),
+        ("%ros2 topic ec", "echo"),
+    ],
+)
+def test_the_tab_key_offers_magics_programs_and_the_words_of_ros2(
+    shell: InteractiveShell, line: str, offered: str
+) -> None:
+    shell.run_cell("%%node talker\nprint('hello')\n")
+    assert offered in shell.complete("", line, len(line))[1]
+
+
 def test_each_cell_begins_with_no_findings(shell: InteractiveShell) -> None:
     from autograder.checks import findings
     from autograder.core.results import Outcome, Status
@@ -565,6 +583,7 @@ def test_lab_says_what_is_done_what_is_open_and_what_was_predicted(notebook: Not
     marks = {"grade": True, "solution": False, "locked": True, "task": False, "schema_version": 3}
     check = {"nbgrader": marks | {"grade_id": "check", "points": 3}}
     later = {"nbgrader": marks | {"grade_id": "later", "points": 2}}
+    again = {"nbgrader": marks | {"grade_id": "again", "points": 1}}
     text = {"nbgrader": marks | {"grade_id": "why", "points": 4, "solution": True}}
     *_, guesses = answer(GUESSES, "predictions")
     cells = [
@@ -574,6 +593,8 @@ def test_lab_says_what_is_done_what_is_open_and_what_was_predicted(notebook: Not
         ("code", FILLED, check),
         ("markdown", "## 2. Ticks", {}),
         ("code", f"{CHECK}  # of this notebook", later),
+        ("markdown", "### Check: once more", {}),
+        ("code", f"{CHECK}  # of this notebook, again", again),
         ("markdown", "## 3. Explain", {}),
         ("markdown", "Because.", text),
     ]
@@ -584,14 +605,18 @@ def test_lab_says_what_is_done_what_is_open_and_what_was_predicted(notebook: Not
     ]
     notebook.path.write_text(json.dumps({"cells": made, "metadata": {}, "nbformat": 4, "nbformat_minor": 5}))
     notebook.run(GUESSES, "c2")
+    notebook.run("%%file predicted.yaml\npairs: [live, none]\nempty: [live, '?']\n")
+    notebook.run("%%file measured.yaml\npairs: [live, none]\nempty: [live, all]\n")
     notebook.run(FILLED, "c3")
     said = notebook.run("%lab")
     lines = [" ".join(line.split()) for line in said.text.splitlines()]
-    assert lines[0] == "Lab 0: Hearts: 2 of 3 parts done · 3 of 5 points"
+    assert lines[0] == "Lab 0: Hearts: 2 of 4 tasks done · 3 of 6 points"
     assert "✓ 1. Beats passed 3 of 3 points" in lines and "Go on with: 2. Ticks" in lines
+    assert "2. Ticks 0 of 3 points" in lines and "○ Once more not checked since the kernel started 1 point" in lines
     assert "○ 2. Ticks not checked since the kernel started 2 points" in lines
     assert "✓ 3. Explain written 4 points, given by a person" in lines
     assert "beats 7 0 otherwise" in lines and "ticks pause open" in lines
+    assert "pairs live, none live, none as predicted" in lines and "empty live, all open" in lines
     assert "<b>2. Ticks</b>" in said.html
     notebook.run(GUESSES, "c2")
     assert "passed, but a cell above was run again since" in notebook.run("%lab").text

@@ -107,6 +107,36 @@ def test_no_file_of_the_kit_names_a_package_host(files: dict[str, str]) -> None:
     assert [name for name, text in files.items() if FOREIGN.search(text)] == []
 
 
+def test_the_files_for_other_platforms_can_be_read_and_name_what_there_is(files: dict[str, str]) -> None:
+    """Nobody has run them on those platforms here; what they say is at least there."""
+    import yaml
+    from typer.main import get_command
+
+    from autograder.cli.app import app
+
+    there = {name.removeprefix(f"{NAME}/"): text for name, text in files.items()}
+    workflow_file, container = ".github/workflows/check.yml", ".devcontainer/devcontainer.json"
+    settings = json.loads(re.sub(r"^\s*//.*$", "", there[container], flags=re.MULTILINE))
+    (job,) = yaml.safe_load(there[workflow_file])["jobs"].values()
+    scripts = [settings["postCreateCommand"], *(step["run"] for step in job["steps"] if "run" in step)]
+    for script in scripts:
+        assert subprocess.run(["bash", "-n"], input=script, text=True, capture_output=True).stderr == ""
+    instructions = re.sub(r"\\\n", " ", there["binder/Dockerfile"]).splitlines()
+    words = {line.split()[0] for line in instructions if line and not line.startswith("#")}
+    assert words <= {"FROM", "ARG", "RUN", "WORKDIR", "USER", "COPY", "ENV"}
+
+    targets = set(re.findall(r"^([a-z]+):", there["Makefile"], re.MULTILINE))
+    check = get_command(app).commands["check"]  # type: ignore[attr-defined]
+    options = {option for parameter in check.params for option in parameter.opts}
+    told = "\n".join([there["README.md"], there["binder/Dockerfile"], *scripts])
+    assert set(re.findall(r"\bmake ([a-z]+)\b(?!-)", told)) <= targets
+    assert "--github" in options and "autograder check" in there[workflow_file]
+    for path in re.findall(r"(?:[\w.-]+/)+[\w*.-]+\.(?:md|yml|ipynb|whl|json)|`[\w.]+/[\w.]+`", told):
+        pattern = path.strip("`").replace("REPOSITORY/", "").replace("${containerWorkspaceFolder}/", "")
+        if not re.match(r"\.venv|labs/\.\.\.", pattern):
+            assert any(Path(name).match(pattern) or name.startswith(f"{pattern}/") for name in there), pattern
+
+
 def test_a_lab_that_would_tell_its_solution_is_not_given_out(course: Path, tmp_path: Path) -> None:
     root = shutil.copytree(course, tmp_path / "course")
     told = [{**cell, "source": re.sub(r"###.*\n", "", str(cell["source"]))} for cell in toy.CELLS]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import os
 import sys
 import time
@@ -13,6 +12,7 @@ import typer
 
 from autograder.cli.app import JsonOption, SeedOption, app
 from autograder.core.errors import KitError
+from autograder.core.files import signature
 from autograder.core.results import Isolation  # its values stand in the command's help
 
 if TYPE_CHECKING:
@@ -65,8 +65,8 @@ def check(
     settings = Settings(isolation=isolation_for(isolation), seed=seed)
     audience: Audience = "instructor" if instructor else "student"
     while True:
-        saved = notebook.stat().st_mtime_ns
-        result = checked(notebook, found, settings)
+        saved = signature(notebook)
+        result = checked(notebook, found, settings, None if as_json else audience)
         if junit is not None:
             from autograder.core.files import write_beside
             from autograder.report.export.junit import junit_xml
@@ -77,7 +77,10 @@ def check(
             from autograder.report.export.gradescope import results_json
 
             write_beside(gradescope, results_json(result))
-        _show(result, audience, as_json)
+        if as_json:
+            from autograder.report.audience import result_for
+
+            print(result_for(result, audience).model_dump_json(indent=1))
         if github:
             _tell_github(result, audience, notebook)
         if not watch:
@@ -103,25 +106,23 @@ def isolation_for(wanted: Isolation | None) -> Isolation:
     return found
 
 
-def checked(notebook: Path, lab: Lab, settings: Settings) -> SubmissionResult:
-    """Run the checks on a notebook, and say meanwhile on a terminal what takes so long."""
+def checked(notebook: Path, lab: Lab, settings: Settings, audience: Audience | None = None) -> SubmissionResult:
+    """Run the checks on a notebook, and say meanwhile on a terminal what is waited for.
+
+    Args:
+        notebook: to check.
+        lab: that it answers.
+        settings: how to run it.
+        audience: for whom the report is printed, each verdict as soon as it is there; None prints none.
+    """
     from autograder.grading.runner import WORKERS_FOR_ONE, run_submission
-    from autograder.report.terminal import working
+    from autograder.report.growing import GrowingReport
 
-    number = f"the {len(lab.checks)} checks" if len(lab.checks) > 1 else "the check"
-    with working(f"Running {number} of {lab.name}: evidence is waited for"):
-        return run_submission(notebook, notebook.parent.resolve().name, lab, settings, workers=WORKERS_FOR_ONE)
-
-
-def _show(result: SubmissionResult, audience: Audience, as_json: bool) -> None:
-    if as_json:
-        from autograder.report.audience import result_for
-
-        print(result_for(result, audience).model_dump_json(indent=1))
-    else:
-        from autograder.report.terminal import console, submission_view
-
-        console().print(submission_view(result, audience))
+    student = notebook.parent.resolve().name
+    with GrowingReport([check.grade_id for check in lab.checks], audience) as report:
+        result = run_submission(notebook, student, lab, settings, workers=WORKERS_FOR_ONE, follower=report)
+        report.finish(result)
+    return result
 
 
 def _tell_github(result: SubmissionResult, audience: Audience, notebook: Path) -> None:
@@ -146,10 +147,11 @@ def _status(result: SubmissionResult) -> int:
     return COULD_NOT_FIND_OUT if Status.UNKNOWN in statuses else 0
 
 
-def _wait_for_save(notebook: Path, saved: int) -> None:
-    """Wait until the notebook is another file than it was; while an editor replaces it, there may be none."""
+def _wait_for_save(notebook: Path, saved: tuple[int, ...] | None) -> None:
+    """Wait until the notebook is another file than it was, and no longer changes: an editor may still write it."""
+    seen = saved
     while True:
         time.sleep(_LOOK)
-        with contextlib.suppress(OSError):
-            if notebook.stat().st_mtime_ns != saved:
-                return
+        before, seen = seen, signature(notebook)
+        if seen is not None and seen == before != saved:
+            return

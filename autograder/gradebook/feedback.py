@@ -21,7 +21,8 @@ from autograder.gradebook.exchange_files import complete, only_notebooks
 from autograder.gradebook.reading import read_grade
 from autograder.grading.store import ResultStore
 from autograder.intake.roster import FILE_NAME, read_roster
-from autograder.report.feedback_page import Heading, Task, feedback_html, plain_title
+from autograder.report.feedback_page import Heading, Task, feedback_html
+from autograder.report.words import plain_title
 from autograder.submission import timestamp
 from autograder.submission.reader import read_submission
 

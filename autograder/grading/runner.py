@@ -13,6 +13,7 @@ from pathlib import Path
 
 from autograder.core.results import Isolation, SubmissionResult
 from autograder.course.lab import Lab
+from autograder.grading.follower import Follower
 from autograder.grading.job import Job
 from autograder.grading.store import ResultStore
 from autograder.grading.supervisor import run_in_workers
@@ -61,6 +62,7 @@ def run_submission(
     settings: Settings,
     store: ResultStore | None = None,
     workers: int = 1,
+    follower: Follower | None = None,
 ) -> SubmissionResult:
     """Read one submission, run its checks in the sandbox, and return what came of it.
 
@@ -71,6 +73,7 @@ def run_submission(
         settings: how to run it.
         store: to keep the result in, and to take it from if nothing changed; None keeps nothing.
         workers: that share its checks and run at once.
+        follower: is told what each check came to while others still run.
 
     Raises:
         KitError: this machine cannot isolate programs as asked.
@@ -80,7 +83,9 @@ def run_submission(
     if known is not None:
         return known
     job = job_of(submission, student, lab, settings)
-    result = run_in_workers(job, workers) if submission.readable else without_running(submission, job)
+    if follower is not None:
+        follower.begun(submission.problems)
+    result = run_in_workers(job, workers, follower) if submission.readable else without_running(submission, job)
     if store is not None:
         store.save(result)
     return result

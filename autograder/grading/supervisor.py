@@ -5,13 +5,15 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
+from queue import SimpleQueue
 
 from pydantic import ValidationError
 
 from autograder.core.results import CheckResult, SubmissionResult
 from autograder.course.lab import Cell
 from autograder.grading.builds import with_interfaces
+from autograder.grading.follower import Ear, Follower, Told
 from autograder.grading.job import CELL_SECONDS, STUCK_SECONDS, Job
 from autograder.grading.validation import undecided, validated
 from autograder.sandbox.outer import OuterRun, run_in_sandbox
@@ -44,24 +46,54 @@ def run_in_worker(job: Job, stop: threading.Event | None = None) -> SubmissionRe
     return _result(job, _run_share(with_interfaces(job, 1, stop), job.checks, stop), began)
 
 
-def run_in_workers(job: Job, workers: int) -> SubmissionResult:
+def run_in_workers(job: Job, workers: int, follower: Follower | None = None) -> SubmissionResult:
     """As `run_in_worker`, with the checks shared by several workers that run at once.
 
     Checks know nothing of each other: who waits for one submission waits less with several workers; a class, of which
     many run at once anyway, is cheaper with one each.
+
+    Args:
+        job: the submission and its checks.
+        workers: how many.
+        follower: is told what each check came to while others still run.
     """
     began = time.monotonic()
+    if follower is not None and job.interfaces:
+        follower.at(0, "building the packages")
     job = with_interfaces(job, workers)
     shares = [share for share in (job.checks[number::workers] for number in range(workers)) if share]
     given_up = threading.Event()
+    told: SimpleQueue[Told | Future[list[CheckResult]]] = SimpleQueue()
     with ThreadPoolExecutor(max(1, len(shares)), thread_name_prefix="share") as pool:
         try:  # from the first share on: Ctrl-C may come before the last of them is begun
-            futures = [pool.submit(_run_share, job, share, given_up) for share in shares]
-            checks = [check for future in futures for check in future.result()]
+            for number, share in enumerate(shares):
+                ear = Ear(number, told.put) if follower is not None else None
+                pool.submit(_run_share, job, share, given_up, ear).add_done_callback(told.put)
+            checks = _follow(told, len(shares), follower)
         except BaseException:  # nobody waits for the shares any more
             given_up.set()
             raise
     return _result(job, checks, began)
+
+
+def _follow(
+    told: SimpleQueue[Told | Future[list[CheckResult]]], shares: int, follower: Follower | None
+) -> list[CheckResult]:
+    """Pass on what is heard of the shares until all have ended, and return what they came to.
+
+    This thread does it: one that reads what a worker writes must not wait until somebody scrolls on.
+    """
+    checks: list[CheckResult] = []
+    while shares:
+        heard = told.get()
+        if isinstance(heard, Future):
+            checks += heard.result()
+            shares -= 1
+        elif follower is not None and isinstance(heard, CheckResult):
+            follower.decided(heard)
+        elif follower is not None and isinstance(heard, tuple):
+            follower.at(*heard)
+    return checks
 
 
 def _result(job: Job, checks: list[CheckResult], began: float) -> SubmissionResult:
@@ -71,7 +103,9 @@ def _result(job: Job, checks: list[CheckResult], began: float) -> SubmissionResu
     return validated(result, job.checks)
 
 
-def _run_share(job: Job, share: Sequence[Cell], stop: threading.Event | None) -> list[CheckResult]:
+def _run_share(
+    job: Job, share: Sequence[Cell], stop: threading.Event | None, ear: Ear | None = None
+) -> list[CheckResult]:
     """Run some of a job's checks, one after the other.
 
     At a check at which the worker gets stuck, nobody could find out. One at which it dies is tried once more. Then
@@ -85,8 +119,15 @@ def _run_share(job: Job, share: Sequence[Cell], stop: threading.Event | None) ->
         cells = [cell for cell in job.cells if cell.points is None or cell in left]
         part = job.model_copy(update={"cells": cells})
         seconds = limit(len(left)) + job.build_seconds
+        if ear is not None:
+            ear.begin(left)
         run = run_in_sandbox(
-            ["autograder.grading.worker"], part.model_dump_json().encode("utf-8"), job.isolation, seconds, stop
+            ["autograder.grading.worker"],
+            part.model_dump_json().encode("utf-8"),
+            job.isolation,
+            seconds,
+            stop,
+            ear.hear if ear is not None else None,
         )
         decided += _said(run.stdout)
         known = {check.grade_id for check in decided}

@@ -20,14 +20,15 @@ _LINES, _CHARACTERS = 7, 1000
 def validated(result: SubmissionResult, checks: Sequence[Cell]) -> SubmissionResult:
     """Return the result with exactly the lab's checks; one that is missing or impossible is undecided."""
     by_id = {check.grade_id: check for check in result.checks}
-    kept = []
-    for cell in checks:
-        check = by_id.get(cell.grade_id)
-        possible = check is not None and (check.points is None or 0.0 <= check.points <= check.max_points)
-        if check is None or not possible or check.max_points != cell.points:
-            check = undecided(cell, "The grader returned no usable result for this check.")
-        kept.append(check.model_copy(update={"title": cell.title}))
-    return result.model_copy(update={"checks": kept})
+    return result.model_copy(update={"checks": [believed(cell, by_id.get(cell.grade_id)) for cell in checks]})
+
+
+def believed(cell: Cell, check: CheckResult | None) -> CheckResult:
+    """Return what is believed of one check's result: it is undecided if there is none, or an impossible one."""
+    possible = check is not None and (check.points is None or 0.0 <= check.points <= check.max_points)
+    if check is None or not possible or check.max_points != cell.points:
+        check = undecided(cell, "The grader returned no usable result for this check.")
+    return check.model_copy(update={"title": cell.title})
 
 
 def undecided(cell: Cell, because: str, printed: str = "", code: str = NO_RESULT) -> CheckResult:

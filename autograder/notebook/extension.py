@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from autograder.core import front_end
 from autograder.course.cell_file import CELL_BYTES, BadNameError, CellFile, check_free, check_name, parse
 from autograder.course.folder import book_of_kit
-from autograder.notebook import lab_magic, ros2_magic
+from autograder.notebook import completion, lab_magic, ros2_magic
 from autograder.notebook.kernel import Kernel, now
 from autograder.notebook.program_folder import Written, shown
 
@@ -57,6 +57,7 @@ def register(shell: Any) -> None:
         return
     front_end.active = kernel
     kernel.start()
+    completion.register(shell, kernel)
     shell.events.register("pre_run_cell", kernel.begin_cell)
     shell.events.register("post_run_cell", kernel.end_cell)
     shell.display_formatter.mimebundle_formatter.for_type_by_name("autograder.checks.scoring", "Score", shown_score)

@@ -54,9 +54,12 @@ def _text(state: LabState) -> str:
     screen = Console(file=io.StringIO(), width=100, highlight=False, color_system=None, force_jupyter=False)
     screen.print(plain(f"{state.title}: {state.summary}"), markup=False)
     rows = Table.grid(padding=(0, 1))
-    for row in state.rows:
-        mark = SYMBOL[row.verdict] if row.verdict else ("✓" if row.done else "○")
-        rows.add_row(mark, plain(row.title), row.said, row.points)
+    for part in state.parts:
+        if part.heading:
+            rows.add_row("", plain(part.heading), "", part.points)
+        for row in part.rows:
+            mark = SYMBOL[row.verdict] if row.verdict else ("✓" if row.done else "○")
+            rows.add_row(mark, ("  " if part.heading else "") + plain(row.title), row.said, row.points)
     screen.print(rows)
     if state.next:
         screen.print(plain(f"Go on with: {state.next}"), markup=False)

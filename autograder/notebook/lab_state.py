@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -15,9 +15,11 @@ from autograder.report import words
 from autograder.report.words import Verdict
 from autograder.submission.notebook_file import cells_of
 
-_HEADING = re.compile(r"^#{1,6}\s+(.*?)\s*#*\s*$", re.MULTILINE)
-_GUESS = re.compile(r"_predicted$")
-_FACT = re.compile(r"_(measured|seen)$")
+_HEADING = re.compile(r"^(#{1,6})\s+(.*?)\s*#*\s*$", re.MULTILINE)
+_PART = 2
+"""The level of the headings of a lab's parts."""
+_GUESS = re.compile(r"(^|_)predicted$")
+_FACT = re.compile(r"(^|_)(measured|seen)$")
 
 
 @dataclass(frozen=True)
@@ -40,6 +42,29 @@ class Row:
     """What became of it, in words."""
     points: str
     done: bool
+    sure: float = 0.0
+    later: float = 0.0
+    """Points that grading may give as well."""
+    possible: float = 0.0
+    """Points that the check can give; a text is given them by a person, and has none here."""
+
+
+@dataclass(frozen=True)
+class Part:
+    """What stands below one of the lab's larger headings."""
+
+    title: str
+    rows: list[Row] = field(default_factory=list)
+
+    @property
+    def heading(self) -> str:
+        """Its title, unless its only row has that very title."""
+        return "" if [row.title for row in self.rows] == [self.title] else self.title
+
+    @property
+    def points(self) -> str:
+        """The points of its checks in words; empty if it has none."""
+        return _points(self.rows) if any(row.possible for row in self.rows) else ""
 
 
 @dataclass(frozen=True)
@@ -63,25 +88,34 @@ class LabState:
     """All that `%lab` shows."""
 
     title: str = ""
-    rows: list[Row] = field(default_factory=list)
+    parts: list[Part] = field(default_factory=list)
     guesses: list[Guess] = field(default_factory=list)
-    sure: float = 0.0
-    later: float = 0.0
-    """Points that grading may give as well."""
-    possible: float = 0.0
-    """Points that the checks can give."""
+
+    @property
+    def rows(self) -> list[Row]:
+        """Those of all parts."""
+        return [row for part in self.parts for row in part.rows]
 
     @property
     def next(self) -> str:
-        """The first part that is open; empty if none is."""
-        return next((row.title for row in self.rows if not row.done), "")
+        """The first task that is open; empty if none is."""
+        for part in self.parts:
+            for row in part.rows:
+                if not row.done:
+                    return f"{row.title} (in “{part.heading}”)" if part.heading not in ("", row.title) else row.title
+        return ""
 
     @property
     def summary(self) -> str:
         """The points, and how much is done, in a sentence."""
         done = sum(row.done for row in self.rows)
-        later = f", up to {self.later:g} more decided at grading" if self.later else ""
-        return f"{done} of {len(self.rows)} parts done · {self.sure:g} of {self.possible:g} points{later}"
+        return f"{done} of {len(self.rows)} tasks done · {_points(self.rows)}"
+
+
+def _points(rows: Sequence[Row]) -> str:
+    sure, later, possible = (sum(getattr(row, name) for row in rows) for name in ("sure", "later", "possible"))
+    more = f", up to {later:g} more decided at grading" if later else ""
+    return f"{sure:g} of {possible:g} point{'' if possible == 1 else 's'}{more}"
 
 
 def lab_state(notebook: Path, reports: Mapping[str, Report], runs: Mapping[str, int], files: Path) -> LabState:
@@ -97,24 +131,27 @@ def lab_state(notebook: Path, reports: Mapping[str, Report], runs: Mapping[str, 
         UnreadableError: it is no notebook.
     """
     state = LabState()
-    title, newest = "", 0
+    title, part, newest = "", "", 0
     for cell in cells_of(notebook):
         source, marks = source_of(cell), nbgrader_of(cell)
         if cell.get("cell_type") == "markdown" and not marks.get("solution"):
-            for heading in _HEADING.findall(source):
-                title = heading
-                state.title = state.title or heading
+            for level, heading in _HEADING.findall(source):
+                title = words.plain_title(heading)
+                part = title if len(level) <= _PART else part
+                state.title = state.title or title
         elif marks.get("solution"):
             named = re.match(r"%%(node|file)\s+(\S+)", source)
             if named:
                 newest = max(newest, runs.get(f"{named[2]}.py" if named[1] == "node" else named[2], 0))
         if not marks.get("points"):
             continue
-        full = float(marks["points"])
+        if not state.parts or state.parts[-1].title != part:
+            state.parts.append(Part(part))
+        rows, full = state.parts[-1].rows, float(marks["points"])
         if marks.get("solution"):
-            state.rows.append(_text(title or grade_id_of(cell), source, full))
+            rows.append(_text(title or grade_id_of(cell), source, full))
         elif marks.get("grade"):
-            state.rows.append(_check(title or grade_id_of(cell), reports.get(cell_digest(source)), newest, full, state))
+            rows.append(_check(title or grade_id_of(cell), reports.get(cell_digest(source)), newest, full))
             newest = 0
     state.guesses = _guesses(files)
     return state
@@ -126,20 +163,17 @@ def _text(title: str, source: str, full: float) -> Row:
     return Row(title, None, "written" if written else "not written yet", points, written)
 
 
-def _check(title: str, report: Report | None, newest: int, full: float, state: LabState) -> Row:
-    state.possible += full
+def _check(title: str, report: Report | None, newest: int, full: float) -> Row:
     points = f"{full:g} point{'' if full == 1 else 's'}"
     if report is None:
-        return Row(title, None, "not checked since the kernel started", points, False)
+        return Row(title, None, "not checked since the kernel started", points, False, possible=full)
     verdict = words.verdict(report.result)
     if newest > report.number:
-        return Row(title, None, f"{verdict}, but a cell above was run again since", points, False)
+        return Row(title, None, f"{verdict}, but a cell above was run again since", points, False, possible=full)
     sure = report.result.sure_points or 0.0
-    state.sure += sure
-    if report.result.more_at_grading:
-        state.later += report.result.possible_points - sure
+    later = report.result.possible_points - sure if report.result.more_at_grading else 0.0
     done = verdict in (Verdict.PASSED, Verdict.HOLDS)
-    return Row(title, verdict, str(verdict), words.points(report.result), done)
+    return Row(title, verdict, str(verdict), words.points(report.result), done, sure, later, full)
 
 
 def _guesses(folder: Path) -> list[Guess]:
@@ -158,5 +192,9 @@ def _guesses(folder: Path) -> list[Guess]:
 
 
 def _shown(value: Any) -> str:
-    text = "" if value is None or value == "?" else str(value)
+    """A value as the student wrote it; empty while something in it is open."""
+    values = value if isinstance(value, list) else [value]
+    if any(one in (None, "?") for one in values):
+        return ""
+    text = ", ".join({True: "yes", False: "no"}[one] if isinstance(one, bool) else str(one) for one in values)
     return " ".join(text.split())[:60]

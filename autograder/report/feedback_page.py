@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import datetime
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import groupby
@@ -203,11 +202,3 @@ def _repairs(
         {"lost": _number(points), "title": title, "anchor": anchor, "why": why, "hint": hint, "check": name}
         for points, title, anchor, why, hint, name in lost[:_FIRST]
     ]
-
-
-def plain_title(markdown: str) -> str:
-    """Return a heading's text without Markdown's links and emphasis, and without saying that it is about a check."""
-    text = re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", markdown)
-    text = re.sub(r"(\*\*|__)(.+?)\1", r"\2", text)
-    about = text.removeprefix("Check: ")
-    return text if about == text else about[:1].upper() + about[1:]

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import contextlib
 import io
 import unicodedata
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 from rich.console import Console, Group, RenderableType
 from rich.panel import Panel
-from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 from rich.text import Text
 
 from autograder.core.output import last_lines
-from autograder.core.results import CellResult, CheckResult, NodeLog, Outcome, Status, SubmissionResult
+from autograder.core.results import CellResult, CheckResult, Isolation, NodeLog, Outcome, Status, SubmissionResult
 from autograder.report import words
 from autograder.report.audience import Audience, check_for, reason, result_for
 from autograder.report.reading import section_for
@@ -49,20 +47,21 @@ def plain(text: str) -> str:
 
 def submission_view(result: SubmissionResult, audience: Audience = "student") -> RenderableType:
     """Return everything that this audience may know of one submission."""
-    result = result_for(result, audience)
-    parts: list[RenderableType] = []
-    for problem in result.problems:
-        parts.append(_outcome_line(problem))
-        parts.extend(_details(problem))
-    if result.problems:
-        parts.append(Text())
-    for check in result.checks:
-        parts.append(check_view(check, title=check.title or check.grade_id))
-    parts.append(Text())
-    parts.append(_total(result))
-    if result.isolation != "full":
-        parts.append(Text(f"isolation: {result.isolation.value}", "dim"))
-    return Group(*parts)
+    seen = result_for(result, audience)
+    checks = [check_view(check, title=check.title or check.grade_id) for check in seen.checks]
+    return Group(*problems_view(seen.problems), *checks, total_view(seen))
+
+
+def problems_view(problems: Sequence[Outcome]) -> list[RenderableType]:
+    """Return what is wrong with a submission as a whole."""
+    lines = [line for problem in problems for line in (_outcome_line(problem), *_details(problem))]
+    return [*lines, Text()] if lines else []
+
+
+def total_view(result: SubmissionResult) -> RenderableType:
+    """Return the last lines of a report: the points, and the isolation if it is not full."""
+    weaker = [] if result.isolation is Isolation.FULL else [Text(f"isolation: {result.isolation.value}", "dim")]
+    return Group(Text(), _total(result), *weaker)
 
 
 def _total(result: SubmissionResult) -> Text:
@@ -292,21 +291,3 @@ def console() -> Console:
     if not made.is_terminal:
         made.width = 120
     return made
-
-
-@contextlib.contextmanager
-def working(sentence: str) -> Iterator[None]:
-    """Say on the terminal what takes so long, and for how long; a pipe or a log gets nothing of it."""
-    progress = Progress(
-        SpinnerColumn(),
-        TextColumn("{task.description}"),
-        TimeElapsedColumn(),
-        console=Console(stderr=True),
-        transient=True,
-    )
-    if not progress.console.is_terminal:
-        yield
-        return
-    with progress:
-        progress.add_task(plain(sentence), total=None)
-        yield

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -136,3 +137,11 @@ def holding(found: Findings) -> str:
     counts = [(len(found.held), "part"), (len(found.passed), "expectation")]
     told = [f"{count} {what}{'' if count == 1 else 's'}" for count, what in counts if count]
     return f"{' and '.join(told)} {'holds' if sum(count for count, _ in counts) == 1 else 'hold'}" if told else ""
+
+
+def plain_title(markdown: str) -> str:
+    """Return a heading's text without Markdown's links and emphasis, and without saying that it is about a check."""
+    text = re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", markdown)
+    text = re.sub(r"(\*\*|__)(.+?)\1", r"\2", text)
+    about = text.removeprefix("Check: ")
+    return text if about == text else about[:1].upper() + about[1:]

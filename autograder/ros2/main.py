@@ -82,6 +82,15 @@ def run(
     return 0
 
 
+def verbs_of(command: str) -> list[str]:
+    """Return the verbs of a command; empty if there is no such command."""
+    if command not in COMMANDS:
+        return []
+    verbs = argparse.ArgumentParser().add_subparsers()
+    importlib.import_module(f"autograder.ros2.{command}").add_verbs(verbs)
+    return list(verbs.choices or ())
+
+
 def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
     """The parser of these words: of the other commands it knows the names."""
     parser = argparse.ArgumentParser(prog="ros2", description="ros2 is an extensible command-line tool for ROS 2.")

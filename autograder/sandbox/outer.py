@@ -11,6 +11,7 @@ import subprocess
 import sys
 import threading
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from autograder.core.results import Isolation
@@ -62,6 +63,7 @@ def run_in_sandbox(
     isolation: Isolation,
     time_limit: float,
     stop: threading.Event | None = None,
+    heard: Callable[[bytes], None] | None = None,
 ) -> OuterRun:
     """Run `python -m <module_args…>` in the grading sandbox and wait for it.
 
@@ -74,6 +76,7 @@ def run_in_sandbox(
         isolation: as `isolation.choose` returned it.
         time_limit: seconds after which everything in the sandbox is ended.
         stop: everything in it is ended soon after this is set.
+        heard: is given what it writes on stdout, as it comes.
 
     Raises:
         OSError: the sandbox cannot be started at all.
@@ -83,23 +86,27 @@ def run_in_sandbox(
         raise Stopped
     _compile_package()
     if isolation is not Isolation.FULL:
-        return _run(_start_child(module_args), stdin, time_limit, stop)
+        return _run(_start_child(module_args), stdin, time_limit, stop, heard)
     fork = _forks.fork(module_args)
-    run = _run(fork, stdin, time_limit, stop)
+    run = _run(fork, stdin, time_limit, stop, heard)
     if fork.lost and not fork.begun:  # the server was killed before it heard of it
         _forks.gone()
         fork = _forks.fork(module_args)
-        run = _run(fork, stdin, time_limit, stop)
+        run = _run(fork, stdin, time_limit, stop, heard)
     if fork.lost:
         run.stderr += _forks.gone()
     return run
 
 
 def _run(
-    process: subprocess.Popen[bytes] | Fork, stdin: bytes, time_limit: float, stop: threading.Event | None
+    process: subprocess.Popen[bytes] | Fork,
+    stdin: bytes,
+    time_limit: float,
+    stop: threading.Event | None,
+    heard: Callable[[bytes], None] | None,
 ) -> OuterRun:
     try:
-        return exchange(process, stdin, time_limit, stop)
+        return exchange(process, stdin, time_limit, stop, heard)
     finally:
         with contextlib.suppress(ProcessLookupError):
             process.kill()
@@ -166,7 +173,11 @@ def _compile_package_once() -> None:
 
 
 def exchange(
-    process: subprocess.Popen[bytes] | Fork, stdin: bytes, time_limit: float, stop: threading.Event | None = None
+    process: subprocess.Popen[bytes] | Fork,
+    stdin: bytes,
+    time_limit: float,
+    stop: threading.Event | None = None,
+    heard: Callable[[bytes], None] | None = None,
 ) -> OuterRun:
     """Feed a process and take what it writes, until it ends, writes too much, or its time is over.
 
@@ -175,6 +186,7 @@ def exchange(
         stdin: what it reads.
         time_limit: seconds.
         stop: gives up soon after this is set.
+        heard: is given what it writes on stdout, as it comes.
 
     Raises:
         Stopped: by `stop`.
@@ -214,6 +226,8 @@ def exchange(
                     selector.unregister(stream)
                 elif name == "stdout" or len(taken["stderr"]) < STDERR_KEPT:
                     taken[name] += data
+                    if name == "stdout" and heard is not None:
+                        heard(data)
     try:
         status = process.wait(max(0.5, deadline - time.monotonic()))
     except subprocess.TimeoutExpired:
