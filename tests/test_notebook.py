@@ -593,7 +593,7 @@ def test_lab_says_what_is_done_what_is_open_and_what_was_predicted(notebook: Not
         ("code", FILLED, check),
         ("markdown", "## 2. Ticks", {}),
         ("code", f"{CHECK}  # of this notebook", later),
-        ("markdown", "### Check: once more", {}),
+        ("markdown", "### Check: once more\n```\n# a comment\n```", {}),
         ("code", f"{CHECK}  # of this notebook, again", again),
         ("markdown", "## 3. Explain", {}),
         ("markdown", "Because.", text),
@@ -612,8 +612,8 @@ def test_lab_says_what_is_done_what_is_open_and_what_was_predicted(notebook: Not
     lines = [" ".join(line.split()) for line in said.text.splitlines()]
     assert lines[0] == "Lab 0: Hearts: 2 of 4 tasks done · 3 of 6 points"
     assert "✓ 1. Beats passed 3 of 3 points" in lines and "Go on with: 2. Ticks" in lines
-    assert "2. Ticks 0 of 3 points" in lines and "○ Once more not checked since the kernel started 1 point" in lines
-    assert "○ 2. Ticks not checked since the kernel started 2 points" in lines
+    assert "2. Ticks 0 of 3 points" in lines and "○ Once more not run in this kernel 1 point" in lines
+    assert "○ 2. Ticks not run in this kernel 2 points" in lines
     assert "✓ 3. Explain written 4 points, given by a person" in lines
     assert "beats 7 0 otherwise" in lines and "ticks pause open" in lines
     assert "pairs live, none live, none as predicted" in lines and "empty live, all open" in lines

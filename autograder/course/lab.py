@@ -29,6 +29,8 @@ CODE_STUB = "# YOUR CODE HERE"
 TEXT_STUB = "YOUR ANSWER HERE"
 
 _HEADING = re.compile(r"^(#{1,6})\s+(.*?)\s*#*\s*$", re.MULTILINE)
+_FENCED = re.compile(r"^(```|~~~).*?^\1[`~]*$", re.MULTILINE | re.DOTALL)
+"""Code, in which such a line is a comment."""
 
 
 @cache
@@ -180,7 +182,7 @@ def source_of(cell: dict[str, Any]) -> str:
 
 def headings(markdown: str) -> list[tuple[int, str]]:
     """Return the headings in a cell's text, each with its level, from 1."""
-    return [(len(marks), text) for marks, text in _HEADING.findall(markdown)]
+    return [(len(marks), text) for marks, text in _HEADING.findall(_FENCED.sub("", markdown))]
 
 
 def lab_names(root: Path) -> list[str]:

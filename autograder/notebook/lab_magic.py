@@ -54,6 +54,8 @@ def _text(state: LabState) -> str:
     screen = Console(file=io.StringIO(), width=100, highlight=False, color_system=None, force_jupyter=False)
     screen.print(plain(f"{state.title}: {state.summary}"), markup=False)
     rows = Table.grid(padding=(0, 1))
+    for heading in ("", "title", "said", "points"):
+        rows.add_column(heading, no_wrap=heading in ("said", "points"))
     for part in state.parts:
         if part.heading:
             rows.add_row("", plain(part.heading), "", part.points)

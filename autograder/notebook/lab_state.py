@@ -10,12 +10,11 @@ from typing import Any
 
 from autograder.core import student_yaml
 from autograder.core.results import CellResult
-from autograder.course.lab import TEXT_STUB, cell_digest, grade_id_of, nbgrader_of, source_of
+from autograder.course.lab import TEXT_STUB, cell_digest, grade_id_of, headings, nbgrader_of, source_of
 from autograder.report import words
 from autograder.report.words import Verdict
 from autograder.submission.notebook_file import cells_of
 
-_HEADING = re.compile(r"^(#{1,6})\s+(.*?)\s*#*\s*$", re.MULTILINE)
 _PART = 2
 """The level of the headings of a lab's parts."""
 _GUESS = re.compile(r"(^|_)predicted$")
@@ -135,9 +134,9 @@ def lab_state(notebook: Path, reports: Mapping[str, Report], runs: Mapping[str, 
     for cell in cells_of(notebook):
         source, marks = source_of(cell), nbgrader_of(cell)
         if cell.get("cell_type") == "markdown" and not marks.get("solution"):
-            for level, heading in _HEADING.findall(source):
+            for level, heading in headings(source):
                 title = words.plain_title(heading)
-                part = title if len(level) <= _PART else part
+                part = title if level <= _PART else part
                 state.title = state.title or title
         elif marks.get("solution"):
             named = re.match(r"%%(node|file)\s+(\S+)", source)
@@ -166,7 +165,7 @@ def _text(title: str, source: str, full: float) -> Row:
 def _check(title: str, report: Report | None, newest: int, full: float) -> Row:
     points = f"{full:g} point{'' if full == 1 else 's'}"
     if report is None:
-        return Row(title, None, "not checked since the kernel started", points, False, possible=full)
+        return Row(title, None, "not run in this kernel", points, False, possible=full)
     verdict = words.verdict(report.result)
     if newest > report.number:
         return Row(title, None, f"{verdict}, but a cell above was run again since", points, False, possible=full)

@@ -6,8 +6,9 @@ import contextlib
 from collections.abc import Iterator, Sequence
 
 from rich.console import Console
-from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+from rich.progress import Progress, ProgressColumn, SpinnerColumn, Task, TimeElapsedColumn
 from rich.table import Column
+from rich.text import Text
 
 from autograder.core.results import CheckResult, Outcome, SubmissionResult
 from autograder.report.audience import Audience, check_for, result_for
@@ -90,8 +91,15 @@ def working(sentence: str) -> Iterator[None]:
         yield
 
 
+class _Sentence(ProgressColumn):
+    """A task's description in one line, cut where the terminal ends."""
+
+    def render(self, task: Task) -> Text:
+        """Return it."""
+        return Text(task.description, no_wrap=True, overflow="ellipsis")
+
+
 def _line(screen: Console) -> Progress:
-    sentence = TextColumn("{task.description}", markup=False, table_column=Column(no_wrap=True, overflow="ellipsis"))
-    elapsed = TimeElapsedColumn(Column(no_wrap=True))
     on_a_terminal = screen.is_terminal and screen.file.isatty()
-    return Progress(SpinnerColumn(), elapsed, sentence, console=screen, transient=True, disable=not on_a_terminal)
+    elapsed = TimeElapsedColumn(Column(no_wrap=True))
+    return Progress(SpinnerColumn(), elapsed, _Sentence(), console=screen, transient=True, disable=not on_a_terminal)
