@@ -20,7 +20,8 @@ import pytest
 import toy
 from junitparser import JUnitXml
 
-from autograder.core.results import Isolation
+from autograder.core.grades import CellGrade, Grade
+from autograder.core.results import CheckResult, Isolation, Outcome, Part, Status, SubmissionResult
 from autograder.course.lab import load_lab
 from autograder.gradebook.class_entries import class_entries
 from autograder.gradebook.class_run import ClassRun, grade_class
@@ -35,6 +36,7 @@ from autograder.intake.members import members
 from autograder.intake.roster import read_roster
 from autograder.report.class_page import write_class_page
 from autograder.report.export import FORMATS
+from autograder.report.feedback_page import Heading, Task, feedback_html
 
 KIT = Path(__file__).resolve().parent.parent
 ROSTER = """id,name,email,section,canvas_id,moodle_id
@@ -254,6 +256,37 @@ def test_who_is_gone_from_the_source_leaves_the_class_until_they_are_back(graded
     assert nbgraders_own_export(graded.root, tmp_path) == {"ann": 9.5, "bob": 2.5}
     gone.rename(graded.source / FILES["cem"])
     assert "cem,toy,,9,2" in grade(graded.root, graded.source).grades.read_text()
+
+
+def test_a_page_on_which_most_is_wrong_is_no_longer_than_eight_screens(browser: Any) -> None:
+    """As long as those of lab 3, which has the most tasks."""
+    why = (
+        "The rule `camera/image_colour:=front/image_raw` changed nothing: nothing is called `/area/camera/image_colour`"
+    )
+    tasks, cells, checks = [], [], []
+    for number in range(20):
+        name, parts = f"check_{number}", [Part(title=f"part {part}", max_points=0.5, points=0) for part in range(4)]
+        outcomes = [
+            Outcome(
+                status=Status.FAILED, title=f"`/area/camera_{number}` has a publisher on `/status_{part}`",
+                because=f"{why}, the name on its left side, in line {number}.", expected="1 publisher",
+                observed="none; topics: /camera/image_color, /emergency_stop", hint="Compare them. See lecture 3.",
+                part=f"part {part}",
+            )
+            for part in range(4)
+        ]  # fmt: skip
+        wrong = CheckResult(grade_id=name, title=name, max_points=2, points=0, parts=parts, outcomes=outcomes)
+        right = CheckResult(grade_id=name, title=name, max_points=2, points=2)
+        checks.append(right if number % 5 == 0 else wrong)
+        cells.append(CellGrade(name, checks[-1].points, 2, True, False))
+        tasks.append(Task(f"Task {number}", [name], {f"program_{number}": "print('hello')"}, f"Part {number // 5}"))
+    result = SubmissionResult(student="ann", lab="toy", digest="d", isolation=Isolation.FULL, checks=checks)
+    day = datetime.date(2026, 11, 22)
+    text = feedback_html(Heading("Toy", "ann"), tasks, result, Grade("ann", "toy", tuple(cells), 0), day)
+    window = browser.new_page(viewport={"width": 1280, "height": 800})
+    window.set_content(text)
+    assert window.evaluate("document.documentElement.scrollHeight") < 8 * 800
+    window.close()
 
 
 def test_both_pages_can_be_read_by_everybody_on_a_phone_and_on_paper(graded: Graded, browser: Any) -> None:

@@ -161,6 +161,17 @@ def test_a_lost_part_stands_with_its_finding_and_held_parts_are_folded() -> None
     assert "partly passed" in text and "1 of 3 points" in text
 
 
+def test_a_reason_that_several_parts_have_is_told_once_and_none_of_them_is_left_out() -> None:
+    parts = [Part(title=name, max_points=1, points=0) for name in ("left", "right", "rear")]
+    whys = {"left": "They have one name.", "right": "They have one name.", "rear": "It is not there."}
+    outcomes = [outcome(Status.FAILED, part=name, because=why, hint="Name them.") for name, why in whys.items()]
+    page = check_html(check(0, *outcomes).model_copy(update={"parts": parts}))
+    assert page.count("Name them.") == 1
+    seen, folded = page.split("<details", 1)
+    assert "left" in seen and "It is not there." in seen and "right" not in seen
+    assert "1 more for reasons that stand above" in folded and "right · 0 of 1 point" in folded
+
+
 def test_an_untouched_answer_is_named_and_is_no_failure() -> None:
     text = text_of(check_view(VERDICTS["not attempted yet"]))
     assert "The cells `%%node talker`, `%%file table.yaml` are still as you received them." in text

@@ -96,8 +96,9 @@ def check_html(
         on_demand: whether hints open one after the other, for a student who still works on it.
         book: link to the folder of the lectures as HTML; empty if there is none.
     """
-    shown = _each_picture_once(check_for(check, audience))
+    shown = _each_thing_once(check_for(check, audience))
     verdict, found = words.verdict(shown), words.findings(shown)
+    lost, again = words.said_once(found)
     cut = [log.model_copy(update={"text": last_lines(log.text, LOG_LINES)}) for log in shown.logs if log.text.strip()]
     return render(
         "check.html",
@@ -108,7 +109,16 @@ def check_html(
         not_attempted=words.not_attempted(shown),
         remarks=remarks,
         findings=Markup(
-            render("findings.html", on_demand=on_demand, book=book, fold_pictures=fold_pictures, **vars(found))
+            render(
+                "findings.html",
+                bad=found.bad,
+                lost=lost,
+                again=again,
+                not_looked_at=found.not_looked_at,
+                on_demand=on_demand,
+                book=book,
+                fold_pictures=fold_pictures,
+            )
         ),
         folded=verdict is Verdict.NOT_ATTEMPTED,
         passed=found.passed,
@@ -119,14 +129,15 @@ def check_html(
     )
 
 
-def _each_picture_once(check: CellResult) -> CellResult:
-    """Leave out a picture that a finding above has: several expectations may look at one run."""
+def _each_thing_once(check: CellResult) -> CellResult:
+    """Leave out a picture or a hint that a finding above has: several expectations may look at one run."""
     seen: set[str] = set()
     outcomes = []
     for outcome in check.outcomes:
         if outcome.picture is not None and outcome.picture.svg in seen:
             outcome = outcome.model_copy(update={"picture": None})
-        elif outcome.picture is not None:
-            seen.add(outcome.picture.svg)
+        if outcome.hint in seen:
+            outcome = outcome.model_copy(update={"hint": ""})
+        seen |= {outcome.hint} | ({outcome.picture.svg} if outcome.picture is not None else set())
         outcomes.append(outcome)
     return check.model_copy(update={"outcomes": outcomes})

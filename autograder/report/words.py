@@ -132,6 +132,18 @@ def findings(check: CellResult) -> Findings:
     return Findings([o for o in bad if o.part not in titles], lost, held, by_status[Status.PASSED], sentence)
 
 
+def said_once(found: Findings) -> tuple[list[PartFindings], list[PartFindings]]:
+    """Split the lost parts: those that say something new, and those of which all reasons and hints stand above."""
+    said = [(one.because, one.hint) for one in found.bad]
+    new: list[PartFindings] = []
+    again: list[PartFindings] = []
+    for part in found.lost:
+        known = [any(one.because == why and one.hint in hint for why, hint in said if why) for one in part.bad]
+        (again if known and all(known) else new).append(part)
+        said += [(one.because, one.hint) for one in part.bad]
+    return new, again
+
+
 def holding(found: Findings) -> str:
     """Say how many parts and expectations hold; empty if none."""
     counts = [(len(found.held), "part"), (len(found.passed), "expectation")]
