@@ -63,8 +63,8 @@ def trouble(scene: Scene, name: str) -> Diagnosis | None:
     return diagnosis.program_trouble(scene)
 
 
-def of_goal(ask: str) -> Ask:
-    return lambda scene, name: getattr(diagnosis, ask)(scene, f"/{name}/count")
+def of_goal(ask: str, *more: str) -> Ask:
+    return lambda scene, name: getattr(diagnosis, ask)(scene, f"/{name}/count", *more)
 
 
 @dataclass
@@ -255,6 +255,21 @@ CASES = {
         COUNTS.format(AGREE),
         EXECUTE + "    return Fibonacci.Result()\n",
         says="no-succeed",
+        because="goal_handle.canceled()",
+        ask=of_goal("why_not_finished", "canceled"),
+    ),
+    "cancels_by_itself": Case(
+        COUNTS.format(AGREE),
+        EXECUTE + "    goal.canceled()\n    return Fibonacci.Result()\n",
+        says="execute-exception",
+        because="without a request to cancel",
+        ask=of_goal("why_not_finished"),
+    ),
+    "ends_twice": Case(
+        COUNTS.format(AGREE),
+        EXECUTE + "    goal.abort()\n" + SUCCEED,
+        says="execute-exception",
+        because="it ends only once",
         ask=of_goal("why_not_finished"),
     ),
     "aborts_by_itself": Case(
@@ -310,8 +325,9 @@ CASES = {
     "holds_the_thread": Case(
         COUNTS.format(AGREE),
         EXECUTE.replace("def execute", "async def execute") + "    time.sleep(0.5)\n" + SUCCEED,
+        THREADS.format(1),
         says="goal-holds-thread",
-        because="only an `await` gives the thread back",
+        because="only an `await` gives the thread back. Give it two threads",
         never=("cancel-return", "goal-holds-group"),
         ask=of_goal("why_not_canceled"),
     ),

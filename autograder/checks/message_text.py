@@ -27,8 +27,10 @@ def in_words(message: Any, looked_at_by: Callable[..., object] | None = None) ->
 
 
 def set_fields(message: Any) -> str:
-    """The fields of a message that were given a value, as `order=5`; those that are 0, empty or false are left out."""
-    said = [f"{path}={_value(value)}" for path, value in _fields(message, "") if value not in (0, b"\x00", "", [])]
+    """A message's fields as `order=5`; of several, those that are 0, empty or false are left out."""
+    fields = list(_fields(message, ""))
+    alone = len(fields) == 1
+    said = [f"{path}={_value(value)}" for path, value in fields if alone or value not in (0, b"\x00", "", [])]
     return ", ".join(said) or "every field is 0 or empty"
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 from autograder.diagnosis.events import BadMessage, BadReturn, CallbackError, Event, ThreadError, read
 from autograder.diagnosis.inside import Inside
 from autograder.diagnosis.reason import DiagnosedProgram, Diagnosis
@@ -171,6 +173,23 @@ def _bad_return(program: str, event: BadReturn) -> Diagnosis:
     )
 
 
+def _of_goal_state(error: str) -> str:
+    """What to do when a goal cannot end so, in the state that it is in; empty for another error."""
+    found = re.search(r"invalid transition from state (\w+) with event (\w+)", error)
+    if not found:
+        return ""
+    state, event = found.groups()
+    if state in ("SUCCEEDED", "CANCELED", "ABORTED"):
+        return "The goal had ended already, and it ends only once: `goal_handle.is_active` says whether it may still end."
+    if event == "CANCELED":
+        return (
+            "Call `canceled()` in the execute callback, and only while `goal_handle.is_cancel_requested` is true: "
+            "without a request to cancel this goal rclpy does not allow it. To give a goal up by yourself, call "
+            "`abort()`."
+        )
+    return "The goal was accepted and is not executed yet: `goal_handle.execute()` has to be called before it can end."
+
+
 def _error(program: str, event: CallbackError) -> Diagnosis:
     error = f"{event.type}: {event.text}".strip(": ")
     at = f" ({event.line})" if event.line else ""
@@ -198,6 +217,7 @@ def _error(program: str, event: CallbackError) -> Diagnosis:
             "A value that cannot be used is refused: what `add_on_set_parameters_callback` was given returns "
             "SetParametersResult(successful=False, reason=…). An exception ends the node."
         )
+    hint = _of_goal_state(error) or hint
     if not event.line and "positional argument" in error:
         hint = "It could not be called: the function takes another number of arguments than it is given here."
     if event.kind == "task" and not event.line:

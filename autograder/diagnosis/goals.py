@@ -19,6 +19,9 @@ from autograder.graph.names import nearest, type_name
 SEND_GOAL = "/_action/send_goal"
 """How the name of the service ends that takes an action's goals."""
 
+_ENDS = {"succeeded": "succeed()", "canceled": "canceled()", "aborted": "abort()"}
+"""What an execute callback calls for a status."""
+
 KEPT = 0.3
 """Seconds that a run must have taken to count as one that keeps requests waiting."""
 
@@ -50,8 +53,8 @@ def why_rejected(scene: Scene, name: str) -> Diagnosis | None:
     return _said(scene, name, "goal")
 
 
-def why_not_finished(scene: Scene, name: str) -> Diagnosis | None:
-    """Why a goal ended as it should not, or not at all.
+def why_not_finished(scene: Scene, name: str, status: str = "succeeded") -> Diagnosis | None:
+    """Why a goal did not end as this status, or not at all.
 
     Must have seen: an error leave the execute callback, its result refused, or a return without an end of the goal.
     """
@@ -65,8 +68,8 @@ def why_not_finished(scene: Scene, name: str) -> Diagnosis | None:
                     f"The execute callback of `{inside.name}` ({event.line}) returned without saying how the goal has "
                     "ended, so rclpy aborts it.",
                     "no-succeed",
-                    "Call `goal_handle.succeed()` before `return` (or `canceled()`, or `abort()`): a result alone does "
-                    "not say that the goal was reached.",
+                    f"Call `goal_handle.{_ENDS[status]}` before `return`: a result alone does not say how the goal has "
+                    "ended.",
                 )
     return None
 
@@ -133,7 +136,9 @@ def why_waits_for_a_goal(scene: Scene, name: str) -> Diagnosis | None:
                 f"`{inside.name}`: {called(thing)} holds the only thread of its {executor.type} until it returns, so "
                 f"nothing else of the node runs meanwhile: no timer, no new goal, no request to cancel.{alone}",
                 "goal-holds-thread",
-                "Add the node to a MultiThreadedExecutor(num_threads=...) and spin that.",
+                "Give it two threads or more: `MultiThreadedExecutor(num_threads=2)`."
+                if executor.type == "MultiThreadedExecutor"
+                else "Add the node to a MultiThreadedExecutor(num_threads=...) and spin that.",
             )
         if thing.kind in ("accepted", "goal") and thing.exclusive:
             return Diagnosis(

@@ -193,19 +193,26 @@ class ActionExpectations(Meeting):
         goal.wait_for_result(within)
         scene = self._scene() if goal.status != status or goal.result is None else None
         if scene is not None and goal.result is None:
-            because = f"The goal is `{self._state(goal)}`; it has not ended within {within:g} s."
+            because, advice = f"The goal is `{self._state(goal)}`; it has not ended within {within:g} s.", ""
             if self._state(goal) in ("succeeded", "canceled", "aborted"):
                 because = f"The goal is `{self._state(goal)}`, but its execute callback has not returned a result."
+                advice = "When its goal has ended, the execute callback has to `return`: nothing else ends its loop."
+            elif goal.agreed:
+                advice = "The server has agreed to cancel; now the execute callback has to look at `is_cancel_requested`."
             reason = (
-                diagnosis.why_not_finished(scene, goal.name)
+                diagnosis.why_not_finished(scene, goal.name, status)
                 or diagnosis.program_trouble(scene)
                 or diagnosis.inside_reason(scene)
-                or Diagnosis(because, "goal-unfinished")
+                or Diagnosis(because, "goal-unfinished", advice)
             )
             self._fail(title, reason, expected=status, observed="no end", hint=hint)
         if scene is not None:
-            found = diagnosis.why_not_finished(scene, goal.name) if goal.status == "aborted" else None
-            reason = found or Diagnosis(f"It ended as `{goal.status}`.", "goal-status")
+            found = diagnosis.why_not_finished(scene, goal.name, status) if goal.status == "aborted" else None
+            because, advice = f"It ended as `{goal.status}`.", ""
+            if goal.agreed:
+                because = f"The server had agreed to cancel the goal, and it ended as `{goal.status}` all the same."
+                advice = "While `is_cancel_requested` is true, the execute callback calls `canceled()` and no other end."
+            reason = found or Diagnosis(because, "goal-status", advice)
             self._fail(title, reason, expected=status, observed=goal.status, hint=hint)
         outcomes.passed(title, observed=goal.status)
         return goal.result
@@ -242,7 +249,7 @@ class ActionExpectations(Meeting):
                 said += f" The goal had ended as `{goal.status}` meanwhile."
             reason = (
                 diagnosis.why_not_canceled(scene, goal.name)
-                or (diagnosis.why_not_finished(scene, goal.name) if goal.status == "aborted" else None)
+                or (diagnosis.why_not_finished(scene, goal.name, "canceled") if goal.status == "aborted" else None)
                 or diagnosis.program_trouble(scene)
                 or diagnosis.inside_reason(scene)
                 or Diagnosis(said, "cancel-refused")

@@ -27,7 +27,7 @@ class FibonacciServer(Node):
         )
 
     def decide(self, goal):
-        return GoalResponse.ACCEPT if 1 <= goal.order else GoalResponse.REJECT
+        return GoalResponse.ACCEPT
 
     def execute(self, goal_handle):
         sequence = [0, 1]
