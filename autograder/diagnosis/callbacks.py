@@ -180,7 +180,7 @@ def _of_goal_state(error: str) -> str:
         return ""
     state, event = found.groups()
     if state in ("SUCCEEDED", "CANCELED", "ABORTED"):
-        return "The goal had ended already, and it ends only once: `goal_handle.is_active` says whether it may still end."
+        return "The goal had ended already, and it ends only once: `goal_handle.is_active` tells whether it may end."
     if event == "CANCELED":
         return (
             "Call `canceled()` in the execute callback, and only while `goal_handle.is_cancel_requested` is true: "

@@ -88,13 +88,10 @@ class ActionExpectations(Meeting):
             outcomes.passed(title, observed=observed)
             return sent
         if accepted:
-            found = diagnosis.why_rejected(self._scene(), name)
-            reason = found or Diagnosis(
-                f"The server rejected a goal that it should accept: {set_fields(goal)}.", "goal-rejected"
-            )
-            self._fail(
-                f"The action `{name}` accepts the goal", reason, expected="accepted", observed=observed, hint=hint
-            )
+            because = f"The server rejected a goal that it should accept: {set_fields(goal)}."
+            reason = diagnosis.why_rejected(self._scene(), name) or Diagnosis(because, "goal-rejected")
+            title = f"The action `{name}` accepts the goal"
+            self._fail(title, reason, expected="accepted", observed=observed, hint=hint)
         reason = Diagnosis(f"The server accepted a goal that it should reject: {set_fields(goal)}.", "goal-accepted")
         self._fail(f"The action `{name}` rejects the goal", reason, expected="rejected", observed=observed, hint=hint)
 
@@ -191,14 +188,17 @@ class ActionExpectations(Meeting):
         """
         title = f"The goal of `{goal.name}` ends as `{status}`"
         goal.wait_for_result(within)
-        scene = self._scene() if goal.status != status or goal.result is None else None
-        if scene is not None and goal.result is None:
+        if goal.status == status and goal.result is not None:
+            outcomes.passed(title, observed=goal.status)
+            return goal.result
+        scene = self._scene()
+        if goal.result is None:
             because, advice = f"The goal is `{self._state(goal)}`; it has not ended within {within:g} s.", ""
             if self._state(goal) in ("succeeded", "canceled", "aborted"):
                 because = f"The goal is `{self._state(goal)}`, but its execute callback has not returned a result."
-                advice = "When its goal has ended, the execute callback has to `return`: nothing else ends its loop."
+                advice = "When its goal has ended, the execute callback has to `return`."
             elif goal.agreed:
-                advice = "The server has agreed to cancel; now the execute callback has to look at `is_cancel_requested`."
+                advice = "It agreed to cancel: now the execute callback has to look at `is_cancel_requested`."
             reason = (
                 diagnosis.why_not_finished(scene, goal.name, status)
                 or diagnosis.program_trouble(scene)
@@ -206,16 +206,13 @@ class ActionExpectations(Meeting):
                 or Diagnosis(because, "goal-unfinished", advice)
             )
             self._fail(title, reason, expected=status, observed="no end", hint=hint)
-        if scene is not None:
-            found = diagnosis.why_not_finished(scene, goal.name, status) if goal.status == "aborted" else None
-            because, advice = f"It ended as `{goal.status}`.", ""
-            if goal.agreed:
-                because = f"The server had agreed to cancel the goal, and it ended as `{goal.status}` all the same."
-                advice = "While `is_cancel_requested` is true, the execute callback calls `canceled()` and no other end."
-            reason = found or Diagnosis(because, "goal-status", advice)
-            self._fail(title, reason, expected=status, observed=goal.status, hint=hint)
-        outcomes.passed(title, observed=goal.status)
-        return goal.result
+        found = diagnosis.why_not_finished(scene, goal.name, status) if goal.status == "aborted" else None
+        because, advice = f"It ended as `{goal.status}`.", ""
+        if goal.agreed:
+            because = f"The server had agreed to cancel the goal, and it ended as `{goal.status}` all the same."
+            advice = "While `is_cancel_requested` is true, call `canceled()` and no other end."
+        found = found or Diagnosis(because, "goal-status", advice)
+        self._fail(title, found, expected=status, observed=goal.status, hint=hint)
 
     def expect_canceled(self, goal: Goal, *, within: float = 3.0, hint: str = "") -> Any:
         """Ask the server to cancel a goal: it agrees, and soon ends the goal as `canceled`.
@@ -245,8 +242,7 @@ class ActionExpectations(Meeting):
         if not goal.agreed:
             scene = self._scene()
             said = "It refused." if goal.agreed is False else f"No answer came within {within:g} s."
-            if goal.result is not None:
-                said += f" The goal had ended as `{goal.status}` meanwhile."
+            said += f" The goal had ended as `{goal.status}` meanwhile." if goal.result is not None else ""
             reason = (
                 diagnosis.why_not_canceled(scene, goal.name)
                 or (diagnosis.why_not_finished(scene, goal.name, "canceled") if goal.status == "aborted" else None)
