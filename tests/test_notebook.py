@@ -123,6 +123,14 @@ def test_a_bad_name_writes_nothing_and_is_explained(
     assert not Path("nodes").exists()
 
 
+def test_what_the_disk_refuses_is_named_with_what_to_do(
+    shell: InteractiveShell, capsys: pytest.CaptureFixture[str]
+) -> None:
+    Path("nodes").write_text("a file, where a folder has to be")
+    said = say(shell, "%%node talker\nprint('hello')\n", capsys)
+    assert "✗ not written: " in said and "nodes" in said and "run this cell again" in said
+
+
 def test_the_magics_explain_themselves(shell: InteractiveShell) -> None:
     for magic, example in (("node", "%%node talker"), ("file", "%%file camera.yaml")):
         text = shell.find_cell_magic(magic).__doc__

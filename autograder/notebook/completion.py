@@ -2,21 +2,41 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from autograder.notebook.kernel import Kernel
 
-_PROGRAM = r"""(?s).*\b(launch|Program|log|start)\(\s*(["'][^"']*["']\s*,\s*)*["']\w*$|%%node\s+\w*$"""
-"""Where the name of a program is being written, up to the cursor."""
-
+_PROGRAM = re.compile(r"""\b(launch|Program|log|start)\((\s*["'][^"']*["']\s*,)*\s*["']\w*$|^%%node\s+\w*$""")
+"""How a line ends, up to the cursor, in which the name of a program is being written."""
+_ROS2 = re.compile(r"^\s*%ros2\s")
 _ABOUT_NODES = ("node", "param", "lifecycle")
 
 
 def register(shell: Any, kernel: Kernel) -> None:
     """Add to what a shell completes."""
-    shell.set_hook("complete_command", lambda _shell, _event: _programs(kernel), re_key=_PROGRAM)
-    shell.set_hook("complete_command", lambda _shell, event: _words(event), str_key="%ros2")
+    from IPython.core.completer import context_matcher
+
+    @context_matcher()  # type: ignore[untyped-decorator]
+    def offers(context: Any) -> dict[str, Any]:
+        line = context.text_until_cursor.rpartition("\n")[2]
+        if _PROGRAM.search(line):
+            return _offered(_programs(kernel), context.token)
+        if _ROS2.match(line):
+            return _offered(_words(line[: len(line) - len(context.token)].split()[1:]), context.token)
+        return {"completions": []}
+
+    shell.Completer.custom_matchers.append(offers)
+
+
+def _offered(words: Iterable[str], token: str) -> dict[str, Any]:
+    """The words that begin so, and nothing of Python's."""
+    from IPython.core.completer import SimpleCompletion
+
+    found = [SimpleCompletion(word) for word in words if word.startswith(token)]
+    return {"completions": found, "suppress": True, "ordered": True}
 
 
 def _programs(kernel: Kernel) -> list[str]:
@@ -27,12 +47,11 @@ def _programs(kernel: Kernel) -> list[str]:
     return sorted(name.removesuffix(".py") for name in names if name.endswith(".py") and "/" not in name)
 
 
-def _words(event: Any) -> list[str]:
+def _words(before: list[str]) -> list[str]:
     """The commands, the verbs of a command, and then what is on the graph of the programs that run."""
     from autograder.checks.runtime import current
     from autograder.ros2.main import COMMANDS, verbs_of
 
-    _, *before = event.text_until_cursor[: len(event.text_until_cursor) - len(event.symbol)].split()
     if not before:
         return list(COMMANDS)
     if len(before) == 1:

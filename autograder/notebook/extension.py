@@ -36,9 +36,12 @@ _FILE_HELP = """Write the rest of the cell to a file: parameters, a launch file,
       ros__parameters:
         rate: 10.0
 
-The name has no folder and ends in .yaml, .yml, .json or .csv. The file lies in the folder `nodes` beside the notebook.
-After a change run the cell again, and then its check.
+The name has no folder and ends in .yaml, .yml, .json or .csv; a file of a package begins with the package's folder, as
+in `%%file src/car_sensors/package.xml`. The file lies in the folder `nodes` beside the notebook. After a change run the
+cell again, and then its check.
 """
+
+_ANEW = "Once that is mended, run this cell again; until then what it wrote before still runs."
 
 
 def register(shell: Any) -> None:
@@ -99,7 +102,7 @@ def _writer(kernel: Kernel, magic: str, text: str) -> Any:
         except BadNameError as error:
             print(f"✗ not written: {error}")
         except OSError as error:
-            print(f"✗ not written: {error.filename or 'the file'}: {error.strerror or error}")
+            print(f"✗ not written: {error.filename or 'the file'}: {error.strerror or error}. {_ANEW}")
 
     write.__doc__ = text
     return write
