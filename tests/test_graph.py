@@ -29,6 +29,7 @@ from autograder.checks import runtime
 from autograder.checks.concurrency import Concurrency
 from autograder.checks.program import Program
 from autograder.core.cpu_use import CpuUse, cpu_uses, kept_waiting
+from autograder.graph import domains
 from autograder.graph.names import nearest
 from autograder.graph.observer import Observer
 from autograder.graph.qos import first_mismatch
@@ -89,6 +90,13 @@ def test_overlap_counts_the_runs_that_are_under_way_together(runs: list[tuple[st
 def test_the_order_of_publication_decides_not_the_order_of_arrival() -> None:
     messages = received(["a begin", "a end", "b begin", "b end"])
     assert Concurrency([messages[i] for i in (0, 2, 1, 3)]).overlap("ab") == 1
+
+
+def test_where_idle_kernels_claim_every_domain_one_without_programs_is_taken(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A hundred kernels are too many for a test: that all domains are claimed, and one is free, is said for them."""
+    monkeypatch.setattr(domains, "_claimed", lambda _domain: None)
+    monkeypatch.setattr(domains, "is_free", lambda domain: domain == 42)
+    assert next(domains.free_domains()) == 42
 
 
 @pytest.mark.parametrize(
