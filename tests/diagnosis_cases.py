@@ -43,6 +43,10 @@ def silent_late(scene: Scene, name: str) -> Diagnosis | None:
     return diagnosis.why_silent(scene, f"/{name}/map", String, LATCHED)
 
 
+def unlogged(scene: Scene, name: str) -> Diagnosis | None:
+    return diagnosis.nothing_due(scene, f"/{name}")
+
+
 def inside(scene: Scene, name: str) -> Diagnosis | None:
     return diagnosis.inside_reason(scene, f"/{name}")
 
@@ -622,6 +626,9 @@ CASES = {
     # Silence.
     "long_period": Case(
         "self.create_timer(500.0, lambda: None)\n", says="timer-period", because="every 500 s)", never=("silent",)
+    ),
+    "logs_later": Case(
+        "self.create_timer(500.0, lambda: None)\n", says="timer-period", because="every 500 s)", ask=unlogged
     ),
     "two_periods": Case(
         "self.create_timer(500.0, lambda: None)\nself.create_timer(0.05, lambda: None)\n",

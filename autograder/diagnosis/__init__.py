@@ -27,7 +27,15 @@ from autograder.diagnosis.names import why_doubled, why_no_endpoint, why_no_node
 from autograder.diagnosis.programs import program_trouble, shut_down_inside
 from autograder.diagnosis.reason import DiagnosedProgram, Diagnosis
 from autograder.diagnosis.scene import Scene
-from autograder.diagnosis.silence import SILENT, account, lifecycle_silence, paces, why_no_answer, why_silent
+from autograder.diagnosis.silence import (
+    SILENT,
+    account,
+    lifecycle_silence,
+    nothing_due,
+    paces,
+    why_no_answer,
+    why_silent,
+)
 from autograder.diagnosis.together import layout, waits_for_its_group, why_not_together, why_starved
 from autograder.diagnosis.traces import last_traceback
 from autograder.diagnosis.turns import why_kept_waiting
@@ -44,6 +52,7 @@ __all__ = [
     "last_traceback",
     "layout",
     "lifecycle_silence",
+    "nothing_due",
     "paces",
     "program_trouble",
     "shut_down_inside",

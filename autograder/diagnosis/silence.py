@@ -93,16 +93,34 @@ def too_old(scene: Scene, topic: str, profile: QoSProfile) -> Diagnosis | None:
 
 
 def not_due(scene: Scene, topic: str) -> Diagnosis | None:
-    """Must have seen: a node that is spun and has published nothing, and timers of it of which none is due yet."""
+    """Must have seen: a node that has published nothing on a topic, and timers of it of which none is due yet."""
     for inside, publisher in _publishers(scene, topic):
-        timers = [t for t in inside.callbacks if t.kind == "timer" and t.node == publisher.node and not t.cancelled]
-        late = [t for t in timers if not t.runs and t.period > inside.age]
-        if inside.alive and not publisher.runs and late and len(late) == len(timers):
-            return Diagnosis(
-                f"`{inside.name}`: {called(late[0])} has not fired yet; the program has run for {inside.age:.0f} s.",
-                "timer-period",
-                "`create_timer` takes its period in seconds.",
-            )
+        found = None if publisher.runs else _no_timer_due(inside, publisher.node)
+        if found:
+            return found
+    return None
+
+
+def _no_timer_due(inside: Inside, node: str) -> Diagnosis | None:
+    """Must have seen: a program that lives, and timers of its node of which none is due yet."""
+    timers = [t for t in inside.callbacks if t.kind == "timer" and t.node == node and not t.cancelled]
+    late = [t for t in timers if not t.runs and t.period > inside.age]
+    if inside.alive and late and len(late) == len(timers):
+        return Diagnosis(
+            f"`{inside.name}`: {called(late[0])} has not fired yet; the program has run for {inside.age:.0f} s.",
+            "timer-period",
+            "`create_timer` takes its period in seconds.",
+        )
+    return None
+
+
+def nothing_due(scene: Scene, node: str) -> Diagnosis | None:
+    """Must have seen: a node without a subscription that lives, and timers of it of which none is due yet."""
+    for inside in scene.insides:
+        if not any(thing.kind == "subscription" and thing.node == node for thing in inside.callbacks):
+            found = _no_timer_due(inside, node)
+            if found:
+                return found
     return None
 
 

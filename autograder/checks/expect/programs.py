@@ -179,8 +179,8 @@ class ProgramExpectations(Expectations):
             found = len(matching()) == count
         self._expect_that(
             found,
-            f"A log message{f' of level {level}' if level else ''} says {text!r}",
-            lambda: self._why_not_logged(len(matching())),
+            f"A log message{f' of level {level}' if level else ''} {f'says {text!r}' if text else 'comes'}",
+            lambda: self._why_not_logged(len(matching()), text, level, node),
             expected=text,
             observed="; ".join(r.msg.msg for r in rosout.messages[-3:]),
             hint=hint,
@@ -192,10 +192,29 @@ class ProgramExpectations(Expectations):
         profile = QoSProfile(depth=1000, durability=QoSDurabilityPolicy.TRANSIENT_LOCAL)
         return self._observer.record("/rosout", Log, profile)
 
-    def _why_not_logged(self, times: int) -> Diagnosis:
-        came = {0: "No such message was logged.", 1: "It came once."}.get(times, f"It came {times} times.")
+    def _why_not_logged(self, times: int, text: str, level: str, node: str) -> Diagnosis:
+        instead = "" if times else self._said_instead(text, level, node)
         scene = self._scene()
-        return diagnosis.program_trouble(scene) or diagnosis.inside_reason(scene) or Diagnosis(came, "no-log")
+        found = diagnosis.program_trouble(scene) or diagnosis.inside_reason(scene)
+        if not found and node and not times and not instead:
+            found = diagnosis.nothing_due(scene, "/" + node.replace(".", "/"))
+        came = {0: instead or "No such message was logged.", 1: "It came once."}.get(times, f"It came {times} times.")
+        return found or Diagnosis(came, "no-log")
+
+    def _said_instead(self, text: str, level: str, node: str) -> str:
+        """The same words at another level, by another node or only printed, where a message did not come."""
+        said = [r.msg for r in self._rosout.messages if re.search(text, r.msg.msg)]
+        own = [message for message in said if not node or message.name == node]
+        if level and own and own[-1].level != _LEVELS[level]:
+            has = next((name for name, number in _LEVELS.items() if number == own[-1].level), str(own[-1].level))
+            return f"`{own[-1].msg[:80]}` was logged at level {has}, not at {level}."
+        if said and text and not own:
+            return f"`{said[-1].msg[:80]}` was logged by `{said[-1].name}`, not by `{node}`."
+        lines = (line.strip() for _, program in self._running.programs for line in program.output().splitlines())
+        printed = next((line for line in lines if text and re.search(text, line) and "] [" not in line), "")
+        if printed:
+            return f"`{printed[:80]}` was printed, not logged. What `self.get_logger()` is given is logged."
+        return ""
 
     @cached_property
     def clock(self) -> ClockDriver:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from collections import Counter
 from collections.abc import Sequence
 
 from autograder.checks.expect.endpoints import EndExpectations
@@ -31,14 +32,16 @@ class SourceExpectations(EndExpectations):
         )
         ends = self._ends(topic, msg_type, "publisher", "")
         owners = [full_name(end.node_namespace, end.node_name) for end in ends]
-        named = ", ".join(sorted(owners))
+        named = ", ".join(f"{many} of {name}" if many > 1 else name for name, many in sorted(Counter(owners).items()))
         if len(ends) > publishers and not (len(set(owners)) == publishers == 1 and not _numbers_repeat(received)):
             self._fail(
                 title,
                 Diagnosis(
                     f"`{topic}` has {len(ends)} publishers ({named}): it cannot be told whose messages these are.",
                     "extra-publisher",
-                    "Publish on this topic from one place only.",
+                    "Publish on this topic from one place only."
+                    + " Make the publisher once, in the constructor, and send each message with it."
+                    * (len(set(owners)) == 1),
                 ),
                 expected=f"{publishers} publisher",
                 observed=f"{len(ends)} publishers",

@@ -12,7 +12,7 @@ class TemperatureMonitor(Node):
 
     def judge(self, message):
         if message.temperature > 30:
-            self.get_logger().warn("%r is more than thirty" % message.temperature)
+            self.get_logger().warn("above the limit of 30.0: %r" % message.temperature)
 
 
 def main():

@@ -1,4 +1,7 @@
 %%node camera
+import threading
+import time
+
 import rclpy
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
@@ -14,11 +17,15 @@ class Camera(Node):
         self.image = Image(width=WIDTH, height=HEIGHT, encoding="rgb8", step=3 * WIDTH)
         self.image.header.frame_id = "camera_link"
         self.image.data = b"\x10\x20\x30" * (WIDTH * HEIGHT)
-        self.create_timer(0.1, self.take)
+        threading.Thread(target=self.take, daemon=True).start()
 
     def take(self):
-        self.image.header.stamp = self.get_clock().now().to_msg()
-        self.publisher.publish(self.image)
+        due = time.monotonic()
+        while rclpy.ok():
+            self.image.header.stamp = self.get_clock().now().to_msg()
+            self.publisher.publish(self.image)
+            due += 0.1
+            time.sleep(max(0.0, due - time.monotonic()))
 
 
 def main():
