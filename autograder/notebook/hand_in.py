@@ -49,15 +49,16 @@ def look_over(notebook: Path, lab: Lab, packed: Path) -> HandIn:
         return found
     saved_at = notebook.stat().st_mtime
     untouched: list[str] = []
+    unrun: list[str] = []
     runs = read_runs(notebook.parent / NODES / notebook.stem)
     for answer in lab.answers.values():
         cell = cells.get(answer.grade_id)
         if cell is not None:
-            _look_at_answer(answer, cell, runs, saved_at, found, untouched)
+            _look_at_answer(answer, cell, runs, saved_at, found, untouched, unrun)
     if untouched:
-        one = len(untouched) == 1
-        cells_are = f"cell {untouched[0]} is" if one else f"cells {', '.join(untouched)} are"
-        found.empty.append(f"The {cells_are} still as you received {'it' if one else 'them'}.")
+        found.empty.append(_of_all(untouched, "is still as you received it.", "are still as you received them."))
+    if unrun:
+        found.unrun.append(_of_all(unrun, "has not been run.", "have not been run."))
     found.outdated += _older_checks(lab, cells)
     return found
 
@@ -69,6 +70,7 @@ def _look_at_answer(
     saved_at: float,
     found: HandIn,
     untouched: list[str],
+    unrun: list[str],
 ) -> None:
     source = source_of(cell)
     name = f"`%%{answer.file.magic} {answer.file.name}`" if answer.file else f"`{answer.grade_id}`"
@@ -78,7 +80,7 @@ def _look_at_answer(
         return
     elif (ran := runs.get(answer.file.file_name)) is None:
         if cell.get("execution_count") is None:
-            found.unrun.append(f"The cell {name} has not been run.")
+            unrun.append(name)
     elif ran.sha256 != _digest(source, answer.file):
         clock = time.strftime("%H:%M:%S", time.localtime(ran.at))
         if ran.at > saved_at:
@@ -91,6 +93,10 @@ def _look_at_answer(
                 f"The cell {name} has been changed since it was run at {clock}: what you saw of it is about the earlier"
                 " text. The saved text is handed in."
             )
+
+
+def _of_all(names: list[str], of_one: str, of_several: str) -> str:
+    return f"The cell {names[0]} {of_one}" if len(names) == 1 else f"The cells {', '.join(names)} {of_several}"
 
 
 def _digest(source: str, file: CellFile) -> str:
