@@ -506,6 +506,14 @@ def test_a_wait_says_what_it_waits_for_and_cleans_up(notebook: Notebook) -> None
     assert "\n\n✓ passed" in shown.text
 
 
+def test_an_interrupt_is_a_sentence_and_the_next_verdict_is_right(notebook: Notebook) -> None:
+    write(notebook)
+    interrupts = "lambda: os.kill(os.getpid(), signal.SIGINT)"
+    shown = notebook.run(f'import os, signal\nwith launch("talker") as ros:\n    ros.wait({interrupts}, within=60)')
+    assert shown.error == "Interrupted while it waited for what `ros.wait` asks for."
+    assert "✓ passed" in notebook.run(CHECK).text
+
+
 def test_a_module_of_the_students_own_is_imported(notebook: Notebook) -> None:
     base = "%%node my_base\nTOPIC = 'chatter'"
     user = TALKER.replace("import rclpy\n", "import rclpy\nimport my_base\n").replace('"chatter"', "my_base.TOPIC")

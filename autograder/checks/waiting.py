@@ -65,6 +65,14 @@ class NotLaunchedError(Exception):
         return [str(self)]
 
 
+class Interrupted(KeyboardInterrupt):
+    """Somebody has interrupted a wait. In a notebook it reads as a sentence."""
+
+    def _render_traceback_(self) -> list[str]:
+        """What IPython shows in place of a traceback through the kit."""
+        return [str(self)]
+
+
 def watched(launch: type) -> type:
     """Make the methods of `launch` that wait say what for."""
     for name, sentence in _WAITS_FOR.items():
@@ -79,10 +87,13 @@ def _says(method: Any, sentence: str) -> Any:
     def call(self: Any, *args: Any, **kwargs: Any) -> Any:
         look_at_times(args, kwargs)
         first = next(iter([*args, *kwargs.values()]), "")
-        if self._watch is None or not self._watch.begin(sentence.format(first if isinstance(first, str) else "it")):
+        awaited = sentence.format(first if isinstance(first, str) else "it")
+        if self._watch is None or not self._watch.begin(awaited):
             return method(self, *args, **kwargs)
         try:
             return method(self, *args, **kwargs)
+        except KeyboardInterrupt:
+            raise Interrupted(f"Interrupted while it waited for {awaited}.") from None
         finally:
             self._watch.end()
 
