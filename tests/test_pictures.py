@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from std_msgs.msg import String
 
 from autograder.checks import findings, launch, runtime
 from autograder.core.results import CellResult, Isolation, Outcome, Status
@@ -119,6 +120,12 @@ def test_arrivals_count_each_row() -> None:
     assert "usually every 0.10 s" in picture.alt
 
 
+@pytest.mark.parametrize("seconds", [0.02, 3.0, 7200.0, 1e6])
+def test_an_axis_of_seconds_fits_what_took_moments_and_what_took_days(seconds: float) -> None:
+    shown = words(arrivals("/frames", [Traffic("/camera publishes", [0.0, seconds])])).split(" | ")
+    assert 2 <= len([text for text in shown if re.fullmatch(r"[\d.]+( s)?", text)]) <= 20
+
+
 def test_a_forged_name_does_nothing() -> None:
     ends = [Endpoint(NASTY, NASTY, True, BEST_EFFORT)]
     drawn = [
@@ -178,6 +185,7 @@ def programs(tmp_path: Path) -> Iterator[Path]:
 
 def test_a_launch_draws_what_its_programs_did(programs: Path) -> None:
     with launch("robot") as ros:
+        ros.expect_publisher("/activity", String, node="/robot")
         assert ros.wait(lambda: ros.runs().count("camera") >= 2 and ros.runs().count("beat") >= 2)
         on_graph = ros.graph()
     runs = ros.runs()

@@ -163,7 +163,8 @@ def seconds_axis(canvas: Canvas, left: float, top: float, bottom: float, seconds
     """Draw the grid of a time axis from 0 to `seconds`, with its numbers; return the units for one second."""
     right = canvas.width - 24
     per_second = (right - left) / seconds
-    step = next(step for step in (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 30.0, 60.0, 600.0) if seconds / step <= 10.5)
+    steps = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 30.0, 60.0, 600.0, 3600.0)
+    step = next((step for step in steps if seconds / step <= 10.5), seconds / 10)
     for number in range(int(seconds / step + 1e-6) + 1):
         x = left + number * step * per_second
         canvas.line([(x, top), (x, bottom)], line=1, grey=True)

@@ -93,10 +93,8 @@ def _moved(run: Run, zero: float) -> Run:
 def _sections(runs: Sequence[Run], by: str) -> list[tuple[str, list[_Row]]]:
     """The rows, by the heading above them."""
     if by == "thread":
-        threads = sorted({(run.node.partition(" ")[0], run.thread) for run in runs}, key=lambda key: key[1])
-        rows = [
-            _Row(f"thread {n}", "", [[r for r in runs if r.thread == n]]) for n in dict.fromkeys(t for _, t in threads)
-        ]
+        threads = sorted({run.thread for run in runs})
+        rows = [_Row(f"thread {number}", "", [[run for run in runs if run.thread == number]]) for number in threads]
         return [("", rows)] if rows else []
     nodes = {run.node for run in runs}
     sections: dict[str, list[_Row]] = {}
