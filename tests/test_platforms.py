@@ -6,6 +6,7 @@ import io
 import subprocess
 import sys
 import zipfile
+from collections.abc import Mapping
 from pathlib import Path
 
 import pytest
@@ -128,7 +129,7 @@ PLATFORMS: dict[str, tuple[str, dict[str, str], dict[str, str], dict[str, str]]]
 }
 
 
-def lay_out(files: dict[str, str], place: Path, zipped: bool) -> Path:
+def lay_out(files: Mapping[str, str | bytes], place: Path, zipped: bool) -> Path:
     """The files as a folder or as a zip."""
     if zipped:
         with zipfile.ZipFile(place / "in.zip", "w", zipfile.ZIP_DEFLATED) as archive:
@@ -137,7 +138,7 @@ def lay_out(files: dict[str, str], place: Path, zipped: bool) -> Path:
         return place / "in.zip"
     for name, text in files.items():
         (place / "in" / name).parent.mkdir(parents=True, exist_ok=True)
-        (place / "in" / name).write_text(text)
+        (place / "in" / name).write_bytes(text.encode() if isinstance(text, str) else text)
     return place / "in"
 
 
@@ -199,14 +200,50 @@ def test_two_students_of_one_name_stay_two(tmp_path: Path) -> None:
     assert texts(collected) == {"doejane_1": "one", "doejane_2": "other"}
 
 
-def test_a_folder_of_zips_is_a_class(tmp_path: Path) -> None:
-    (tmp_path / "in").mkdir()
-    for student in ("jd01", "mm02"):
-        content = io.BytesIO()
-        with zipfile.ZipFile(content, "w") as archive:
-            archive.writestr("toy.ipynb", student)
-        (tmp_path / "in" / f"{student}.zip").write_bytes(content.getvalue())
-    assert texts(collect(tmp_path / "in", toy.LAB, tmp_path / "course")) == {"jd01": "jd01", "mm02": "mm02"}
+def zip_of(text: str, name: str = "toy.ipynb") -> bytes:
+    content = io.BytesIO()
+    with zipfile.ZipFile(content, "w") as archive:
+        archive.writestr(name, text)
+    return content.getvalue()
+
+
+@pytest.mark.parametrize("zipped", [False, True], ids=["folder", "zip"])
+@pytest.mark.parametrize(
+    ("names", "called"),
+    [
+        (("jd01.zip", "mm02.zip"), ""),
+        (("doejane_12345_678901_toy.zip", "mullerjurgen_12346_678902_work.zip"), "Canvas"),
+        (("Lab 2_jd01_attempt_2026-11-19-10-00-00_toy.zip", "Lab 2_mm02_attempt_2026-11-18-08-00-00_a.zip"),
+         "Blackboard"),
+    ],
+    ids=["students", "canvas", "blackboard"],
+)  # fmt: skip
+def test_zips_with_a_notebook_each_are_a_class(
+    tmp_path: Path, names: tuple[str, str], called: str, zipped: bool
+) -> None:
+    course = tmp_path / "course"
+    course.mkdir()
+    (course / "roster.csv").write_text(ROSTER, encoding="utf-8")
+    files = {name: zip_of(text) for name, text in zip(names, ("jd", "mm"), strict=True)}
+    collected = collect(lay_out(files, tmp_path, zipped), toy.LAB, course)
+    assert texts(collected) == {"jd01": "jd", "mm02": "mm"}
+    assert (collected.format, collected.refused) == (called, [])
+
+
+def test_a_name_that_leaves_nothing_of_the_student_is_refused_and_stops_nobody_else(tmp_path: Path) -> None:
+    collected = collect(lay_out({"toy_.ipynb": "?", "toy_ann.ipynb": "ann"}, tmp_path, False), toy.LAB, tmp_path / "c")
+    assert texts(collected) == {"ann": "ann"}
+    assert "'' cannot be a student's name" in collected.refused[0]
+
+
+def test_two_folders_of_one_student_in_the_roster_do_not_replace_each_other_unsaid(tmp_path: Path) -> None:
+    course = tmp_path / "course"
+    course.mkdir()
+    (course / "roster.csv").write_text(ROSTER + ",,,,,,\n", encoding="utf-8")  # as spreadsheets write an empty line
+    files = {"janedoe/toy.ipynb": "by GitHub", "jd01/toy.ipynb": "by number"}
+    collected = collect(lay_out(files, tmp_path, False), toy.LAB, course)
+    assert texts(collected) == {"jd01": "by GitHub"}
+    assert "'janedoe' and 'jd01' mean the same student; the second was left out" in collected.refused[0]
 
 
 @pytest.mark.parametrize("zipped", [False, True], ids=["folder", "zip"])

@@ -84,8 +84,7 @@ def collect(source: Path, lab: str, root: Path) -> Collected:
             collected.refused.append(f"The folder {folder[:80]!r} cannot be a student's name; it was left out.")
             continue
         if student in owners:
-            twice = f"The folders {owners[student][:80]!r} and {folder[:80]!r} mean the same student"
-            collected.refused.append(f"{twice}; the second was left out.")
+            collected.refused.append(_twice(owners[student], folder))
             continue
         owners[student] = folder
         if student != unicodedata.normalize("NFC", folder):
@@ -155,7 +154,7 @@ def _of_platform(source: Path, lab: str, roster: Roster | None, collected: Colle
 def _called(claim: Claim, claims: Sequence[Claim]) -> str:
     """The name that a platform gives a student; with its number for them where two have one name."""
     owner = claim.owner
-    name = next(owner[kind] for kind in ("id", "github", "name", "canvas", "email") if owner.get(kind))
+    name = next((owner[kind] for kind in ("id", "github", "name", "canvas", "email") if owner.get(kind)), "")
     number = owner.get("canvas_id") or owner.get("moodle_id") or ""
     others = (other.owner for other in claims if other.owner != owner)
     return f"{name}_{number}" if number and any(name in other.values() for other in others) else name
@@ -164,12 +163,21 @@ def _called(claim: Claim, claims: Sequence[Claim]) -> str:
 def _by_roster(found: dict[str, HandedIn], roster: Roster, collected: Collected) -> dict[str, HandedIn]:
     """A folder for each student: their names as the roster has them. Those that it does not have keep theirs."""
     named: dict[str, HandedIn] = {}
-    for folder, handed_in in found.items():
+    folders: dict[str, str] = {}
+    for folder, handed_in in sorted(found.items(), key=lambda item: item[0]):
         student = roster.student({"id": folder, "email": folder, "name": folder, "github": folder})
+        name = student or folder
+        if name in named:
+            collected.refused.append(_twice(folders[name], folder))
+            continue
         if student is None:
             collected.notes.append(f"{folder[:100]!r} is no student of the roster, and keeps this name.")
-        named[student or folder] = handed_in
+        named[name], folders[name] = handed_in, folder
     return named
+
+
+def _twice(folder: str, other: str) -> str:
+    return f"The folders {folder[:80]!r} and {other[:80]!r} mean the same student; the second was left out."
 
 
 def _keep(submitted: Path, parts: Sequence[str], text: str) -> None:

@@ -65,17 +65,32 @@ def _is_notebook(member: Member) -> bool:
     return member.name.lower().endswith(".ipynb")
 
 
+def _given_out(member: Member, form: re.Pattern[str]) -> re.Match[str] | None:
+    """What a platform calls a file, or else the zip that it lies in; None if neither name is of the form."""
+    return form.fullmatch(member.name) or form.fullmatch(member.zip)
+
+
 def canvas(files: Sequence[Member], lab: str) -> Recognised:
     """Canvas, "Download submissions": one flat folder."""
     found = Recognised("Canvas")
+    with_notebook: set[str] = set()
+    others: dict[str, str] = {}
     for member in files:
-        match = _CANVAS.fullmatch(member.name)
+        match = _given_out(member, _CANVAS)
         if match and _is_notebook(member):
+            with_notebook.add(match.string)
             owner = {"canvas": match["name"], "canvas_id": match["user"]}
-            found.claims.append(Claim(member, owner, (int(match["number"]),), late=bool(match["late"])))
+            turn = (int(match["number"]), member.name == f"{lab}.ipynb", member.path)
+            found.claims.append(Claim(member, owner, turn, late=bool(match["late"])))
         elif match:
-            found.strange.append(f"{member.name[:100]!r} of {match['name']} is no notebook.")
+            others.setdefault(match.string, match["name"])
+    found.strange += _no_notebooks(others, with_notebook)
     return found
+
+
+def _no_notebooks(others: Mapping[str, str], with_notebook: set[str]) -> list[str]:
+    """Sentences about what was uploaded, each with its student, and is no notebook, nor a zip that holds one."""
+    return [f"{given[:100]!r} of {who} is no notebook." for given, who in others.items() if given not in with_notebook]
 
 
 def moodle(files: Sequence[Member], lab: str) -> Recognised:
@@ -101,14 +116,19 @@ def moodle(files: Sequence[Member], lab: str) -> Recognised:
 def blackboard(files: Sequence[Member], lab: str) -> Recognised:
     """Blackboard, "Assignment file download": one flat folder, with a text for each attempt."""
     found = Recognised("Blackboard")
+    with_notebook: set[str] = set()
+    others: dict[str, str] = {}
     for member in files:
-        match = _BLACKBOARD.fullmatch(member.name)
+        match = _given_out(member, _BLACKBOARD)
         if match and _is_notebook(member):
+            with_notebook.add(match.string)
             numbers = match["when"].split("-")
             when = f"{'-'.join(numbers[:3])} {':'.join(numbers[3:])}"
-            found.claims.append(Claim(member, {"id": match["user"]}, (match["when"],), when))
+            turn = (match["when"], member.name == f"{lab}.ipynb", member.path)
+            found.claims.append(Claim(member, {"id": match["user"]}, turn, when))
         elif match and match["file"]:
-            found.strange.append(f"{member.name[:100]!r} of {match['user']} is no notebook.")
+            others.setdefault(match.string, match["user"])
+    found.strange += _no_notebooks(others, with_notebook)
     return found
 
 

@@ -7,18 +7,18 @@ import os
 import stat
 import zipfile
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
 
 from autograder.core.files import read_plain
 
-_MOST = 20_000
+MOST = 20_000
 """More files than this are no class."""
 _DEPTH = 8
-"""Folders that lie inside each other; a wrapper, a repository and its folders are five."""
+"""Folders inside each other that are looked into; a wrapper, a repository and its folders are five."""
 _ZIP_BYTES = 64 * 1024 * 1024
 """The largest zip inside another, in bytes; one student's repository."""
-_PACKERS = (".", "__MACOSX")
+PACKERS = (".", "__MACOSX")
 """What the names of folders and files begin with that a system or a packer made."""
 
 
@@ -30,6 +30,8 @@ class Member:
     """From the source on; a zip inside is a folder of its name without `.zip`."""
     read: Callable[[int], bytes]
     """At most so many bytes of it. Raises OSError, or what a damaged zip raises."""
+    zip: str = ""
+    """The name, without `.zip`, of the zip inside the source that it lies in; empty if it lies in none."""
 
     @property
     def name(self) -> str:
@@ -44,13 +46,13 @@ def members(source: Path) -> list[Member]:
         zipfile.BadZipFile: the source is a zip that cannot be read, or one of those errors that zipfile has besides.
     """
     found: list[Member] = []
-    listing = _of_folder(source, ()) if source.is_dir() else _of_zip(zipfile.ZipFile(source), ())
+    listing = _of_folder(source, ()) if source.is_dir() else in_zip(zipfile.ZipFile(source), [])
     for member in listing:
-        if len(found) >= _MOST:
+        if len(found) >= MOST:
             break
-        inside = list(_inside(member)) if member.name.lower().endswith(".zip") else []
+        inside = unpacked(member) if is_zip(member.name) else []
         found += inside or [member]
-    return found[:_MOST]
+    return found[:MOST]
 
 
 def _of_folder(source: Path, parts: tuple[str, ...]) -> Iterator[Member]:
@@ -61,7 +63,7 @@ def _of_folder(source: Path, parts: tuple[str, ...]) -> Iterator[Member]:
         return
     for entry in entries:
         path = (*parts, entry.name)
-        if entry.name.startswith(_PACKERS):
+        if entry.name.startswith(PACKERS):
             continue
         if entry.is_dir(follow_symlinks=False):
             if len(path) < _DEPTH:
@@ -70,22 +72,30 @@ def _of_folder(source: Path, parts: tuple[str, ...]) -> Iterator[Member]:
             yield Member(path, lambda most, path=path: read_plain(source, path, most))  # type: ignore[misc]
 
 
-def _of_zip(archive: zipfile.ZipFile, parts: tuple[str, ...]) -> Iterator[Member]:
-    for info in archive.infolist()[:_MOST]:
-        path = PurePosixPath(member_name(info).replace("\\", "/"))
-        plain = stat.S_IFMT(info.external_attr >> 16) in (0, stat.S_IFREG) and not info.is_dir()
-        if not plain or not path.parts or path.is_absolute() or ".." in path.parts or "\0" in info.orig_filename:
-            continue
-        if len(path.parts) <= _DEPTH and not any(part.startswith(_PACKERS) for part in path.parts):
-            yield Member((*parts, *path.parts), lambda most, info=info: _read(archive, info, most))  # type: ignore[misc]
+def in_zip(archive: zipfile.ZipFile, bad: list[str], above: tuple[str, ...] = ()) -> Iterator[Member]:
+    """Give the files of a zip, which stays open for as long as they are read.
+
+    Args:
+        archive: the zip.
+        bad: gets the names that lead nowhere in it, or out of it.
+        above: the folders that the zip counts as being in.
+    """
+    for info in archive.infolist()[:MOST]:
+        path = PurePosixPath(_name(info).replace("\\", "/"))
+        if not path.parts or path.is_absolute() or ".." in path.parts or "\0" in info.orig_filename:
+            bad.append(info.orig_filename)
+        elif not info.is_dir() and not any(part.startswith(PACKERS) for part in path.parts):
+            yield Member((*above, *path.parts), lambda most, info=info: _read(archive, info, most))  # type: ignore[misc]
 
 
 def _read(archive: zipfile.ZipFile, info: zipfile.ZipInfo, most: int) -> bytes:
+    if stat.S_IFMT(info.external_attr >> 16) not in (0, stat.S_IFREG):
+        raise OSError("it is a link or something else that is no file")
     with archive.open(info) as file:
         return file.read(most)
 
 
-def member_name(info: zipfile.ZipInfo) -> str:
+def _name(info: zipfile.ZipInfo) -> str:
     """A member's name; some packers write UTF-8 without saying so, which then is taken for the DOS character set."""
     if not info.flag_bits & 0x800:
         try:
@@ -95,11 +105,19 @@ def member_name(info: zipfile.ZipInfo) -> str:
     return info.filename
 
 
-def _inside(member: Member) -> Iterator[Member]:
-    """The files of a zip inside; none if it is no zip, or too large."""
+def is_zip(name: str) -> bool:
+    """Whether a file is a zip by its name."""
+    return name.lower().endswith(".zip")
+
+
+def unpacked(member: Member) -> list[Member]:
+    """Return the files of a zip inside; none if it is no zip, or too large."""
     try:
         content = member.read(_ZIP_BYTES + 1)
-        if len(content) <= _ZIP_BYTES:
-            yield from _of_zip(zipfile.ZipFile(io.BytesIO(content)), (*member.path[:-1], member.name[:-4]))
+        if len(content) > _ZIP_BYTES:
+            return []
+        name = member.name[: -len(".zip")]
+        files = in_zip(zipfile.ZipFile(io.BytesIO(content)), [], (*member.path[:-1], name))
+        return [replace(file, zip=name) for file in files]
     except Exception:  # a damaged zip raises many kinds; it is then a file as any other
-        return
+        return []

@@ -3,22 +3,17 @@
 from __future__ import annotations
 
 import contextlib
-import stat
 import zipfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 
 from autograder.core.errors import KitError
 from autograder.core.files import read_plain
-from autograder.intake.members import member_name, members
+from autograder.intake.members import MOST, PACKERS, Member, in_zip, is_zip, members, unpacked
 from autograder.submission import exchange_secret, timestamp
 from autograder.submission.notebook_file import NOTEBOOK_BYTES
 
-_PACKERS_PREFIXES = (".", "__MACOSX")
-"""What the name of a folder begins with that a system or a packer made."""
-_MOST_ENTRIES = 20_000
-"""More entries than this in a zip are no class."""
 _NAMED = 5
 """Of more bad names than this only their number is said."""
 
@@ -60,15 +55,20 @@ def plain_class(source: Path, lab: str, refused: list[str]) -> dict[str, HandedI
 def _from_folder(source: Path, lab: str, refused: list[str]) -> dict[str, HandedIn]:
     found: dict[str, HandedIn] = {}
     for entry in sorted(source.iterdir()):
-        if entry.name.startswith(_PACKERS_PREFIXES):
+        if entry.name.startswith(PACKERS):
             continue
         if entry.is_symlink():
             refused.append(f"{_shown(entry)} is a link; links are not followed, so it was left out.")
-        elif entry.is_file() and entry.suffix.lower() == ".zip":
+        elif entry.is_file() and is_zip(entry.name):
             try:
-                found[entry.stem] = HandedIn(_notebook_in_zip(entry, lab))
+                notebook = _notebook_in_zip(_files_of(entry), lab)
             except _NotUnderstood as reason:
                 refused.append(f"{_shown(entry)} {reason}; it was left out.")
+                continue
+            if entry.stem in found:
+                refused.append(f"{_shown(entry)} and another entry mean the same student; it was left out.")
+            else:
+                found[entry.stem] = HandedIn(notebook)
         elif entry.is_dir():
             try:
                 found[entry.name] = _handed_in(source, entry.name, lab)
@@ -101,24 +101,31 @@ def _notebook_in(source: Path, student: str, lab: str) -> bytes:
     return read_plain(source, [student, *chosen], NOTEBOOK_BYTES + 1) if chosen else b""
 
 
-def _notebook_in_zip(path: Path, lab: str) -> bytes:
-    """Return the notebook in one student's zip.
+def _files_of(path: Path) -> list[Member]:
+    """Return what one student's zip holds.
 
     Raises:
-        _NotUnderstood: the zip cannot be read, or nothing says which notebook counts.
+        _NotUnderstood: it cannot be read.
     """
     try:
-        files = {member.path: member for member in members(path)}
-        while files and len({parts[0] for parts in files}) == 1 and all(len(parts) > 1 for parts in files):
-            if next(iter(files))[0] == lab:
-                break
-            files = {parts[1:]: member for parts, member in files.items()}
-        chosen = _choose([parts for parts in files if len(parts) == 1 or parts[:-1] == (lab,)], lab)
-        return files[chosen].read(NOTEBOOK_BYTES + 1) if chosen else b""
-    except _NotUnderstood:
-        raise
+        return members(path)
     except Exception as error:  # a damaged zip raises many kinds
         raise _NotUnderstood(f"cannot be read ({error})") from error
+
+
+def _notebook_in_zip(held: Sequence[Member], lab: str) -> bytes:
+    """Return the notebook among the files of one student's zip; folders around all of them do no harm.
+
+    Raises:
+        _NotUnderstood: it cannot be read, or nothing says which notebook counts.
+    """
+    files = {member.path: member for member in held}
+    while files and len({parts[0] for parts in files}) == 1 and all(len(parts) > 1 for parts in files):
+        if next(iter(files))[0] == lab:
+            break
+        files = {parts[1:]: member for parts, member in files.items()}
+    chosen = _choose([parts for parts in files if len(parts) == 1 or parts[:-1] == (lab,)], lab)
+    return _read(files[chosen]) if chosen else b""
 
 
 def _choose(paths: Sequence[tuple[str, ...]], lab: str) -> tuple[str, ...]:
@@ -172,47 +179,59 @@ def _open_zip(source: Path, lab: str) -> zipfile.ZipFile:
 
 def _from_zip(source: Path, lab: str, refused: list[str]) -> dict[str, HandedIn]:
     found: dict[str, HandedIn] = {}
-    students: dict[str, dict[tuple[str, ...], zipfile.ZipInfo]] = {}
+    students: dict[str, dict[tuple[str, ...], Member]] = {}
+    packed: dict[str, Member] = {}
+    bad: list[str] = []
     with _open_zip(source, lab) as archive:
-        members = archive.infolist()
-        if len(members) > _MOST_ENTRIES:
-            raise KitError(f"{source} has {len(members)} entries; that is no class.", "Check the file.")
-        paths = _paths(members, refused)
-        depth = _depth([parts for parts, _ in paths], lab)
-        for parts, member in paths:
-            inside = parts[depth:]
-            if len(inside) < 2:
-                continue
-            students.setdefault(inside[0], {})[inside[1:]] = member
-        for student, files in students.items():
+        if len(archive.infolist()) > MOST:
+            raise KitError(f"{source} has {len(archive.infolist())} entries; that is no class.", "Check the file.")
+        files = list(in_zip(archive, bad))
+        depth = _depth([member.path for member in files], lab)
+        for member in files:
+            inside = member.path[depth:]
+            if len(inside) > 1:
+                students.setdefault(inside[0], {})[inside[1:]] = member
+            elif inside and is_zip(inside[0]):
+                packed[inside[0][: -len(".zip")]] = member
+        for student in dict.fromkeys([*students, *packed]):
             try:
-                chosen = _choose([rest for rest in files if len(rest) == 1 or rest[:-1] == (lab,)], lab)
-                beside = (timestamp.FILE_NAME, exchange_secret.FILE_NAME)
-                stamp, secret = (files.get((name,)) or files.get((lab, name)) for name in beside)
-                found[student] = HandedIn(
-                    _member(archive, files[chosen]) if chosen else b"",
-                    _member(archive, stamp)[: timestamp.MOST_BYTES] if stamp else b"",
-                    exchange_secret.secret(_member(archive, secret)) if secret else "",
-                )
+                if student in students:
+                    found[student] = _in_folder(students[student], lab)
+                else:
+                    found[student] = HandedIn(_notebook_in_zip(_unpacked(packed[student]), lab))
             except _NotUnderstood as reason:
                 refused.append(f"{student[:80]!r} {reason}; it was left out.")
+    for student in sorted(packed.keys() & students.keys()):
+        refused.append(f"{student[:80]!r} is a folder and a zip of one student; the zip was left out.")
+    if bad:
+        names = ", ".join(repr(name[:60]) for name in bad[:_NAMED])
+        more = f" and {len(bad) - _NAMED} more" if len(bad) > _NAMED else ""
+        refused.append(f"The zip has entries whose names lead nowhere in it; they were left out: {names}{more}.")
     return found
 
 
-def _paths(members: Sequence[zipfile.ZipInfo], refused: list[str]) -> list[tuple[tuple[str, ...], zipfile.ZipInfo]]:
-    """The files in a zip by their paths; what a packer adds is left out, and names that no file may have are said."""
-    paths = []
-    bad = []
-    for member in members:
-        path = PurePosixPath(member_name(member).replace("\\", "/"))
-        if not path.parts or path.is_absolute() or ".." in path.parts or "\0" in member.orig_filename:
-            bad.append(repr(member.orig_filename[:60]))
-        elif not member.is_dir() and not any(part.startswith(_PACKERS_PREFIXES) for part in path.parts):
-            paths.append((path.parts, member))
-    if bad:
-        names = ", ".join(bad[:_NAMED]) + (f" and {len(bad) - _NAMED} more" if len(bad) > _NAMED else "")
-        refused.append(f"The zip has entries whose names lead nowhere in it; they were left out: {names}.")
-    return paths
+def _in_folder(files: Mapping[tuple[str, ...], Member], lab: str) -> HandedIn:
+    """What lies in a student's folder, by the paths in it.
+
+    Raises:
+        _NotUnderstood: it cannot be read, or nothing says which notebook counts.
+    """
+    chosen = _choose([rest for rest in files if len(rest) == 1 or rest[:-1] == (lab,)], lab)
+    stamp, secret = (
+        files.get((name,)) or files.get((lab, name)) for name in (timestamp.FILE_NAME, exchange_secret.FILE_NAME)
+    )
+    return HandedIn(
+        _read(files[chosen]) if chosen else b"",
+        _read(stamp)[: timestamp.MOST_BYTES] if stamp is not None else b"",
+        exchange_secret.secret(_read(secret)) if secret is not None else "",
+    )
+
+
+def _unpacked(member: Member) -> list[Member]:
+    held = unpacked(member)
+    if not held:
+        raise _NotUnderstood("cannot be read as a zip")
+    return [Member(inner.path[len(member.path) :], inner.read) for inner in held]
 
 
 def _depth(paths: list[tuple[str, ...]], lab: str) -> int:
@@ -222,11 +241,8 @@ def _depth(paths: list[tuple[str, ...]], lab: str) -> int:
     return 1 if one_top and not is_student and any(len(path) >= 3 for path in paths) else 0
 
 
-def _member(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> bytes:
+def _read(member: Member) -> bytes:
     try:
-        if stat.S_IFMT(member.external_attr >> 16) not in (0, stat.S_IFREG):
-            raise OSError("it is a link or something else that is no file")
-        with archive.open(member) as file:
-            return file.read(NOTEBOOK_BYTES + 1)
+        return member.read(NOTEBOOK_BYTES + 1)
     except Exception as error:  # each way of packing fails in its own way (zlib.error, LZMAError); the class goes on
-        raise _NotUnderstood(f"holds {member.filename[:200]!r}, which cannot be read ({error})") from error
+        raise _NotUnderstood(f"holds {'/'.join(member.path)[:200]!r}, which cannot be read ({error})") from error

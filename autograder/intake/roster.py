@@ -71,14 +71,15 @@ def read_roster(path: Path) -> Roster:
     """
     try:
         with path.open(encoding="utf-8-sig", newline="") as file:
-            lines = list(csv.DictReader(file))
+            reader = csv.DictReader(file)
+            lines = [(reader.line_num, line) for line in reader]
     except (OSError, UnicodeError, csv.Error) as error:
         raise KitError(f"The roster {path} cannot be read: {error}.", "It is a CSV file in UTF-8.") from error
     students: dict[str, dict[str, str]] = {}
-    for number, line in enumerate(lines, start=2):
-        known = {
-            (key or "").strip().lower(): (value or "").strip() for key, value in line.items() if isinstance(value, str)
-        }
+    for number, line in lines:
+        known = {(key or "").strip().lower(): value.strip() for key, value in line.items() if isinstance(value, str)}
+        if not any(known.values()):  # spreadsheets write lines of nothing but commas
+            continue
         student = known.get("id", "")
         if not student:
             raise KitError(

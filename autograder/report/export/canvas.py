@@ -41,5 +41,7 @@ def to_canvas_feedback(entries: Sequence[Entry], _: str) -> Export:
 
 
 def _place(entry: Entry) -> str:
-    name = PurePosixPath(entry.file).name
-    return str(PurePosixPath(name).with_suffix(".html")) if "canvas_id" in entry.known and name else ""
+    """The name that Canvas gave to the upload, a notebook or a zip with one in it."""
+    number = entry.known.get("canvas_id")
+    given = (part for part in reversed(PurePosixPath(entry.file).parts) if number and f"_{number}_" in part)
+    return next((f"{part.removesuffix('.ipynb')}.html" for part in given), "")
