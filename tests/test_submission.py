@@ -24,7 +24,7 @@ from autograder.course.lab import Lab, grade_id_of, load_lab
 from autograder.intake.collect import collect
 from autograder.submission.cell_files import OWN_FILES
 from autograder.submission.notebook_file import NOTEBOOK_BYTES
-from autograder.submission.reader import read_submission
+from autograder.submission.reader import PROBLEMS_KEPT, read_submission
 from autograder.submission.submission import Submission
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -83,7 +83,7 @@ def test_a_cell_without_the_magic_is_no_file(source: str) -> None:
         "%%node talker # mine", "%%node täl", "%%file", "%%file a.py", "%%file /etc/passwd.yaml", "%%file ../a.yaml",
         "%%file a/b.yaml", "%%file a\\b.yaml", "%%file .yaml", "%%file .hidden.yaml", "%%file a.yaml.py",
         "%%file -rf.yaml", "%%file a\x00.yaml", "%%file " + "a" * 300 + ".yaml",
-        "%%file a" + ".bbbbbbbb" * 28 + ".yaml",
+        "%%file a" + ".bbbbbbbb" * 28 + ".yaml", "%%node a" + " " * 60_000 + "b",
     ],
 )  # fmt: skip
 def test_a_bad_name_is_refused_with_a_reason(line: str) -> None:
@@ -186,6 +186,13 @@ def test_files_of_the_students_own_have_a_limit(lab: Lab, tmp_path: Path) -> Non
     submission = read(lab, tmp_path, cells)
     assert codes(submission) == ["too-many-files"]
     assert len(submission.files) == 3 + OWN_FILES
+
+
+def test_of_very_many_problems_the_first_are_listed_and_the_others_counted(lab: Lab, tmp_path: Path) -> None:
+    ignored = [plain_cell(f"%%node helper\nprint({number})") for number in range(PROBLEMS_KEPT + 2)]
+    submission = read(lab, tmp_path, [*solved(lab), *ignored])
+    assert codes(submission) == ["ignored-cell"] * PROBLEMS_KEPT + ["more-problems"]
+    assert "2 more problems" in submission.problems[-1].because
 
 
 def test_sources_may_be_lists_of_lines(lab: Lab, tmp_path: Path) -> None:

@@ -137,6 +137,7 @@ GROUPS: dict[str, dict[str, str]] = {
         "same-file": "two answers name one file",
         "ignored-cell": "a cell of the student's own names a file that belongs to an answer or to the lab",
         "too-many-files": "more cells of the student's own name files than are taken along",
+        "more-problems": "the notebook has more problems than are listed",
     },
     "The grader could not find out": {
         "grader": "the check itself broke; no points are taken, and an instructor decides",

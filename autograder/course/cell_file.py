@@ -96,10 +96,10 @@ def parse(source: str) -> CellFile | None:
     """
     lines = source.replace("\r\n", "\n").split("\n")
     above = next((number for number, line in enumerate(lines) if line.strip()), len(lines))
-    match = re.fullmatch(r"%%(node|file)(?:\s+(.*?))?\s*", lines[above]) if above < len(lines) else None
+    match = re.fullmatch(r"%%(node|file)(\s.*)?", lines[above]) if above < len(lines) else None
     if match is None:
         return None
-    magic, name = match.group(1), match.group(2) or ""
+    magic, name = match.group(1), (match.group(2) or "").strip()
     check_name(magic, name)
     first = [f"# %%{magic} {name}"] if magic == "node" or name.endswith(".py") else []
     text = "\n".join([""] * above + first + lines[above + 1 :])

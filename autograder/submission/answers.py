@@ -34,12 +34,12 @@ def take_answers(cells: list[dict[str, Any]], lab: Lab, submission: Submission) 
         )
     forged = sorted(found.keys() - released.keys())
     if forged:
-        names = ", ".join(f"`{grade_id[:40]}`" for grade_id in forged[:5]) + (", …" if len(forged) > 5 else "")
+        listed = ", ".join(f"`{grade_id[:40]}`" for grade_id in forged[:5]) + (", …" if len(forged) > 5 else "")
         submission.problems.append(
             problem(
                 "forged-cell",
                 "every graded cell belongs to the lab",
-                f"The lab has no graded cell {names}: ignored.",
+                f"The lab has no graded cell {listed}: ignored.",
                 "Use ordinary cells for your own notes and experiments.",
             )
         )

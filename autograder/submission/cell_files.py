@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 from autograder.core.results import Outcome
@@ -17,6 +18,7 @@ OWN_FILES = 50
 def take_files(lab: Lab, submission: Submission) -> None:
     """Put the files that the answers name, and the lab's own, into a submission."""
     owners: dict[str, str] = {}
+    places = _Places([*submission.files, *lab.given])
     for grade_id, answer in lab.answers.items():
         if answer.file is None:
             continue
@@ -49,10 +51,11 @@ def take_files(lab: Lab, submission: Submission) -> None:
                 f"The cells `{owners[file.file_name]}` and `{grade_id}` both name {file.file_name}: the later counts."
             )
             submission.problems.append(problem("same-file", title, because, f"Begin the cell with `{wanted}`."))
-        if _is_in_the_way(file.file_name, {*submission.files, *lab.given}):
+        if places.taken(file.file_name):
             because = f"`{file.file_name}` is a file of one cell and a folder of another."
             submission.problems.append(problem("bad-file-name", title, because, f"Begin the cell with `{wanted}`."))
             continue
+        places.add(file.file_name)
         owners[file.file_name] = grade_id
         submission.files[file.file_name] = file.text
     submission.files.update(lab.given)
@@ -79,6 +82,7 @@ def take_own_files(cells: list[dict[str, Any]], lab: Lab, submission: Submission
     """Take along what cells of the student's own hold, as in the notebook; an answer's name belongs to its own cell."""
     answers = {answer.file.file_name: answer.grade_id for answer in lab.answers.values() if answer.file is not None}
     taken = dict(submission.files)
+    places = _Places(taken)
     own: dict[str, str] = {}
     for cell in cells:
         file = _named(cell)
@@ -96,10 +100,11 @@ def take_own_files(cells: list[dict[str, Any]], lab: Lab, submission: Submission
                 problem("bad-file-name", f"`%%{file.magic} {file.name}` can be a file", f"{error} The cell is ignored.")
             )
             continue
-        if _is_in_the_way(file.file_name, {*taken, *own}):
+        if places.taken(file.file_name):
             because = f"`{file.file_name}` is a file of one cell and a folder of another. The cell is ignored."
             submission.problems.append(problem("bad-file-name", f"`%%{file.magic} {file.name}` can be a file", because))
             continue
+        places.add(file.file_name)
         own[file.file_name] = file.text
     if len(own) > OWN_FILES:
         because = f"There are {len(own)} cells of your own that name files; the first {OWN_FILES} are taken along."
@@ -109,9 +114,28 @@ def take_own_files(cells: list[dict[str, Any]], lab: Lab, submission: Submission
     return own
 
 
-def _is_in_the_way(name: str, others: set[str]) -> bool:
-    """Whether a file would lie where another one needs a folder, or the other way round."""
-    return any(other.startswith(f"{name}/") or name.startswith(f"{other}/") for other in others)
+class _Places:
+    """Where files lie, and the folders above them."""
+
+    def __init__(self, names: Iterable[str]) -> None:
+        self._files: set[str] = set()
+        self._folders: set[str] = set()
+        for name in names:
+            self.add(name)
+
+    def add(self, name: str) -> None:
+        self._files.add(name)
+        self._folders.update(_folders(name))
+
+    def taken(self, name: str) -> bool:
+        """Whether a file would lie where another one needs a folder, or the other way round."""
+        return name in self._folders or not self._files.isdisjoint(_folders(name))
+
+
+def _folders(name: str) -> list[str]:
+    """The folders that a file's name puts it into."""
+    parts = name.split("/")
+    return ["/".join(parts[:count]) for count in range(1, len(parts))]
 
 
 def _ignored(file: CellFile, answer: str, lab: Lab, submission: Submission) -> Outcome:

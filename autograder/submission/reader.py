@@ -18,8 +18,11 @@ from autograder.core.files import signature
 from autograder.course.lab import Lab, lab_names, load_lab
 from autograder.submission.answers import take_answers
 from autograder.submission.cell_files import take_files, take_own_files
-from autograder.submission.notebook_file import UnreadableError, cells_of, grade_ids_in
+from autograder.submission.notebook_file import UnreadableError, cells_of, grade_ids_in, problem
 from autograder.submission.submission import Submission
+
+PROBLEMS_KEPT = 100
+"""As many problems of a notebook are listed."""
 
 
 def read_submission(path: Path, lab: Lab) -> Submission:
@@ -42,11 +45,20 @@ def _read(path: Path, _signature: object, lab: Lab) -> Submission:
         submission.readable = False
     take_files(lab, submission)
     own = take_own_files(cells, lab, submission) if submission.readable else {}
-    problems = [[problem.code, problem.because] for problem in submission.problems]
+    _keep_first_problems(submission)
+    problems = [[found.code, found.because] for found in submission.problems]
     parts = [lab.digest, problems, list(submission.sources.items()), sorted(own.items())]
     submission.digest = hashlib.sha256(json.dumps(parts).encode()).hexdigest()
     submission.notebook = lab.clean_notebook(submission.sources)
     return submission
+
+
+def _keep_first_problems(submission: Submission) -> None:
+    """Of very many problems, such as thousands of cells that are ignored, say only how many there are."""
+    left_out = len(submission.problems) - PROBLEMS_KEPT
+    if left_out > 0:
+        because = f"The notebook has {left_out} more problem{'s' * (left_out != 1)}, not listed here."
+        submission.problems[PROBLEMS_KEPT:] = [problem("more-problems", "the notebook has few problems", because)]
 
 
 def lab_of(notebook: Path, name: str | None, root: Path) -> Lab:
