@@ -243,6 +243,15 @@ def test_what_is_often_meant_is_in_the_hint(tmp_path: Path, text: str, hint: str
     assert hint in caught.value.hint
 
 
+@pytest.mark.parametrize(("content", "told"), [(b"a: \xe4", "text in UTF-8"), (b"#" * (FILE_BYTES + 1), "larger than")])
+def test_a_parameter_file_with_substitutions_that_is_no_text_is_refused(
+    tmp_path: Path, content: bytes, told: str
+) -> None:
+    (tmp_path / "p.yaml").write_bytes(content)
+    text = f"launch:\n{CAMERA}, param: [{{from: $(dirname)/p.yaml, allow_substs: true}}]}}\n"
+    assert told in refusal(tmp_path, text)
+
+
 def test_an_argument_that_is_spelt_otherwise_is_named(tmp_path: Path) -> None:
     text = f'launch:\n- arg: {{name: side, default: x}}\n{CAMERA}, name: "$(var sied)"}}\n'
     assert "`side` is there; is that meant?" in refusal(tmp_path, text)

@@ -209,6 +209,12 @@ def test_a_parameter_files_key_is_matched_as_rcl_does(tmp_path: Path, key: str, 
     assert (params_file.why_not_reached(text, "/vehicle/right_demo") is None) is reached
 
 
+@pytest.mark.parametrize(("name", "text"), [("none.yaml", ""), ("/dev/none/p.yaml", ""), ("latin.yaml", "a: \ufffd")])
+def test_a_parameter_file_that_cannot_be_read_as_text_stops_no_check(tmp_path: Path, name: str, text: str) -> None:
+    (tmp_path / "latin.yaml").write_bytes(b"a: \xe4")
+    assert params_file.text_of(tmp_path, name) == text
+
+
 def test_nested_keys_of_a_parameter_file_are_joined() -> None:
     assert params_file.node_keys("vehicle:\n  right:\n    ros__parameters: {a: 1}\n/b:\n  ros__parameters: {}\n") == [
         "/vehicle/right",

@@ -8,10 +8,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from autograder.core.student_yaml import StudentFileError, load, read
+from autograder.core.student_yaml import FILE_BYTES, StudentFileError, load, read
 
 _REFUSED = re.compile(
-    r"parse params file: '--params-file (?P<file>[^']+)'\. Error: (?P<what>.*?)"
+    r"parse params file: '--params-file (?P<file>[^']{1,300})'\. Error: (?P<what>.{0,400}?)"
     r"(?: at line (?P<line>\d+))?(?:, at /|\s*$)",
     re.MULTILINE,
 )
@@ -46,6 +46,15 @@ def unreadable(words: Sequence[str], folder: Path) -> StudentFileError | None:
                 if error.code == "not-yaml":
                     return error
     return None
+
+
+def text_of(folder: Path, file: str) -> str:
+    """A parameter file's text; empty where there is none that a program could read as one."""
+    try:
+        with (folder / file).open("rb") as opened:
+            return opened.read(FILE_BYTES).decode("utf-8", "replace")
+    except OSError:
+        return ""
 
 
 def node_keys(text: str) -> list[str]:

@@ -20,6 +20,9 @@ _DOUBLE = re.compile(
     re.IGNORECASE,
 )
 
+_LONGEST_INTEGER = 1000
+"""Characters."""
+
 # A comma behind a tag belongs to the tag for rcl.
 _TAG = re.compile(r"(![\w-]*),")
 # The library that rcl reads YAML with; it differs from PyYAML's own reader in tabs and colons.
@@ -64,6 +67,11 @@ def _kind(value: str, *, plain: bool) -> str:
         return "text"
     if value in _BOOLS:
         return "bool"
-    if _INTEGER.fullmatch(value) and -(2**63) <= int(value, 0 if "x" in value.lower() else 10) < 2**63:
+    # Python reads no number of thousands of digits, and rcl takes none that long for an integer.
+    if len(value) < _LONGEST_INTEGER and _INTEGER.fullmatch(value) and -(2**63) <= _integer(value) < 2**63:
         return "integer"
     return "double" if _DOUBLE.fullmatch(value) else "text"
+
+
+def _integer(value: str) -> int:
+    return int(value, 16 if "x" in value.lower() else 10)

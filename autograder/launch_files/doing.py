@@ -9,9 +9,10 @@ from rclpy.exceptions import InvalidNamespaceException, InvalidNodeNameException
 from rclpy.validate_namespace import validate_namespace
 from rclpy.validate_node_name import validate_node_name
 
+from autograder.core.student_yaml import FILE_BYTES
 from autograder.graph.names import nearest
 from autograder.launch_files import substitutions, values
-from autograder.launch_files.errors import Place
+from autograder.launch_files.errors import Place, ValueRefused
 from autograder.launch_files.nodes import Inline, LaunchedNode, ParamsFile, ParamsText
 from autograder.launch_files.schema import Action, refusing
 from autograder.launch_files.substitutions import Context
@@ -146,7 +147,7 @@ class Doing:
         """A parameter file with its substitutions done."""
 
         def read() -> ParamsText:
-            text = parse(path.read_text(encoding="utf-8"))
+            text = parse(_text_of(path))
             substitutions.check(text)
             done = substitutions.perform(text, self.context, self.place.folder)
             return ParamsText(text=done)
@@ -170,6 +171,22 @@ class Doing:
                 f"the package `{package}` has no program `{program}`.{f' It has {listed}.' if listed else ''}",
                 "A program is called as in the first line of its cell, `%%node NAME`, without `.py`.",
             )
+
+
+def _text_of(path: Path) -> str:
+    """The text of a file, which the build of a package may have made.
+
+    Raises:
+        ValueRefused: it is no text, or too large.
+    """
+    try:
+        with path.open("rb") as file:
+            content = file.read(FILE_BYTES + 1)
+        if len(content) > FILE_BYTES:
+            raise ValueRefused(f"`{path.name}` is larger than {FILE_BYTES // 1024} KiB.")
+        return content.decode("utf-8")
+    except (OSError, UnicodeDecodeError):
+        raise ValueRefused(f"`{path.name}` cannot be read as text in UTF-8.") from None
 
 
 def _beside(folder: Path) -> list[str]:

@@ -100,9 +100,8 @@ def _given(launched: Program, node: str) -> Iterator[str]:
         if not meant or f"/{meant}" == node:
             yield parameter
     for option, file in itertools.pairwise(launched.arguments()):
-        path = runtime.current.folder / file
-        if option == "--params-file" and path.is_file():
-            yield from params_file.names_for(path.read_text(encoding="utf-8"), node)
+        if option == "--params-file":
+            yield from params_file.names_for(params_file.text_of(runtime.current.folder, file), node)
 
 
 def _no_such_argument(running: Running, found: Any) -> Diagnosis | None:
@@ -125,10 +124,9 @@ def _file_for_others(running: Running, node: str) -> Diagnosis | None:
             hint = "Write `$(dirname)/NAME.yaml`; NAME is a cell's `%%file`."
             return Diagnosis(f"{launched.warnings[0]} The node started without it.", "params-file-missing", hint)
         for option, file in itertools.pairwise(launched.arguments()):
-            path = runtime.current.folder / file
-            if option != "--params-file" or not path.is_file():
+            if option != "--params-file":
                 continue
-            because = params_file.why_not_reached(path.read_text(encoding="utf-8"), node)
+            because = params_file.why_not_reached(params_file.text_of(runtime.current.folder, file), node)
             if because:
                 return Diagnosis(because, "params-file-key", "The key is the node's full name, namespace included.")
     return None
