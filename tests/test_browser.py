@@ -22,6 +22,7 @@ import pytest
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
 import sample_class
+from jupyter_server import address_of
 
 from autograder.course.lab import lab_names, load_lab
 
@@ -71,7 +72,7 @@ def jupyter_lab(tmp_path: Path) -> Iterator[tuple[Path, str]]:
     with (tmp_path / "jupyter.log").open("w") as log:
         server = subprocess.Popen(command, cwd=ROOT, env=environment, stdout=log, stderr=subprocess.STDOUT)
         try:
-            yield work, _address(home / "runtime", server, tmp_path / "jupyter.log")
+            yield work, address_of(server, home / "runtime", tmp_path / "jupyter.log")
         finally:
             server.terminate()
             try:
@@ -87,18 +88,6 @@ def window(browser: Any) -> Iterator[Any]:
     opened = browser.new_context(viewport={"width": 1400, "height": 900})
     yield opened
     opened.close()
-
-
-def _address(runtime: Path, server: subprocess.Popen[bytes], log: Path) -> str:
-    deadline = time.monotonic() + START_SECONDS
-    while time.monotonic() < deadline and server.poll() is None:
-        for path in runtime.glob("jpserver-*.json"):
-            try:
-                return str(json.loads(path.read_text())["url"])
-            except (ValueError, KeyError):  # still being written
-                pass
-        time.sleep(0.1)
-    raise AssertionError(f"JupyterLab did not start:\n{log.read_text()[-3000:]}")
 
 
 def kernel_is_idle(kernels: list[dict[str, Any]]) -> bool:

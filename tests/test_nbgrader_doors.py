@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
 import os
 import shutil
 import subprocess
 import sys
-import time
 import urllib.request
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -17,6 +15,7 @@ from typing import Any
 
 import pytest
 import toy
+from jupyter_server import address_of
 
 from autograder.course.lab import load_lab
 from autograder.gradebook.preparation import prepare_nbgrader
@@ -121,17 +120,7 @@ def jupyter(folder: Path) -> Iterator[str]:
         stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
     )  # fmt: skip
     try:
-        deadline = time.monotonic() + 120
-        address = ""
-        while not address:
-            assert process.poll() is None and time.monotonic() < deadline, "the server does not start"
-            time.sleep(0.1)
-            # It writes where it will listen before it does.
-            with contextlib.suppress(OSError, ValueError, StopIteration):
-                told = json.loads(next(runtime.glob("jpserver-*.json")).read_text())["url"]
-                with urllib.request.urlopen(f"{told}api", timeout=10):
-                    address = told
-        yield address
+        yield address_of(process, runtime)
     finally:
         process.terminate()
         process.wait(30)

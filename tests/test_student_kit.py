@@ -19,6 +19,7 @@ from pathlib import Path
 
 import pytest
 import toy
+from jupyter_server import address_of
 from test_setup import ENVIRON, ROOT, make, write_lock
 
 from autograder.authoring.student_kit import NAME, write_kit
@@ -160,11 +161,7 @@ def the_book_is_served(kit: Path, tmp_path: Path) -> None:
             cwd=kit, env=environment, stdout=file, stderr=file,
         )  # fmt: skip
     try:
-        deadline = time.monotonic() + 120
-        while not list(tmp_path.glob("runtime/jpserver-*.json")) and time.monotonic() < deadline:
-            assert server.poll() is None, log.read_text()
-            time.sleep(0.1)
-        address = json.loads(next(tmp_path.glob("runtime/jpserver-*.json")).read_text())["url"]
+        address = address_of(server, tmp_path / "runtime", log)
         with urllib.request.urlopen(f"{address}lectures/index.html?token=lab", timeout=60) as answer:
             assert answer.read() == b"<h1>Lectures</h1>"
             assert "sandbox" not in answer.headers["Content-Security-Policy"]
