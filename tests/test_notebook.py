@@ -451,7 +451,7 @@ def test_what_a_cell_without_a_score_expected_is_shown(notebook: Notebook) -> No
     write(notebook)
     shown = notebook.run('with launch("talker") as ros:\n    ros.expect_publisher("/chatter", String)')
     assert "✓ passed" in shown.text and "points" not in shown.text
-    shown = notebook.run('with launch("talker") as ros:\n    ros.expect_publisher("/chater", String, within=1)')
+    shown = notebook.run('with launch("talker") as ros:\n    ros.expect_publisher("/chater", String, within=20)')
     assert "✗ failed" in shown.text and "/chatter" in shown.text
     assert not notebook.run("1 + 1").html
 
@@ -466,17 +466,17 @@ def test_a_nodes_output_streams_while_a_cell_explores(notebook: Notebook) -> Non
     assert "tick <b>" in notebook.run('ros.log("talker")').text
     assert "<details open><summary>Output of <code>talker</code>" in shown.html
     notebook.run("%%node levels\nprint('[WARN] [1.0] [a]: low\\n[INFO] [1.0] [a]: <fine>')")
-    levels = notebook.run('with launch("levels") as ros:\n    ros.wait(lambda: False, within=1)').html
+    levels = notebook.run('with launch("levels") as ros:\n    ros.wait(lambda: False, within=30)').html
     assert ">[WARN] [1.0] [a]: low</span>" in levels and "\n[INFO] [1.0] [a]: &lt;fine&gt;" in levels
     many = notebook.run("%%node many\nfor number in range(1000):\n    print(number)\n")
     assert "written" in many.text
-    flood = notebook.run('with launch("many") as ros:\n    ros.wait(lambda: False, within=1)').text
+    flood = notebook.run('with launch("many") as ros:\n    ros.wait(lambda: False, within=30)').text
     assert "many | 99\n" in flood and "many | 100\n" not in flood and "[more is in ros.log()]" in flood
 
 
 def test_a_nodes_output_stands_under_a_failed_check_only(notebook: Notebook) -> None:
     write(notebook)
-    failed = CHECK.replace("/chatter", "/chater").replace("at_least=2", "at_least=2, within=1")
+    failed = CHECK.replace("/chatter", "/chater").replace("at_least=2", "at_least=2, within=20")
     shown = notebook.run(failed)
     assert "output of talker" in shown.text and "<details" in shown.html and "tick &lt;b&gt;" in shown.html
     assert "tick" not in notebook.run(CHECK).text
