@@ -13,7 +13,8 @@ from typing import Any
 
 from autograder.core.processes import descendants, memory
 from autograder.core.results import Isolation
-from autograder.sandbox.node_sandbox import NodeSandbox, RunningProgram
+from autograder.sandbox.node_sandbox import NodeSandbox
+from autograder.sandbox.running_program import RunningProgram
 
 ATTACKS: dict[str, str] = globals().get("ATTACKS", {})
 AT_ONCE = 6

@@ -8,7 +8,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
 import psutil
@@ -31,8 +31,14 @@ class Cluster:
         """Start the scheduler."""
         self._file, self._ending, self._folder, self._before = folder / "scheduler.json", ending, folder, before
         self._start(KIT, "scheduler", "--host", "127.0.0.1", "--port", "0", "--scheduler-file", str(self._file))
-        until(self._file.exists, "the scheduler does not start")
-        self.address = json.loads(self._file.read_text())["address"]
+        until(self._address, "the scheduler does not start")
+        self.address = self._address()
+
+    def _address(self) -> str:
+        """Where the scheduler listens; empty until it has written all of its file."""
+        with suppress(OSError, ValueError):
+            return str(json.loads(self._file.read_text())["address"])
+        return ""
 
     def worker(self, name: str, kit: Path = KIT, jobs: int = 1) -> psutil.Process:
         """Start a worker for so many jobs at once; it takes them as soon as it is known to the scheduler."""

@@ -22,7 +22,7 @@ import pytest
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
 import sample_class
-from jupyter_server import address_of
+from served import address_of
 
 from autograder.course.lab import lab_names, load_lab
 

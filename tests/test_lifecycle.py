@@ -16,8 +16,10 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.lifecycle import LifecycleNode, TransitionCallbackReturn
 
 from autograder.checks import runtime
-from autograder.graph.lifecycle import LifecycleClient, NoAnswer, ServiceMissing, in_order
+from autograder.graph.lifecycle import LifecycleClient, in_order
 from autograder.graph.observer import Observer
+from autograder.graph.parameters import NoAnswer
+from autograder.graph.services import ServiceMissing
 from autograder.sandbox.environment import profile_environment
 
 UP = [
@@ -133,7 +135,7 @@ def test_steps_of_several_nodes_come_in_the_order_in_which_they_were_taken(obser
             assert client.wait_for_state("unconfigured") == "unconfigured"
         for client in reversed(clients):
             assert client.transition("configure").success
-        assert observer.wait(lambda: len(in_order(clients)) == 4, 5.0)
+        assert observer.wait(lambda: len(in_order(clients)) == 4, 30.0)
         assert [(change.node, change.goal) for change in in_order(clients)] == [
             ("/second", "configuring"),
             ("/second", "inactive"),

@@ -15,7 +15,7 @@ from typing import Any
 
 import pytest
 import toy
-from jupyter_server import address_of
+from served import address_of
 
 from autograder.course.lab import load_lab
 from autograder.gradebook.preparation import prepare_nbgrader

@@ -20,7 +20,8 @@ from autograder.core.processes import descendants
 from autograder.core.results import Isolation
 from autograder.sandbox import isolation
 from autograder.sandbox.isolation import Preflight, choose, preflight
-from autograder.sandbox.node_sandbox import Limits, NodeSandbox
+from autograder.sandbox.limits import Limits
+from autograder.sandbox.node_sandbox import NodeSandbox
 from autograder.sandbox.outer import run_in_sandbox
 
 HONEST = "print('fine')\n"
@@ -249,7 +250,8 @@ def test_a_program_that_only_computes_is_ended_and_says_so(tmp_path: Path) -> No
 def test_a_submission_that_only_computes_has_little_left_for_its_later_launches() -> None:
     run = in_sandbox(
         "import time, tempfile\nfrom pathlib import Path\nfrom autograder.core.results import Isolation\n"
-        "from autograder.sandbox.node_sandbox import Limits, NodeSandbox\n"
+        "from autograder.sandbox.limits import Limits\n"
+        "from autograder.sandbox.node_sandbox import NodeSandbox\n"
         "folder = Path(tempfile.mkdtemp()); (folder / 'burns.py').write_text('while True: pass')\n"
         "(folder / 'asks.py').write_text('import resource; print(resource.getrlimit(resource.RLIMIT_CPU)[0])')\n"
         "limits = Limits(cpu_seconds=3, cpu_together=4, cpu_last=1)\n"

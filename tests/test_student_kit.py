@@ -19,7 +19,7 @@ from pathlib import Path
 
 import pytest
 import toy
-from jupyter_server import address_of
+from served import address_of
 from test_setup import ENVIRON, ROOT, make, write_lock
 
 from autograder.authoring.student_kit import NAME, write_kit
