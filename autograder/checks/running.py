@@ -11,7 +11,7 @@ from autograder.checks.settling import Settling
 from autograder.core.results import NodeLog
 from autograder.diagnosis import Diagnosis, Scene
 from autograder.graph.observer import Observer
-from autograder.sandbox.node_sandbox import RunningProgram
+from autograder.sandbox.running_program import RunningProgram
 
 SETTLE = 2.0
 """Seconds that a new program may take to show that it lives."""

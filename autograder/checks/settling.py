@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from autograder.diagnosis.events import Event, ExecutorSeen, NodeSeen, ProbeFailed, Thing, read
 from autograder.graph.names import full_name
 from autograder.graph.observer import Observer
-from autograder.sandbox.node_sandbox import RunningProgram
+from autograder.sandbox.running_program import RunningProgram
 
 QUIET = 1.5
 """Seconds without anything new, besides the longest period of a timer: what timers' callbacks make is there then."""

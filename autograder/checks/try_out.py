@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from autograder.checks.running import Running
 from autograder.core.output import tidy
 from autograder.graph.names import full_name
-from autograder.sandbox.node_sandbox import RunningProgram
+from autograder.sandbox.running_program import RunningProgram
 
 TRIAL = 3.0
 """Seconds for which the programs run."""

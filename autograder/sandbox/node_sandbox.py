@@ -22,11 +22,8 @@ from autograder.sandbox.environment import INSIDE, python_environment
 from autograder.sandbox.group import GroupLost, ProgramGroup
 from autograder.sandbox.limits import Limits
 from autograder.sandbox.loop import Loop
-from autograder.sandbox.running_program import RunningProgram
 from autograder.sandbox.scratch import Scratch
 from autograder.sandbox.walls import bubblewrap, seccomp
-
-__all__ = ["Limits", "NodeSandbox", "ProgramGroup", "RunningProgram"]
 
 _READY_WITHIN = 30.0
 """Seconds that a launcher may take to load rclpy on a machine that is busy."""

@@ -12,13 +12,8 @@ from collections.abc import Callable
 from typing import Any
 
 from autograder.core.processes import pid_of
+from autograder.sandbox.inside import thread_stacks
 from autograder.sandbox.limits import Limits
-
-STACK_SIGNAL = signal.SIGRTMIN + 10
-"""The launcher makes a program write its threads' stacks at this signal."""
-
-_END_OF_STACKS = b"\n=\n"
-"""What the program writes behind its stacks."""
 
 _LONGEST_NOTE = 4096
 """Bytes; the probe's own are shorter."""
@@ -186,6 +181,6 @@ class RunningProgram:
             self._stacks.clear()
             if self._status is not None:
                 return ""
-            self.signal(STACK_SIGNAL)
-            self._changed.wait_for(lambda: _END_OF_STACKS in self._stacks or self._status is not None, timeout)
+            self.signal(thread_stacks.STACK_SIGNAL)
+            self._changed.wait_for(lambda: thread_stacks.END in self._stacks or self._status is not None, timeout)
             return self._stacks.decode("utf-8", "replace")

@@ -10,7 +10,7 @@ from autograder.checks.expect.expectations import WITHIN
 from autograder.checks.expect.programs import ProgramExpectations
 from autograder.checks.misuse import Misuse
 from autograder.diagnosis import Diagnosis, last_traceback
-from autograder.sandbox.node_sandbox import RunningProgram
+from autograder.sandbox.running_program import RunningProgram
 
 _SAID = {"SIGINT": "Ctrl-C (SIGINT)", "SIGTERM": "SIGTERM"}
 """How a program is told to end, in words."""

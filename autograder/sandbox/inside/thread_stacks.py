@@ -11,7 +11,7 @@ import os
 import signal
 
 STACK_SIGNAL = signal.SIGRTMIN + 10
-"""`sandbox/running_program.py` sends it."""
+"""What `sandbox/running_program.py` asks with."""
 
 END = b"\n=\n"
 """What follows an answer."""

@@ -7,7 +7,6 @@ namespaces, mounts, and the kernel's rarely used corners.
 
 from __future__ import annotations
 
-import ctypes
 import errno
 import platform
 import struct
@@ -129,20 +128,3 @@ def _beginning() -> list[bytes]:
         _step(_LOAD, _NUMBER), _step(_AT_LEAST, 0x40000000, 0, 1), _step(_RETURN, _KILL),  # the x32 calls
         _step(_EQUAL, _CLONE3, 0, 1), _step(_RETURN, _ERRNO | errno.ENOSYS),  # its flags are out of reach: use clone
     ]  # fmt: skip
-
-
-def apply_to_self() -> None:
-    """Put this process, and all that it starts, under the filter.
-
-    Raises:
-        OSError: the kernel refuses.
-    """
-    content = filter_program()
-
-    class Program(ctypes.Structure):
-        _fields_ = [("length", ctypes.c_ushort), ("filter", ctypes.c_char_p)]
-
-    libc = ctypes.CDLL(None, use_errno=True)
-    program = Program(len(content) // 8, content)
-    if libc.prctl(38, 1, 0, 0, 0) != 0 or libc.prctl(22, 2, ctypes.byref(program), 0, 0) != 0:
-        raise OSError(ctypes.get_errno(), "the filter of system calls was refused")
