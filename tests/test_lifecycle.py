@@ -11,6 +11,7 @@ from typing import Any
 
 import pytest
 import rclpy
+from lifecycle_msgs.msg import TransitionEvent
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.lifecycle import LifecycleNode, TransitionCallbackReturn
@@ -126,6 +127,29 @@ def test_a_callback_without_a_return_value_leaves_no_answer(observer: Observer) 
 def test_a_node_that_is_not_there_is_missing_at_once_when_nothing_can_come(observer: Observer) -> None:
     with pytest.raises(ServiceMissing):
         LifecycleClient(observer, "/nobody").state(within=60.0, give_up=lambda: True)
+
+
+def test_a_node_whose_events_never_end_does_not_keep_the_check_waiting_for_ever(observer: Observer) -> None:
+    client, over = LifecycleClient(observer, "/part"), threading.Event()
+    context = Context()
+    rclpy.init(context=context, domain_id=observer.domain_id, args=[])
+    flood = rclpy.create_node("flood", context=context)
+    events = flood.create_publisher(TransitionEvent, "/part/transition_event", 1)
+
+    def publish() -> None:
+        while not over.wait(0.01):
+            events.publish(TransitionEvent())
+
+    thread = threading.Thread(target=publish)
+    thread.start()
+    try:
+        with spinning(observer, "part"):
+            assert client.wait_for_state("active", within=2.0) == "unconfigured"
+    finally:
+        over.set()
+        thread.join()
+        flood.destroy_node()
+        rclpy.try_shutdown(context=context)
 
 
 def test_steps_of_several_nodes_come_in_the_order_in_which_they_were_taken(observer: Observer) -> None:

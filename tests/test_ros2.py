@@ -107,6 +107,20 @@ def test_it_prints_what_the_real_tool_prints(
     assert ended == int(status)
 
 
+@pytest.mark.parametrize(
+    ("command", "told"),
+    [
+        ("topic echo /chatter --filter 'm.data >'", "Invalid filter 'm.data >'"),
+        ("topic echo /chatter --filter m.nothing", "Invalid filter 'm.nothing'"),
+        ("topic hz /chatter --filter m.nothing", "Invalid filter 'm.nothing'"),
+        ("topic pub '/no name' std_msgs/msg/String", "no name"),
+    ],
+)
+def test_what_cannot_be_done_is_told_in_words(robot: Robot, command: str, told: str) -> None:
+    said, status = say(robot, command)
+    assert told in said and "Traceback" not in said and status == 1
+
+
 def terminal(robot: Robot, *words: str) -> subprocess.Popen[str]:
     environment = {name: value for name, value in robot.environment.items() if not name.startswith("FASTRTPS")}
     return subprocess.Popen(

@@ -6,6 +6,7 @@ not available in the current state ends a healthy rclpy node (rclpy 7.1), a labe
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -19,9 +20,6 @@ from autograder.graph.parameters import NoAnswer
 from autograder.graph.services import ServiceMissing
 
 GiveUp = Callable[[], bool]
-
-PRIMARY_STATES = ("unconfigured", "inactive", "active", "finalized")
-"""The states a node rests in; the others are only passed through."""
 
 MATCH_SECONDS = 1.0
 """How long a transition waits for the event topic to be matched: its events are volatile, late listeners miss them."""
@@ -162,12 +160,14 @@ class LifecycleClient:
     def wait_for_state(self, label: str, within: float = 10.0, give_up: GiveUp = lambda: False) -> str:
         """Wait until the node is in a state; the label of its state then, or when the time was over. Raises as `state`.
 
-        The events tell when asking can help, so that a waiting observer does not flood the node.
+        The events tell when asking can help, so that a waiting observer does not flood the node. While they go on the
+        wait does so too, for twice as long at the most.
         """
+        until = time.monotonic() + 2 * within
         while True:
             heard = self._events.count
             seen = self.state(within, give_up)
-            if seen == label or not self._wait_for_more(heard, within, give_up):
+            if seen == label or time.monotonic() >= until or not self._wait_for_more(heard, within, give_up):
                 return seen
 
     def wait_for_changes(self, count: int, within: float = 10.0, give_up: GiveUp = lambda: False) -> list[Change]:
@@ -213,6 +213,3 @@ class LifecycleClient:
 def in_order(clients: Iterable[LifecycleClient]) -> list[Change]:
     """State changes of several nodes in the order in which they were published."""
     return sorted((change for client in clients for change in client.changes), key=lambda change: change.stamp)
-
-
-__all__ = ["PRIMARY_STATES", "Change", "LifecycleClient", "NoAnswer", "Requested", "ServiceMissing", "in_order"]

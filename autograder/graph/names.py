@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 from difflib import SequenceMatcher
 
+UNKNOWN_NODE = "_NODE_NAME_UNKNOWN_"
+"""What the middleware calls the node of an endpoint whose node it has not heard of yet."""
+
 
 def full_name(namespace: str, name: str) -> str:
     """Join a namespace and a node name: `/` and `talker` give `/talker`."""

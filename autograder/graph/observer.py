@@ -12,7 +12,6 @@ from collections.abc import Callable
 from typing import Any
 
 import rclpy
-from rclpy._rclpy_pybind11 import RCLError
 from rclpy.context import Context
 from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
@@ -120,7 +119,6 @@ class Observer:
         rclpy.try_shutdown(context=self._context)
         self._thread.join(timeout=5.0)
         self.node.destroy_node()
-        self._context.try_shutdown()
 
     def room_for(self, size: int, kept: int) -> bool:
         """Take room for one more message of `size` bytes, for a recording that keeps `kept` bytes; False if none.
@@ -191,7 +189,7 @@ class Observer:
         """Names and namespaces of all nodes."""
         try:
             found: list[tuple[str, str]] = _read(self.node.get_node_names_and_namespaces)
-        except RCLError as error:
+        except RuntimeError as error:  # rclpy's RCLError is one
             if "empty node name" in str(error):  # rcl lets no program make such a node
                 raise ForgedGraph from error
             raise

@@ -10,7 +10,7 @@ from rcl_interfaces.srv import GetParameters, ListParameters, SetParameters
 from rclpy.parameter import Parameter, parameter_value_to_python
 
 from autograder.graph.observer import Observer
-from autograder.graph.services import ServiceMissing, call_all
+from autograder.graph.services import call_all
 
 GiveUp = Callable[[], bool]
 
@@ -67,6 +67,3 @@ def set_parameter(
     if not results:
         raise NoAnswer(node)
     return results[0]
-
-
-__all__ = ["NoAnswer", "ServiceMissing", "get_parameters", "list_parameters", "set_parameter"]

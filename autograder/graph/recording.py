@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -92,12 +91,13 @@ class Recording:
         if not self._observer.room_for(size, self._kept):
             return
         self._kept += size
-        with contextlib.suppress(Exception):  # whatever a program sends that is no such message
+        try:
             msg = deserialize_message(data, self.msg_type)
-            bag.current.add(self.topic, self.msg_type, info["source_timestamp"], data)
-            self._messages.append(
-                Received(msg, time.monotonic(), info["source_timestamp"] * 1e-9, info["publication_sequence_number"])
-            )
+        except Exception:  # whatever a program sends that is no such message
+            return
+        stamp = info["source_timestamp"]
+        bag.current.add(self.topic, self.msg_type, stamp, data)
+        self._messages.append(Received(msg, time.monotonic(), stamp * 1e-9, info["publication_sequence_number"]))
         self._observer.notify()
 
     def _refused(self, event: Any) -> None:

@@ -63,13 +63,15 @@ def run(
         options = _parser(words).parse_args(list(words))
     except SystemExit as end:
         return int(end.code or 0)
+    from rclpy.exceptions import NameValidationException
+
     from autograder.ros2.session import Session
 
     session = Session(domain_id, observer, seconds)
     session.options = options
     try:
         options.run(session, options)
-    except Failure as failure:
+    except (Failure, NameValidationException) as failure:
         sys.stdout.flush()
         if str(failure):
             print(failure, file=sys.stderr)

@@ -20,7 +20,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
-from autograder.graph.names import full_name
+from autograder.graph.names import UNKNOWN_NODE, full_name
 from autograder.graph.observer import OBSERVER_NAME, Observer
 from autograder.ros2.failure import TimeIsUp
 
@@ -35,8 +35,6 @@ _STILL = 0.1
 """Seconds between two looks that have to be alike."""
 _POLL = 0.02
 
-_UNKNOWN = "_NODE_NAME_UNKNOWN_"
-"""What the middleware calls the node of an endpoint whose node it has not heard of yet."""
 _Found = TypeVar("_Found")
 _OWN = re.compile(rf"{OBSERVER_NAME}_[0-9a-f]{{6}}")
 
@@ -218,7 +216,7 @@ def _complete(node: Node) -> bool:
     """Whether every endpoint's node and every node's endpoints are known; a node publishes its parameters' events."""
     for topic, _ in node.get_topic_names_and_types():
         ends = [*node.get_publishers_info_by_topic(topic), *node.get_subscriptions_info_by_topic(topic)]
-        if any(end.node_name == _UNKNOWN for end in ends):
+        if any(end.node_name == UNKNOWN_NODE for end in ends):
             return False
     writers = {(end.node_name, end.node_namespace) for end in node.get_publishers_info_by_topic("/parameter_events")}
     return all(one in writers for one in node.get_node_names_and_namespaces())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import yaml
@@ -104,6 +105,28 @@ def matching(session: Session, name: str, options: Any) -> QoSProfile:
     return made
 
 
+def wanted_messages(expression: str | None) -> Callable[[Any], bool]:
+    """What `--filter` asks for: whether a message, `m` in the expression, is one of those; without one, all are.
+
+    Raises:
+        Failure: it is no expression; or, when it is asked, it does not fit the message.
+    """
+    if expression is None:
+        return lambda _: True
+    try:
+        code = compile(expression, "EXPR", "eval")
+    except (SyntaxError, ValueError) as error:
+        raise Failure(f"Invalid filter '{expression}': {error}") from None
+
+    def wanted(message: Any) -> bool:
+        try:
+            return bool(eval(code, {}, {"m": message}))
+        except Exception as error:
+            raise Failure(f"Invalid filter '{expression}': {error}") from None
+
+    return wanted
+
+
 def _echo(session: Session, options: Any) -> None:
     if options.message_type is None:
         message_type = type_of(session, options.topic_name)
@@ -115,7 +138,7 @@ def _echo(session: Session, options: Any) -> None:
             message_type = interface(options.message_type, "msg")
         except LookupError:
             raise Failure(f"The message type '{options.message_type}' is invalid") from None
-    expression = compile(options.expression, "EXPR", "eval") if options.expression else None
+    passes = wanted_messages(options.expression)
     wanted = 1 if options.once else options.count
     printed = 0
 
@@ -123,7 +146,7 @@ def _echo(session: Session, options: Any) -> None:
         nonlocal printed
         if wanted is not None and printed >= wanted:
             return
-        if expression is None or eval(expression, {}, {"m": message}):
+        if passes(message):
             if options.include_message_info:
                 print(yaml.safe_dump(info), end="---------\n")
             _print(message, options)

@@ -15,7 +15,7 @@ from rclpy.time import Time
 from autograder.ros2.failure import Failure
 from autograder.ros2.options import joins, positive
 from autograder.ros2.session import Session
-from autograder.ros2.topic_listen import matching, type_of
+from autograder.ros2.topic_listen import matching, type_of, wanted_messages
 
 _EVERY = 1.0
 """Seconds between two reports."""
@@ -60,14 +60,14 @@ def _listen(session: Session, options: Any, take: Callable[[Any], None], raw: bo
 
 
 def _hz(session: Session, options: Any) -> None:
-    expression = compile(options.expression, "EXPR", "eval") if options.expression else None
+    passes = wanted_messages(options.expression)
     clock = Clock(clock_type=ClockType.SYSTEM_TIME) if options.wall_time else session.node.get_clock()
     gaps: deque[int] = deque(maxlen=options.window)
     last = reported = 0
 
     def take(message: Any) -> None:
         nonlocal last, reported
-        if expression is not None and not eval(expression, {}, {"m": message}):
+        if not passes(message):
             return
         now = clock.now().nanoseconds
         if last and now >= last:
@@ -80,7 +80,7 @@ def _hz(session: Session, options: Any) -> None:
             reported = now
             print(f"average rate: {1e9 * len(gaps) / sum(gaps):.3f}\n\t{_spread(gaps)}", flush=True)
 
-    _listen(session, options, take, raw=expression is None)
+    _listen(session, options, take, raw=options.expression is None)
     session.spin_until(lambda: False)
 
 

@@ -8,11 +8,9 @@ from collections.abc import Sequence
 
 from autograder.checks.expect.endpoints import EndExpectations
 from autograder.diagnosis import Diagnosis
-from autograder.graph.names import full_name
+from autograder.graph.names import UNKNOWN_NODE, full_name
 from autograder.graph.recording import Received
 
-_UNKNOWN = "_NODE_NAME_UNKNOWN_"
-"""What rmw calls the node of an endpoint that has been heard of before its node."""
 _NAMED_WITHIN = 2.0
 """Seconds that the word of which node an endpoint belongs to may be under way."""
 
@@ -27,7 +25,7 @@ class SourceExpectations(EndExpectations):
         if not received:
             return
         self._observer.wait(
-            lambda: all(end.node_name != _UNKNOWN for end in self._ends(topic, msg_type, "publisher", "")),
+            lambda: all(end.node_name != UNKNOWN_NODE for end in self._ends(topic, msg_type, "publisher", "")),
             _NAMED_WITHIN,
         )
         ends = self._ends(topic, msg_type, "publisher", "")
