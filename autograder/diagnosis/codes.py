@@ -1,7 +1,7 @@
 """The codes of all reasons, each with what must have been seen for it. A test holds a case for and a near miss of each.
 
-Codes of limits (`memory-limit` and the like) come from the sandbox, codes of remap rules and of launch and parameter
-files from `autograder/graph` and `autograder/launch_files.py`, others from the check cells themselves.
+Codes of limits (`memory-limit` and the like) come from the sandbox, codes of remap rules and of parameter files from
+`autograder/arguments`, others from the expectations and from the check cells themselves.
 """
 
 CODES = {

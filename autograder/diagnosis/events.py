@@ -10,6 +10,9 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
+_NOTICED = 0.05
+"""Seconds from which on one run of a callback is noticed by what waits for its end."""
+
 
 class _Event(BaseModel):
     model_config = ConfigDict(frozen=True, extra="ignore")
@@ -154,6 +157,11 @@ class Thing(_AtLine):
     def has_callback(self) -> bool:
         """Whether an executor runs a callback of the student's for it."""
         return self.kind in ("timer", "subscription", "service")
+
+    @property
+    def takes_time(self) -> bool:
+        """Whether its runs last so long that what waits for their end notices it."""
+        return bool(self.running) or self.spent > _NOTICED * self.done
 
 
 class Call(_AtLine):

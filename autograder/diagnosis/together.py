@@ -12,9 +12,6 @@ from autograder.diagnosis.scene import Scene
 MOST_OF_THE_TIME = 0.6
 """Share of the time that others must have taken for a callback to count as kept waiting by them."""
 
-TAKES_TIME = 0.05
-"""Seconds from which on one run of a callback keeps others waiting."""
-
 FAR_FEWER = 0.6
 """Share of the due runs below which a timer counts as kept waiting."""
 
@@ -33,7 +30,7 @@ def single_threaded(inside: Inside) -> Diagnosis | None:
     MultiThreadedExecutor.
     """
     used = _used(inside)
-    if not any(thing.running or thing.spent > TAKES_TIME * thing.done for thing in _active(inside)):
+    if not any(thing.takes_time for thing in _active(inside)):
         return None  # nothing keeps the thread, so it is not the thread that is missing
     if not used or len(used) > 1 or used[0].threads is not None:
         return None

@@ -101,9 +101,6 @@ def _under_frames(lines: Sequence[str], number: int) -> bool:
     """Whether this line is an error of any name: it stands under the frames of a traceback."""
     if not re.match(r"[A-Za-z_][\w.]*(: |$)", lines[number]):
         return False
-    for above in reversed(lines[:number]):
-        if above.startswith('  File "'):
-            return True
-        if not above.startswith("    "):
-            return False
-    return False
+    while number > 0 and lines[number - 1].startswith("    "):
+        number -= 1
+    return number > 0 and lines[number - 1].startswith('  File "')

@@ -8,9 +8,6 @@ from autograder.diagnosis.inside import Inside, called
 from autograder.diagnosis.reason import Diagnosis
 from autograder.diagnosis.scene import Scene
 
-TAKES_TIME = 0.05
-"""Seconds from which on a run of a callback is noticed by one that waits for it."""
-
 
 def why_kept_waiting(scene: Scene, service: str) -> Diagnosis | None:
     """Why a service answers only when another callback of its program has ended.
@@ -20,7 +17,7 @@ def why_kept_waiting(scene: Scene, service: str) -> Diagnosis | None:
     """
     for inside in scene.insides:
         asked = [thing for thing in inside.callbacks if (thing.kind, thing.name) == ("service", service)]
-        slow = [thing for thing in inside.callbacks if _takes_time(thing) and thing.name != service]
+        slow = [thing for thing in inside.callbacks if thing.takes_time and thing.name != service]
         for answers in asked:
             for works in slow:
                 found = _group(inside, answers, works) or _thread(inside, answers, works)
@@ -28,10 +25,6 @@ def why_kept_waiting(scene: Scene, service: str) -> Diagnosis | None:
                 if found:
                     return found
     return None
-
-
-def _takes_time(thing: Thing) -> bool:
-    return bool(thing.running) or thing.spent > TAKES_TIME * max(thing.done, 1)
 
 
 def _group(inside: Inside, answers: Thing, works: Thing) -> Diagnosis | None:
@@ -59,7 +52,7 @@ def _thread(inside: Inside, answers: Thing, works: Thing) -> Diagnosis | None:
 
 
 def _lock(inside: Inside, answers: Thing, works: Thing) -> Diagnosis | None:
-    if not _takes_time(answers):
+    if not answers.takes_time:
         return None
     mine, others = (inside.source.locks(int(t.line.rpartition(":")[2] or 0)) for t in (answers, works))
     for lock, line in mine.items():
