@@ -16,8 +16,10 @@ import pytest
 from IPython.core.interactiveshell import InteractiveShell
 from jupyter_client.manager import KernelManager
 
+import autograder.checks
 from autograder.core import front_end
 from autograder.course.lab import blank_mark
+from autograder.notebook import hints
 from autograder.notebook.kernel import Kernel
 from autograder.notebook.program_folder import MANIFEST
 
@@ -578,6 +580,10 @@ def test_in_markdown_a_report_is_text(notebook: Notebook, tmp_path: Path) -> Non
     assert "✓ passed  2 of 2 points" in text and "<div" not in text
 
 
+def test_every_name_of_the_set_up_cell_leads_to_it() -> None:
+    assert set(hints.NAMES) == set(autograder.checks.__all__)
+
+
 def test_an_unused_extension_does_no_harm(tmp_path: Path) -> None:
     code = (
         "import sys\nfrom IPython.core.interactiveshell import InteractiveShell\nshell = InteractiveShell.instance()\n"
@@ -588,7 +594,7 @@ def test_an_unused_extension_does_no_harm(tmp_path: Path) -> None:
     assert not (tmp_path / "nodes").exists()
 
 
-GUESSES = "%%file predictions.yaml\nbeats_predicted: 7\nbeats_measured: 0\nticks_predicted: pause"
+GUESSES = "%%file predictions.yaml\nbeats_predicted: 7\nbeats_measured: 0\nticks_predicted: pause\n3: 4"
 FILLED = (
     "from autograder.checks import answers\nwith answers('predictions.yaml') as table:\n"
     "    table.expect_answer('beats_measured', 0)\ntable.score(3)"

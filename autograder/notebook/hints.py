@@ -7,7 +7,8 @@ from __future__ import annotations
 
 from typing import Any
 
-_NAMES = ("Program", "answers", "command_line", "launch", "launch_file", "vary")
+NAMES = ("NAME_OR_NONE", "Program", "answers", "build", "command_line", "launch", "launch_file", "vary")
+"""What the set-up cell brings: all names of `autograder.checks`, which this extension does not load."""
 _SAY = (
     "Run the first code cell of the notebook, the one with `%load_ext autograder`. It is needed again after every "
     "restart of the kernel, and so are the cells of your programs."
@@ -38,5 +39,5 @@ def _not_known(_line: str) -> None:
 
 
 def _explain(result: Any) -> None:
-    if isinstance(result.error_in_exec, NameError) and result.error_in_exec.name in _NAMES:
+    if isinstance(result.error_in_exec, NameError) and result.error_in_exec.name in NAMES:
         print(_SAY)

@@ -182,7 +182,8 @@ def _guesses(folder: Path) -> list[Guess]:
             table = student_yaml.read(path, table=True)
         except student_yaml.StudentFileError:
             continue
-        for key, value in (table if isinstance(table, dict) else {}).items():
+        for question, value in (table if isinstance(table, dict) else {}).items():
+            key = str(question)  # YAML also has numbers and truth values for keys
             for kind, suffix in (("predicted", _GUESS), ("measured", _FACT)):
                 if suffix.search(key) or suffix.search(path.stem):
                     where = (suffix.sub("", path.stem), suffix.sub("", key))

@@ -10,11 +10,12 @@ from collections.abc import Iterator
 
 from autograder.authoring.lint.finding import Finding
 from autograder.checks.answers import Answers
+from autograder.checks.building import Package
 from autograder.checks.launch import Launch
 from autograder.course.cell_file import parse
 from autograder.course.lab import Cell, Lab
 
-_BLOCKS = {"launch": Launch, "launch_file": Launch, "answers": Answers}
+_BLOCKS = {"launch": Launch, "launch_file": Launch, "answers": Answers, "build": Package}
 """What `with launch(…) as ros` gives, by the function."""
 _OF_THE_NOTEBOOK = {"get_ipython", "display", "__name__", "__file__"}
 
@@ -69,7 +70,7 @@ def _unknown_names(tree: ast.AST, known: set[str]) -> Iterator[str]:
 
 
 def _unknown_expectations(tree: ast.AST) -> Iterator[str]:
-    """Methods and keywords that `ros` or `table` does not have."""
+    """Methods and keywords that `ros`, `table` or `package` does not have."""
     names: dict[str, type] = {}
     for node in ast.walk(tree):
         if isinstance(node, ast.withitem) and isinstance(node.optional_vars, ast.Name):
