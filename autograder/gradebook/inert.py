@@ -31,7 +31,7 @@ _BLANKS = 200
 _FORMULAS = 100
 """Formulas of LaTeX's longer spellings that are shown as such in an answer."""
 _FORMULA = re.compile(r"(\\begin(?=\{)|\\\\(?=[\[(]))")
-_FENCE = re.compile(r"^([ \t>*+\d.)-]*)(`{3,}|~{3,})[^`\n]*$", re.MULTILINE)
+_FENCE = re.compile(r"^([ \t>*+\d.)-]*+)(`{3,}+|~{3,}+)[^`\n]*+$", re.MULTILINE)  # what was taken is never given back
 
 
 def inert(markdown: str) -> str:

@@ -72,8 +72,9 @@ def _build(sources: Sources, stop: threading.Event | None) -> BuildRun | None:
     with _lock:
         alone = _building.setdefault(key, threading.Lock())
     with alone:  # who hands in the same waits for the one build
-        if key in _kept:
-            return _kept[key]
+        known = _kept.get(key)
+        if known is not None:
+            return known
         command, limit = ["autograder.grading.builder"], BUILD_SECONDS + _STARTING
         run = run_in_sandbox(command, sources.model_dump_json().encode(), sources.isolation, limit, stop)
         try:

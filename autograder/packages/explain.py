@@ -7,7 +7,7 @@ first error that the build printed, word for word.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 from autograder.diagnosis.reason import Diagnosis
@@ -120,7 +120,7 @@ _REASONS: list[tuple[str, _Reason]] = [
         lambda m: Diagnosis(f"setup.py names the Python package `{m[1]}`; there is no such folder.", "package-file"),
     ),
     (
-        r"Error processing '([^']*)' of '([^']*)': '?('.*?)'? Traceback",
+        r"Error processing '([^']{0,1000})' of '([^']{0,200})': '?('.{0,1000}?)'? Traceback",
         _interface_line,
     ),
     (
@@ -130,7 +130,7 @@ _REASONS: list[tuple[str, _Reason]] = [
     (
         r"InvalidActionSpecification: Number of '---' separators",
         lambda m: Diagnosis(
-            "An action file has not just two lines `---`: they stand between goal, result and feedback.",
+            "An action file needs exactly two lines `---`: one before the result, and one before the feedback.",
             "interface-parts",
         ),
     ),
@@ -139,7 +139,7 @@ _REASONS: list[tuple[str, _Reason]] = [
         lambda m: Diagnosis(f"CMakeLists.txt names `{m[1]}`; the package has no such file.", "interface-file"),
     ),
     (
-        r"include_map\[pkg\].*?KeyError: '([^']+)'",
+        r"include_map\[pkg\].{0,2000}?KeyError: '([^']{1,200})'",
         lambda m: Diagnosis(
             f"An interface uses a message of `{m[1]}`, which rosidl_generate_interfaces is not told of.",
             "interface-dependency",
@@ -194,17 +194,18 @@ def _quoted(log: str) -> Diagnosis:
         said = " ".join(error[4].split()).rstrip(".")[:300]
         return Diagnosis(f"CMake stops at {where}: {said}.", "cmake")
     if "setup.py" in log:
-        wrong = next(_python_errors(log), "")
+        wrong = _python_error(log)
         if wrong:
             return Diagnosis(f"setup.py ends with an error: {wrong}.", "setup-py")
     first = next((line for line in log.splitlines() if re.search(r"\berror\b|Error", line)), "")
     return Diagnosis(f"The build fails: {first.strip()[:300]}", "build-failed", "The whole log is below.")
 
 
-def _python_errors(log: str) -> Iterator[str]:
-    """The last lines of tracebacks, with the line of setup.py where one is named."""
-    for match in re.finditer(r"^(\w+(?:Error|Exception|Warning)?): (.+)$", log, re.MULTILINE):
-        place = re.findall(r'File "[^"]*setup\.py", line (\d+)', log[: match.start()])
-        where = f" (line {place[-1]})" if place else ""
-        if match[1].endswith(("Error", "Exception")):
-            yield f"{match[1]}: {match[2].rstrip('.')}{where}"
+def _python_error(log: str) -> str:
+    """The last line of the first traceback, with the line of setup.py where one is named; empty if there is none."""
+    match = re.search(r"^(\w+(?:Error|Exception)): (.+)$", log, re.MULTILINE)
+    if match is None:
+        return ""
+    place = re.findall(r'File "[^"]*setup\.py", line (\d+)', log[: match.start()])
+    where = f" (line {place[-1]})" if place else ""
+    return f"{match[1]}: {match[2].rstrip('.')}{where}"
