@@ -60,7 +60,7 @@ def answers(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, tupl
                 return (said.code if said else "") == case.says
 
             for name in batch:
-                ros.wait(lambda: answered(name), 8.0)  # noqa: B023
+                ros.wait(lambda: answered(name), 30.0)  # noqa: B023
     yield found
     runtime.current.close()
 
