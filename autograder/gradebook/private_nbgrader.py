@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -30,13 +31,13 @@ def in_first_pass(autograde: Autograde) -> bool:
 class SaveScores(SaveAutoGrades):  # type: ignore[misc]
     """nbgrader's stage that records points, without its ways of finding them and of asking for a person."""
 
+    @abstractmethod
     def score_check(self, grade: Any, resources: dict[str, Any]) -> None:
         """Set the points of a check cell in its grade."""
-        raise NotImplementedError
 
+    @abstractmethod
     def needs_person(self, grade: Any, cell: Any, asked: bool) -> bool:
         """Whether a person has to look at a cell, whose grade has its points; `asked`: whether one had to before."""
-        raise NotImplementedError
 
     def _add_score(self, cell: Any, resources: dict[str, Any]) -> None:
         grade_id = cell.metadata["nbgrader"]["grade_id"]
@@ -53,6 +54,7 @@ class SaveScores(SaveAutoGrades):  # type: ignore[misc]
 class SaveLabCells(SaveCells):  # type: ignore[misc]
     """nbgrader's stage that notes a lab's cells, which by itself refuses a lab that has grades and other cells now."""
 
+    @abstractmethod
     def fit(self, notebook: Any, new: dict[str, dict[str, Any]]) -> None:
         """Give the notebook in the gradebook, which has grades, the cells that the lab has now.
 
@@ -60,7 +62,6 @@ class SaveLabCells(SaveCells):  # type: ignore[misc]
             notebook: as the gradebook has it.
             new: what nbgrader notes of each cell, by kind (`grade`, `solution`, `task`, `source`) and name.
         """
-        raise NotImplementedError
 
     def _create_notebook(self, nb: Any) -> None:
         kinds = ("grade", "solution", "task", "source")

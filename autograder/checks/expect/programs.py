@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from abc import ABC, abstractmethod
 from functools import cached_property
 from typing import Any
 
@@ -17,13 +18,13 @@ from autograder.checks.program import Program
 from autograder.diagnosis import Diagnosis
 from autograder.graph.clock import ClockDriver
 from autograder.graph.recording import Recording
-from autograder.sandbox.node_sandbox import RunningProgram
+from autograder.sandbox.running_program import RunningProgram
 
 _LEVELS = {"DEBUG": 10, "INFO": 20, "WARN": 30, "ERROR": 40, "FATAL": 50}
 """Numbers of rcl_interfaces/msg/Log."""
 
 
-class ProgramExpectations(Expectations):
+class ProgramExpectations(Expectations, ABC):
     """What the programs do as processes."""
 
     def program(self, name: str) -> RunningProgram:
@@ -43,13 +44,13 @@ class ProgramExpectations(Expectations):
                 return program
         self._fail(f"The program `{name}` is there", diagnosis.program_trouble(self._scene()))
 
+    @abstractmethod
     def _end(self) -> None:
         """End the launch."""
-        raise NotImplementedError
 
+    @abstractmethod
     def _start(self, node: Program | str) -> None:
         """Start one more program."""
-        raise NotImplementedError
 
     def stop(self, name: str = "", *, kill: bool = False) -> None:
         """End one of several programs: politely (SIGTERM), or without a chance to clean up.
