@@ -8,7 +8,7 @@ when one's begin lies between the other's begin and end.
 from __future__ import annotations
 
 import itertools
-from collections import Counter
+from collections import Counter, defaultdict, deque
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -106,12 +106,12 @@ class Concurrency:
         done = []
         for under_way, events in self._stretches:
             unpaired = Counter(under_way)
-            open_at: dict[str, list[float]] = {}
+            open_at: defaultdict[str, deque[float]] = defaultdict(deque)
             for event in events:
                 if event.begins:
-                    open_at.setdefault(event.run, []).append(event.stamp)
+                    open_at[event.run].append(event.stamp)
                 elif unpaired[event.run]:
                     unpaired[event.run] -= 1
                 else:
-                    done.append(Span(event.name, open_at[event.run].pop(0), event.stamp))
+                    done.append(Span(event.name, open_at[event.run].popleft(), event.stamp))
         return done

@@ -12,9 +12,9 @@ from typing import Any, Self
 from autograder.checks import contradictions, findings, outcomes, runtime, seen
 from autograder.checks.building import why_no_executable, why_no_package
 from autograder.checks.command_line import CommandLineError
-from autograder.checks.expect.actions import ActionExpectations
 from autograder.checks.expect.ending import EndingExpectations
 from autograder.checks.expect.facts import Facts
+from autograder.checks.expect.feedback import FeedbackExpectations
 from autograder.checks.expect.looking import Looking
 from autograder.checks.expect.meanwhile import MeanwhileExpectations
 from autograder.checks.expect.messages import MessageExpectations
@@ -39,7 +39,8 @@ from autograder.graph.observer import ForgedGraph, Observer
 from autograder.launch_files import LaunchFileError, remove_written
 from autograder.packages.workspace import INSTALLED
 from autograder.sandbox.environment import profile_environment, remove_logs
-from autograder.sandbox.node_sandbox import Limits, ProgramGroup
+from autograder.sandbox.group import ProgramGroup
+from autograder.sandbox.limits import Limits
 
 
 @watched
@@ -51,7 +52,7 @@ class Launch(
     Publishing,
     ServiceExpectations,
     ParameterExpectations,
-    ActionExpectations,
+    FeedbackExpectations,
     EndingExpectations,
     Facts,
     Looking,
@@ -98,10 +99,10 @@ class Launch(
         os.environ.pop("ROS_AUTOMATIC_DISCOVERY_RANGE", None)
         self._running.observer = Observer(self._domain_id, findings.current.patience)
         self._entered = True
-        if here is not None:
-            self._watch = here.watch(self._observer, lambda: [program for _, program in self._running.programs])
         findings.current.begin_block()
         try:
+            if here is not None:
+                self._watch = here.watch(self._observer, lambda: [program for _, program in self._running.programs])
             self._begin(limits)
             trouble = self._running.trouble
             if here is not None and trouble and not here.scored:  # what only listens would never say so
@@ -273,15 +274,23 @@ class Launch(
         self._over = True
         # What still runs is ended here: how is no fact about the program.
         ended = {id(program): program.exit_status() for _, program in self._running.programs}
+        try:
+            self._look_back()
+        finally:
+            self._close()
+        findings.current.logs += self._running.logs(ended)
+
+    def _look_back(self) -> None:
+        """Keep what only the running programs show: in a notebook for a picture, else what contradicts itself."""
         if runtime.current.front_end is not None:
             with contextlib.suppress(ForgedGraph):
                 self._graph = seen.graph(self._observer)
-        else:
-            varied = [
-                bool(node.parameters or node.params_file or node.arguments_of_its_own)
-                for node, _ in self._running.programs
-            ]
-            findings.current.flags += contradictions.flags(self._scene(), self._overlaps, varied)
+            return
+        varied = [node.may_vary_names() for node, _ in self._running.programs]
+        findings.current.flags += contradictions.flags(self._scene(), self._overlaps, varied)
+
+    def _close(self) -> None:
+        """End the programs and everything that watched them."""
         try:
             if self._group is not None:
                 self._group.end()
@@ -296,4 +305,3 @@ class Launch(
             self._observer.close()
             remove_written(runtime.current.folder)
             remove_logs()
-        findings.current.logs += self._running.logs(ended)

@@ -66,6 +66,10 @@ class Program:
         """The parameter rules that were typed, `name:=value`."""
         return remap_rules.parameter_rules_in(self._typed())
 
+    def may_vary_names(self) -> bool:
+        """Whether it is given what may rightly decide about the names in its code."""
+        return bool(self.parameters or self.params_file or self.arguments_of_its_own)
+
     def rules(self) -> list[str]:
         """The remap rules in the order in which they are given: the first that matches wins."""
         rules = [f"{old}:={new}" for old, new in self.remappings]

@@ -23,7 +23,7 @@ from autograder.sandbox.build import BuildRun
 from autograder.sandbox.node_sandbox import NodeSandbox
 
 
-class Running(Protocol):
+class Launched(Protocol):
     """A launch whose programs run."""
 
     @property
@@ -50,9 +50,9 @@ class Runtime:
         self._sandbox: NodeSandbox | None = None
         self._workspace: Workspace | None = None
         self._domains = free_domains()
-        self.block: Running | None = None
+        self.block: Launched | None = None
         """The launch whose block runs: one at a time."""
-        self.robot: Running | None = None
+        self.robot: Launched | None = None
         """The launch that goes on from cell to cell: one at a time."""
 
     def configure(
@@ -118,7 +118,7 @@ class Runtime:
         return self._sandbox
 
     @property
-    def running(self) -> Running | None:
+    def running(self) -> Launched | None:
         """The launch that runs now: that of the block, or else the one that goes on from cell to cell."""
         return self.block or self.robot
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
@@ -70,6 +71,7 @@ def _runs_of(inside: Inside) -> list[Run]:
         for thing in inside.things.values()
         for began, thread in thing.running
     ]
+    going_on = set(under_way)
     numbers: dict[int, int] = {}
     found = []
     for number, began, ended, thread in [*told, *under_way]:
@@ -77,7 +79,7 @@ def _runs_of(inside: Inside) -> list[Run]:
         if thing is None or thing.kind in ("publisher", "client"):
             continue
         on = numbers.setdefault(thread, len(numbers) + 1)
-        over = (number, began, ended, thread) not in under_way
+        over = (number, began, ended, thread) not in going_on
         found.append(Run(names[number], began, ended, on, groups.get(thing.group_id, ""), thing.node, over))
     return found
 
@@ -85,12 +87,11 @@ def _runs_of(inside: Inside) -> list[Run]:
 def _names(inside: Inside) -> dict[int, str]:
     """A name for each callback: its function's, or what it belongs to; those of one name are numbered."""
     plain = {thing.id: _name(thing) for thing in inside.things.values()}
-    again = [name for name in plain.values() if list(plain.values()).count(name) > 1]
-    counts: dict[str, int] = {}
+    total, so_far = Counter(plain.values()), Counter[str]()
     names = {}
     for number, name in plain.items():
-        counts[name] = counts.get(name, 0) + 1
-        names[number] = f"{name} ({counts[name]})" if name in again else name
+        so_far[name] += 1
+        names[number] = f"{name} ({so_far[name]})" if total[name] > 1 else name
     return names
 
 
@@ -119,9 +120,9 @@ def _groups(inside: Inside) -> dict[int, str]:
 
 def traffic(insides: Sequence[Inside], topic: str) -> list[Traffic]:
     """When messages of a topic were published, and when subscriptions' callbacks got them, publishers first."""
-    rows = {"publisher": [], "subscription": []}  # type: dict[str, list[Traffic]]
+    rows: dict[str, list[Traffic]] = {"publisher": [], "subscription": []}
     for inside in insides:
-        began = {number: [] for number in inside.things}  # type: dict[int, list[float]]
+        began: dict[int, list[float]] = {number: [] for number in inside.things}
         for event in inside.all(Ran):
             for number, begin, _, _ in event.runs:
                 if number in began:

@@ -1,6 +1,6 @@
 """Values that differ from run to run, so that an answer which prints a constant does not pass.
 
-They come from the session's seed, which every result records.
+They come from a seed, which every result records.
 """
 
 from __future__ import annotations

@@ -34,7 +34,7 @@ _WAITS_FOR = {
     "expect_running": "the program `{}`",
     "expect_exit": "the end of the program `{}`",
     "expect_clean_end": "the end of the program `{}`",
-    "expect_log": "a line in the log of `{}`",
+    "expect_log": "a log message that says `{}`",
     "transition": "`{}` to change its state",
     "available_transitions": "an answer of `{}`",
     "state": "the state of `{}`",

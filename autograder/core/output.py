@@ -5,8 +5,6 @@ from __future__ import annotations
 import re
 
 _ESCAPES = re.compile(r"\x1b(?:\[[0-?]*[ -/]*[@-~]|\][^\x07\x1b]*(?:\x07|\x1b\\)?|[@-Z\\-_])")
-
-
 _CONTROL = dict.fromkeys((*range(9), *range(11, 32), *range(127, 160)), "�")
 
 
@@ -20,4 +18,5 @@ def last_lines(output: str, count: int) -> str:
     """Return the last lines of an output, with a mark where others were left out."""
     lines = tidy(output).strip("\n").split("\n")
     left_out = len(lines) - count
-    return "\n".join([f"[{left_out} lines above]", *lines[-count:]] if left_out > 0 else lines)
+    mark = f"[{left_out} line{'s' * (left_out != 1)} above]"
+    return "\n".join([mark, *lines[-count:]] if left_out > 0 else lines)

@@ -128,9 +128,7 @@ class CellResult(_Model):
     @property
     def possible_points(self) -> float:
         """Points that grading can still give: all but those that are lost already."""
-        if self.points is None or not self.more_at_grading:
-            return self.max_points if self.points is None else self.points
-        return self.points
+        return self.max_points if self.points is None else self.points
 
     @property
     def status(self) -> Status:

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from autograder import diagnosis
 from autograder.checks import outcomes
-from autograder.checks.expect import rates
 from autograder.checks.expect.expectations import WITHIN
 from autograder.checks.expect.meeting import Meeting
 from autograder.checks.message_text import set_fields
@@ -98,75 +96,6 @@ class ActionExpectations(Meeting):
     def _offered_action(self, name: str) -> bool:
         return f"{name}/_action/send_goal" in self._observer.services()
 
-    def expect_feedback(
-        self,
-        goal: Goal,
-        *,
-        at_least: int = 1,
-        at_most: int | None = None,
-        exactly: int | None = None,
-        rate: float | None = None,
-        tolerance: float = 0.3,
-        values: Callable[[list[Any]], object] | None = None,
-        within: float = WITHIN,
-        hint: str = "",
-    ) -> list[Any]:
-        """Feedback about a goal arrives. What is counted is what has come when the goal ends, or in `within` seconds.
-
-        Args:
-            goal: what `send_goal` returned.
-            at_least: so many messages; the wait ends with them unless `at_most` is given.
-            at_most: not more, once the goal has ended.
-            exactly: both at once.
-            rate: hertz; judged by the median gap of the server's own stamps.
-            tolerance: allowed deviation of the rate, as a share.
-            values: looks at all feedback messages; a sentence that says what is wrong fails, and so does what is false.
-            within: seconds until they must have come.
-            hint: a pointer for the student.
-
-        Returns:
-            the feedback messages.
-
-        Example:
-            `ros.expect_feedback(goal, at_least=5, rate=10)`
-
-        Codes:
-            `no-feedback`, `goal-feedback`, `rate`, `content`, and those of `expect_result`.
-        """
-        if exactly is not None and (at_least != 1 or at_most is not None):
-            raise Misuse("expect_feedback: exactly=… already says at_least=… and at_most=….")
-        least, most = (at_least, at_most) if exactly is None else (exactly, exactly)
-        number = f"at least {least}" if most is None else f"{least}" if least == most else f"{least} to {most}"
-        title = f"Feedback of `{goal.name}` arrives ({number})"
-
-        def came() -> bool:
-            return goal.result is not None or (most is None and len(goal.heard) >= least)
-
-        self.wait(came, within)
-        self._observer.wait(lambda: len(goal.heard) >= least, 0.3)  # the last may be under way when the result is there
-        heard = goal.heard
-        if len(heard) < least or (most is not None and len(heard) > most):
-            scene = self._scene()
-            said = f"{len(heard)} feedback message{'s' * (len(heard) != 1)} came; the goal is `{self._state(goal)}`."
-            reason = (
-                (diagnosis.why_no_feedback(scene, goal.name) if len(heard) < least else None)
-                or (diagnosis.inside_reason(scene) if goal.result is None else None)
-                or Diagnosis(said, "goal-feedback")
-            )
-            self._fail(title, reason, expected=number, observed=str(len(heard)), hint=hint)
-        if rate is not None and not rates.at_rate(heard, rate, tolerance):
-            measured = rates.in_words(heard)
-            reason = Diagnosis(f"Most of the gaps between feedback messages are those of {measured}.", "rate")
-            title = f"Feedback of `{goal.name}` comes at {rate:.3g} Hz"
-            self._fail(title, reason, expected=f"{rate:.3g} Hz", observed=measured, hint=hint)
-        said_of = values(goal.feedback) if values is not None else True
-        if said_of is not True and (isinstance(said_of, str) or not said_of):
-            because = said_of if isinstance(said_of, str) else "What the feedback says is not what was asked for."
-            reason = diagnosis.why_wrong_feedback(self._scene(), goal.name) or Diagnosis(because, "content")
-            self._fail(f"The feedback of `{goal.name}` says what it should", reason, observed=because, hint=hint)
-        outcomes.passed(title, observed=str(len(heard)))
-        return goal.feedback
-
     def expect_result(self, goal: Goal, *, status: str = "succeeded", within: float = WITHIN, hint: str = "") -> Any:
         """A goal ends, with this status.
 
@@ -193,9 +122,9 @@ class ActionExpectations(Meeting):
             return goal.result
         scene = self._scene()
         if goal.result is None:
-            because, advice = f"The goal is `{self._state(goal)}`; it has not ended within {within:g} s.", ""
-            if self._state(goal) in ("succeeded", "canceled", "aborted"):
-                because = f"The goal is `{self._state(goal)}`, but its execute callback has not returned a result."
+            because, advice = f"The goal is `{state_of(goal)}`; it has not ended within {within:g} s.", ""
+            if state_of(goal) in ("succeeded", "canceled", "aborted"):
+                because = f"The goal is `{state_of(goal)}`, but its execute callback has not returned a result."
                 advice = "When its goal has ended, the execute callback has to `return`."
             elif goal.agreed:
                 advice = "It agreed to cancel: now the execute callback has to look at `is_cancel_requested`."
@@ -294,7 +223,8 @@ class ActionExpectations(Meeting):
             hint=hint,
         )
 
-    def _state(self, goal: Goal) -> str:
-        """The goal's status by the last that is known of it."""
-        changes = goal.changes
-        return goal.status if goal.result is not None or not changes else changes[-1].status
+
+def state_of(goal: Goal) -> str:
+    """The goal's status by the last that is known of it."""
+    changes = goal.changes
+    return goal.status if goal.result is not None or not changes else changes[-1].status

@@ -25,6 +25,18 @@ def where_to_read(hint: str) -> str:
     return " ".join(f"{part[:1].upper()}{part[1:]}" for part in parts if _POINTER.search(part))
 
 
+def objection(verdict: object, otherwise: str) -> str:
+    """What a check's own question says against what it looked at; empty when it has nothing to say against it.
+
+    Args:
+        verdict: its answer: a sentence that says what is wrong, or whether all is well.
+        otherwise: what is said where it only says that something is wrong.
+    """
+    if isinstance(verdict, str):
+        return verdict or otherwise
+    return "" if verdict else otherwise
+
+
 class Expectations:
     """A running launch, and what can be asked of it. Each group of expectations adds what it asks."""
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from functools import cached_property
-
 from autograder import diagnosis
 from autograder.checks import outcomes
 from autograder.checks.expect.expectations import WITHIN
@@ -18,11 +16,6 @@ GONE_WITHIN = 2.0
 
 class GraphExpectations(Meeting):
     """What must be on the graph, and what must not."""
-
-    @cached_property
-    def _built(self) -> set[str]:
-        """Nodes that have answered, or had their time to."""
-        return set()
 
     def expect_node(self, name: str, *, within: float = WITHIN, hint: str = "") -> None:
         """The node with this full name is on the graph, exactly once, and lives on.
@@ -114,7 +107,7 @@ class GraphExpectations(Meeting):
             f"The topic `{topic}` carries {wanted}",
             lambda: diagnosis.why_no_endpoint(self._scene(), topic, msg_type, "publisher"),
             expected=f"{topic} ({wanted})",
-            observed=lambda: self._topics(),
+            observed=self._topics,
             hint=hint,
         )
 
@@ -137,7 +130,7 @@ class GraphExpectations(Meeting):
             gone,
             f"Nobody uses the topic `{topic}`",
             lambda: diagnosis.why_topic_present(self._scene(), topic),
-            observed=lambda: self._topics(),
+            observed=self._topics,
             hint=hint,
         )
 

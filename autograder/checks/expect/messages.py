@@ -12,7 +12,7 @@ from rclpy.qos import QoSProfile
 from autograder import diagnosis
 from autograder.checks import outcomes
 from autograder.checks.expect import rates
-from autograder.checks.expect.expectations import WITHIN
+from autograder.checks.expect.expectations import WITHIN, objection
 from autograder.checks.expect.sources import SourceExpectations
 from autograder.checks.message_text import in_words, shorten
 from autograder.checks.misuse import Misuse
@@ -153,10 +153,7 @@ class MessageExpectations(SourceExpectations):
         self._not_more(wanted, for_seconds)
         self._one_source(wanted.title, topic, msg_type, publisher, publishers, recording.messages[skip:])
         self._at_rate(wanted, tolerance, within)
-        received = wanted.counted()
-        self._say(wanted, received, values)
-        outcomes.passed(wanted.title, observed=f"{len(received)} messages")
-        return [r.msg for r in received]
+        return self._say(wanted, values)
 
     def _too_few(self, wanted: _Wanted, qos: QoSProfile, within: float) -> None:
         got, scene, recording = len(wanted.counted()), self._scene(), wanted.recording
@@ -225,16 +222,16 @@ class MessageExpectations(SourceExpectations):
                 hint=wanted.hint,
             )
 
-    def _say(self, wanted: _Wanted, received: list[Received], values: Callable[[list[Any]], object] | None) -> None:
-        if values is None:
-            return
-        verdict = values([r.msg for r in received])
-        if not isinstance(verdict, str) and verdict:
-            return
-        said = verdict if isinstance(verdict, str) and verdict else "The messages do not say what they should."
-        said_by = [in_words(r.msg, values) for r in received]
+    def _say(self, wanted: _Wanted, values: Callable[[list[Any]], object] | None) -> list[Any]:
+        """Look at what the messages say; where nothing is wrong, return them."""
+        received = [r.msg for r in wanted.counted()]
+        wrong = objection(values(received), "The messages do not say what they should.") if values is not None else ""
+        if not wrong:
+            outcomes.passed(wanted.title, observed=_number(len(received)))
+            return received
+        said_by = [in_words(msg, values) for msg in received]
         observed = shorten("; ".join(said_by if len(said_by) <= 4 else [*said_by[:2], "…", *said_by[-2:]]))
-        self._fail(wanted.title, Diagnosis(said, "content"), observed=observed, hint=wanted.hint)
+        self._fail(wanted.title, Diagnosis(wrong, "content"), observed=observed, hint=wanted.hint)
 
     def expect_silence(
         self, topic: str, msg_type: type, *, for_seconds: float = 1.0, because: str = "", code: str = "", hint: str = ""

@@ -81,8 +81,7 @@ class QosExpectations(EndExpectations):
     def _all_there(self, topic: str, kind: End) -> None:
         """Wait until the nodes at this end are built: their constructors may be about to make further ends."""
         for owner in {full_name(end.node_namespace, end.node_name) for end in self._ends(topic, None, kind, "")}:
-            if owner not in self._built:
-                self._built.add(owner)
+            if owner not in self._met:
                 self._settle(owner)
 
     def expect_match(self, topic: str, *, within: float = WITHIN, hint: str = "") -> None:
