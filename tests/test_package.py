@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import os
 import subprocess
 import sys
@@ -99,6 +100,19 @@ def test_the_command_writes_what_students_receive_and_says_how_to_go_on(
     assert "YOUR CODE HERE" in text
     with pytest.raises(KitError, match="stays as it is"):
         write_package("camera_lab", "", {"a.py": ""}, tmp_path)
+
+
+def test_packages_that_a_lab_has_already_stay_as_they_are_beside_that_of_its_programs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(ROOT)
+    ran = CliRunner().invoke(app, ["package", "lab7_interfaces", str(tmp_path)])
+    assert ran.exit_code == 0, ran.output
+    assert "--packages-select lab7_interfaces car_horn car_interfaces" in ran.output
+    assert {"package.xml", "setup.py", "launch"} <= {path.name for path in (tmp_path / "car_sensors").iterdir()}
+    assert (tmp_path / "lab7_interfaces" / "lab7_interfaces" / "count_server.py").is_file()
+    for path in (tmp_path / "lab7_interfaces").rglob("*.py"):
+        ast.parse(path.read_text(encoding="utf-8"))
 
 
 def test_the_programs_of_a_notebook_are_taken() -> None:

@@ -25,12 +25,14 @@ def package(
         raise KitError(f"There is no notebook {notebook}.", "Name an .ipynb file.")
     from autograder.course.folder import course_root
     from autograder.course.lab import load_lab
-    from autograder.packages.ament_package import lab_files, package_name, write_package
+    from autograder.packages.ament_package import lab_files, package_name, packages_in, write_package
 
     found = load_lab(course_root(course), lab)
-    name = package_name(found)
-    written = write_package(name, f"Programs and launch files of {lab}", lab_files(found, notebook), folder)
-    print(f"{written}\n\nIn a workspace of an installed ROS 2:\n  colcon build --packages-select {name}")
+    name, files = package_name(found), lab_files(found, notebook)
+    written = write_package(name, f"Programs and launch files of {lab}", files, folder)
+    print("\n".join(str(folder / package) for package in (name, *packages_in(files))))
+    selected = " ".join((name, *packages_in(files)))
+    print(f"\nIn a workspace of an installed ROS 2:\n  colcon build --packages-select {selected}")
     launch = sorted(path.name for path in (written / "launch").glob("*.launch.*"))
     program = min(path.stem for path in (written / name).glob("*.py") if path.stem != "__init__")
     start = f"ros2 launch {name} {launch[-1]}" if launch else f"ros2 run {name} {program}"

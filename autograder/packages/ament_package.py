@@ -2,19 +2,21 @@
 
 The programs stay as they are: each is started as a script, with the package's folder first on Python's path, as the
 kit starts it. Launch files and the parameter files beside them are installed into `share/PACKAGE/launch`, where
-`$(dirname)` finds them; other files go to `share/PACKAGE/config`.
+`$(dirname)` finds them; other files go to `share/PACKAGE/config`. What a lab has below `src/` are packages already, and
+stay as they are, beside that one.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from xml.sax.saxutils import escape
 
 from autograder.arguments.params_file import node_keys
 from autograder.core.errors import KitError
 from autograder.course.lab import Lab
+from autograder.packages.workspace import SOURCES
 from autograder.submission.reader import read_submission
 
 _IMPORT = re.compile(r"^\s*(?:from|import)\s+([a-z]\w*)", re.MULTILINE)
@@ -81,12 +83,15 @@ def _start(name: str) -> None:
 
 
 def package_name(lab: Lab) -> str:
-    """The package that the lab's launch files name; the lab's own name if they name none."""
-    for cell in lab.cells:
-        match = _PACKAGE_OF_CHECKS.search(cell.source)
-        if match:
-            return match[1]
-    return lab.name
+    """The package that the lab's launch files name; the lab's own name if they name none but the student's own."""
+    own = packages_in(lab_files(lab, None))
+    named = (match[1] for cell in lab.cells for match in _PACKAGE_OF_CHECKS.finditer(cell.source))
+    return next((name for name in named if name not in own), lab.name)
+
+
+def packages_in(files: Iterable[str]) -> list[str]:
+    """The packages that a lab has below `src/`, by the names of all its files."""
+    return sorted({file.split("/")[1] for file in files if file.startswith(f"{SOURCES}/")})
 
 
 def lab_files(lab: Lab, notebook: Path | None) -> dict[str, str]:
@@ -105,20 +110,26 @@ def lab_files(lab: Lab, notebook: Path | None) -> dict[str, str]:
 
 
 def write_package(name: str, title: str, files: Mapping[str, str], folder: Path) -> Path:
-    """Write a package and return its folder.
+    """Write a package, and beside it those that are complete already; returns its folder.
 
     Args:
         name: of the package.
         title: one line for its description.
-        files: programs (`NAME.py`) and other files by their names.
-        folder: where the package's folder is made, such as the `src` of a workspace.
+        files: programs (`NAME.py`) and other files by their names; those below `src/` are packages already.
+        folder: where the packages' folders are made, such as the `src` of a workspace.
 
     Raises:
         KitError: something is there already, which is left as it is; or there are no programs.
     """
-    target = folder / name
-    if target.exists():
-        raise KitError(f"{target} exists already and stays as it is.", "Move it away, or name another folder.")
+    for made in (name, *packages_in(files)):
+        if (folder / made).exists():
+            raise KitError(
+                f"{folder / made} exists already and stays as it is.", "Move it away, or name another folder."
+            )
+    complete = {
+        file.removeprefix(f"{SOURCES}/"): text for file, text in files.items() if file.startswith(f"{SOURCES}/")
+    }
+    files = {file: text for file, text in files.items() if not file.startswith(f"{SOURCES}/")}
     programs = sorted(file.removesuffix(".py") for file in files if file.endswith(".py"))
     if not programs:
         raise KitError("There are no programs to make a package of.", "Programs are cells with `%%node NAME`.")
@@ -135,10 +146,10 @@ def write_package(name: str, title: str, files: Mapping[str, str], folder: Path)
         ),
         **{f"{_place(file, text, name)}/{file}": text for file, text in files.items()},
     }
-    for path, text in texts.items():
-        (target / path).parent.mkdir(parents=True, exist_ok=True)
-        (target / path).write_text(text, encoding="utf-8")
-    return target
+    for path, text in {**{f"{name}/{path}": text for path, text in texts.items()}, **complete}.items():
+        (folder / path).parent.mkdir(parents=True, exist_ok=True)
+        (folder / path).write_text(text, encoding="utf-8")
+    return folder / name
 
 
 def _place(file: str, text: str, name: str) -> str:
