@@ -27,6 +27,8 @@ _BOTTOM = """
 - After a restart of the kernel run the first code cell again, and then the cells of your programs.
 - Your programs lie in the folder `nodes` of the lab, below the name of the notebook. What you write in cells is what is
   graded; a file that you put into that folder yourself stays yours, but is not handed in.
+- `%%node?` and `%%file?` show an example. The tab key completes: after `launch("` the names of your programs, after
+  `%ros2` its commands and what is on the graph, after `ros.` what a launch can do.
 - `%lab` at a lab's end shows what is done and what is open.
 - Hand in the notebook, the file with the ending `.ipynb`, once you have saved it. In a terminal `autograder submit
   NOTEBOOK` puts a copy with a receipt into the folder `handed_in`, and says what to know before.
