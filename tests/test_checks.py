@@ -266,6 +266,31 @@ def test_a_status_is_asked_of_a_program_that_need_not_spin(grade: Grade) -> None
     assert (failure(result).code, failure(result).because) == ("exit-status", "It ended with status 0.")
 
 
+def test_of_two_runs_of_a_program_the_reason_is_that_of_the_one_that_is_meant(grade: Grade) -> None:
+    result = grade(
+        """\
+        with launch(Program("asker", namespace="/other")) as ros:
+            ros.expect_node("/other/asker", within=30)
+            ros.start(Program("asker", namespace="/meant"))
+            ros.expect_node("/meant/asker", within=30)
+            ros.expect_exit("asker", within=3)
+        ros.score(2)
+        """,
+        asker__py="""\
+import time, rclpy
+from rclpy.node import Node
+from std_srvs.srv import Trigger
+rclpy.init()
+node = Node("asker")
+if node.get_namespace() == "/other":
+    node.create_client(Trigger, "gate").wait_for_service()
+while rclpy.ok():
+    time.sleep(0.1)
+""",
+    )
+    assert failure(result).code == "still-running" and "while rclpy.ok()" in failure(result).because
+
+
 def test_what_follows_a_failure_is_listed_as_not_checked_and_hidden_lines_stay_marked(grade: Grade) -> None:
     result = grade(
         """\

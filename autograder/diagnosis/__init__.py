@@ -12,7 +12,7 @@ has ended, what was seen before stands where its probe tells that the check's ow
 """
 
 from autograder.diagnosis.callbacks import called_from_outside, failed_in_a_callback
-from autograder.diagnosis.chain import inside_reason
+from autograder.diagnosis.chain import inside_reason, reason_inside
 from autograder.diagnosis.goals import (
     why_no_action,
     why_no_feedback,
@@ -55,6 +55,7 @@ __all__ = [
     "nothing_due",
     "paces",
     "program_trouble",
+    "reason_inside",
     "shut_down_inside",
     "waits_for_its_group",
     "why_doubled",

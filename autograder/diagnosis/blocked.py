@@ -85,14 +85,17 @@ def asks_nobody(inside: Inside) -> Diagnosis | None:
 
 
 def _nobody_offers(client: Thing, services: dict[str, list[str]], said: str) -> Diagnosis:
-    close = nearest(client.name, [n for n, types in services.items() if "rcl_interfaces" not in types[0]])
+    own = ("rcl_interfaces/", "type_description")  # what each node offers by itself
+    close = nearest(client.name, [n for n, types in services.items() if not types[0].startswith(own)])
     given = f" (`{client.given}` in the code)" if client.given and client.given != client.name else ""
     return Diagnosis(
         f"{said}the service `{client.name}`{given}, and no node offers that"
         + (f"; the nearest name is `{close}`." if close else "."),
         "waits-for-service",
-        "The name in the code begins with a slash, so no namespace reaches it: write it without."
-        if close and client.given.startswith("/") and close.endswith(client.given)
+        "Wait with a time limit, and look at whether a server came."
+        if not close
+        else "The name in the code begins with a slash, so no namespace reaches it: write it without."
+        if client.given.startswith("/") and close.endswith(client.given)
         else "Compare the names, namespace included.",
     )
 

@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
+import re
 import signal
+from dataclasses import replace
 
 from autograder import diagnosis
 from autograder.checks import outcomes
 from autograder.checks.expect.expectations import WITHIN
 from autograder.checks.expect.programs import ProgramExpectations
 from autograder.checks.misuse import Misuse
+from autograder.core.output import tidy
 from autograder.diagnosis import Diagnosis, last_traceback
 from autograder.sandbox.running_program import RunningProgram
 
 _SAID = {"SIGINT": "Ctrl-C (SIGINT)", "SIGTERM": "SIGTERM"}
 """How a program is told to end, in words."""
+
+_STAMP = re.compile(r" \[\d+\.\d+\]")
+"""The time in a line of the log."""
 
 _ENDED = "`main` has to catch what spinning raises then: `KeyboardInterrupt` and `ExternalShutdownException`. "
 _ENDED += "After that `rclpy.try_shutdown()` is right, which does nothing where the signal has shut rclpy down already."
@@ -28,9 +34,10 @@ _RACE_OF_RCLPY = "failed to initialize wait set: the given context is not valid"
 def _comes_back(where: str) -> str:
     """When the call comes back in which a program is that should have ended; empty if that is no call that spins."""
     if "spin_until_future_complete(" in where:
+        over = " or its `timeout_sec` is over" if "timeout_sec" in where else ""
         return (
-            "`spin_until_future_complete` comes back once its future is done: that of `call_async` when the answer "
-            "comes, one of your own by `set_result` of that very object."
+            f"`spin_until_future_complete` comes back once its future is done{over}: that of `call_async` when the "
+            "answer comes, one of your own by `set_result` of that very object."
         )
     return "`spin` does not come back by itself." if ".spin(" in where else ""
 
@@ -59,7 +66,8 @@ class EndingExpectations(ProgramExpectations):
         if not self.wait(lambda: not program.running(), within):
             where = self._place_of(program)
             hint = f"{_comes_back(where)} {hint}".strip()
-            reason = diagnosis.inside_reason(self._scene())
+            others = self._other_runs(program)
+            reason = diagnosis.reason_inside([one for one in self._scene().insides if one.program not in others])
             if reason and reason.code in ("spinning-ended", "not-spinning"):  # a program that ends need not spin
                 reason = None
             self._fail(
@@ -75,18 +83,25 @@ class EndingExpectations(ProgramExpectations):
         self._expect_that(
             status is None or ended == status,
             title,
-            lambda: diagnosis.shut_down_inside(self._scene()) or self._why_this_status(ended),
+            lambda: diagnosis.shut_down_inside(self._scene()) or self._why_this_status(program),
             expected=str(status),
             observed=str(ended),
             hint=hint,
         )
 
-    def _why_this_status(self, ended: int | None) -> Diagnosis:
-        """Why a program that had to end did so with another status: an error, or nothing more than that is known."""
-        reason = diagnosis.program_trouble(self._scene())
+    def _other_runs(self, program: RunningProgram) -> list[RunningProgram]:
+        """Earlier runs of the same program: what became of them explains nothing."""
+        return [one for _, one in self._running.programs if one.name == program.name and one is not program]
+
+    def _why_this_status(self, program: RunningProgram) -> Diagnosis:
+        """Why a program that had to end did so with another status: an error, or what it said last."""
+        scene = self._scene()
+        reason = diagnosis.program_trouble(replace(scene, stopped=[*scene.stopped, *self._other_runs(program)]))
         if reason is not None and reason.code not in ("exited", "not-spinning"):  # it had to end, and need not spin
             return reason
-        return Diagnosis(f"It ended with status {ended}.", "exit-status")
+        said = [line.strip() for line in tidy(program.output()).splitlines() if line.strip()]
+        last = f" The last line it printed is `{_STAMP.sub('', said[-1])[:120]}`." if said else ""
+        return Diagnosis(f"It ended with status {program.exit_status()}.{last}", "exit-status")
 
     def expect_clean_end(self, name: str, *, by: str = "SIGINT", within: float = 3.0, hint: str = "") -> None:
         """A program that is told to end does so: with exit status 0, and without printing an error.
