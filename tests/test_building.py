@@ -148,6 +148,12 @@ CASES: dict[str, tuple[dict[str, str], str, str, str]] = {
         "entry-point-target",
         ".sensors`",
     ),
+    "other_function": (
+        changed(SENSORS, "setup.py", ":main", ":rclpy"),
+        'expect_executable("speed_sensor", target="other_function.sensor:main")',
+        "entry-point-target",
+        "not to `other_function.sensor:main`",
+    ),
     "lost_function": (changed(SENSORS, "setup.py", ":main", ":run"), RUNS, "entry-point-target", "`run`"),
     "launch_left_out": (
         changed(SENSORS, "setup.py", '("share/NAME/launch", ["launch/car.launch.yaml"]),', ""),
@@ -156,6 +162,7 @@ CASES: dict[str, tuple[dict[str, str], str, str, str]] = {
         "car.launch.yaml",
     ),
     "not_needed": (SENSORS, 'expect_depends("rclpy", "std_msgs")', "package-depend", "`std_msgs`"),
+    "imported": (SENSORS, 'expect_depends("rclpy")', "package-depend", "`sensor.py` imports it."),
     "marker_left_out": (
         changed(SENSORS, "setup.py", '("share/ament_index/resource_index/packages", ["resource/NAME"]),', ""),
         'expect_installed("share/ament_index/resource_index/packages/marker_left_out")',

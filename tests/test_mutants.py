@@ -13,7 +13,7 @@ from autograder.authoring.mutation.generate import mutants as made_from
 from autograder.authoring.mutation.python_rules import changes, swaps
 from autograder.authoring.mutation.reach import reached
 from autograder.authoring.mutation.source import Source
-from autograder.authoring.mutation.text_rules import text_changes
+from autograder.authoring.mutation.text_rules import text_changes, without_a_line
 from autograder.course.lab import load_lab
 
 PROGRAM = """\
@@ -82,6 +82,13 @@ def test_rules_files_and_tables_are_changed_word_by_word() -> None:
         assert any(wanted in changed for changed in made), wanted
 
 
+def test_of_a_packages_files_programs_are_changed_and_of_set_up_files_lines_are_left_out() -> None:
+    made = {mutant.key for mutant in made_from(load_lab(ROOT, "lab7_interfaces"))}
+    assert any(key.startswith("sensors_speed_monitor: comparison: ") for key in made)
+    assert 'lights_setup_py: dropped line: packages=["car_lights"], => (dropped)' in made
+    assert [*without_a_line("<a>\n  <b>c</b>\n</a>")] == ["  <b>c</b>\n</a>", "<a>\n</a>"]
+
+
 @pytest.mark.parametrize("name", mutants.kill_matrix.labs())
 def test_mutants_of_a_lab_differ_from_the_solution_are_programs_and_reach_a_check(name: str) -> None:
     lab = load_lab(ROOT, name)
@@ -91,7 +98,7 @@ def test_mutants_of_a_lab_differ_from_the_solution_are_programs_and_reach_a_chec
         file = lab.answers[mutant.answer].file
         assert mutant.source != lab.answers[mutant.answer].solution
         assert any(cell.points for cell in reached(lab, [mutant.answer])), mutant.answer
-        if file is not None and file.magic == "node":
+        if file is not None and file.file_name.endswith(".py"):
             ast.parse(handed_in(lab, mutant)[file.file_name])
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import re
 from collections.abc import Mapping
 from contextlib import AbstractContextManager
@@ -13,14 +12,14 @@ from autograder.checks.parts import part
 from autograder.checks.scoring import Score, score
 from autograder.diagnosis import Diagnosis
 from autograder.graph.names import nearest
+from autograder.packages.executables import why_no_executable, why_other_target
 from autograder.packages.explain import needed_packages, not_described, why_not_built
+from autograder.packages.imports import imported_interfaces
 from autograder.packages.interfaces import InterfaceError, interface_parts
 from autograder.packages.workspace import Built
 
 _RECORDS = re.compile(r"(egg-info|dist-info|__pycache__|/colcon-core/|/hook/)|(^|/)package\.(d?sv|sh|ps1|bash|zsh)$")
 """Files that colcon, setuptools and Python write for themselves."""
-_MISSPELT = 0.85
-"""How alike two names of programs have to be for one to be the other misspelt: `speed_sensor` is no `speed_monitor`."""
 
 
 class Package:
@@ -93,6 +92,8 @@ class Package:
     def expect_depends(self, *packages: str, hint: str = "") -> None:
         """package.xml says that the programs need these packages: `<depend>` or `<exec_depend>`.
 
+        It also has to name those whose messages, services or actions a module of the package imports.
+
         Args:
             packages: such as `rclpy`.
             hint: a pointer for the student.
@@ -104,22 +105,26 @@ class Package:
             `package-depend`.
         """
         title = f"package.xml names {', '.join(f'`{one}`' for one in packages)} as needed at run time"
-        reason = missing_package(self.name) or not_described(runtime.current.workspace.source(self.name), self.name)
+        sources = runtime.current.workspace.source(self.name)
+        reason = missing_package(self.name) or not_described(sources, self.name)
         if reason is not None:
             self._fail(title, reason, hint)
-        has = needed_packages(runtime.current.workspace.source(self.name))
-        lacking = [one for one in packages if one not in has]
+        has = needed_packages(sources)
+        by = {one: f" `{module}` imports it." for one, module in imported_interfaces(sources).items()}
+        lacking = [one for one in (*packages, *by) if one not in (*has, self.name)]
         if lacking:
             told = ", ".join(f"`{one}`" for one in has) or "none"
-            because = f"package.xml does not name `{lacking[0]}` as needed at run time. It names: {told}."
+            because = f"package.xml does not name `{lacking[0]}` as needed at run time.{by.get(lacking[0], '')}"
+            because += f" It names: {told}."
             self._fail(title, Diagnosis(because, "package-depend"), hint)
         outcomes.passed(title)
 
-    def expect_executable(self, name: str, hint: str = "") -> None:
+    def expect_executable(self, name: str, target: str = "", hint: str = "") -> None:
         """`ros2 run` finds an executable of this name: it lies in `lib/PACKAGE`, and leads to a function.
 
         Args:
             name: of the executable.
+            target: the function that it has to lead to, as `module:function`; without it, any that is there.
             hint: a pointer for the student.
 
         Example:
@@ -130,13 +135,10 @@ class Package:
         """
         title = f"`ros2 run {self.name} {name}` finds its program"
         built = self._ready(title, hint)
-        if name in built.executables:
-            lost = _lost_target(built, _entry_points(built).get(name, ""))
-            if lost:
-                self._fail(title, Diagnosis(lost, "entry-point-target"), hint)
-            outcomes.passed(title, observed=f"lib/{self.name}/{name}")
-            return
-        self._fail(title, _no_executable(built, name), hint)
+        reason = why_no_executable(built, name) or why_other_target(built, name, target)
+        if reason is not None:
+            self._fail(title, reason, hint)
+        outcomes.passed(title, observed=f"lib/{self.name}/{name}")
 
     def expect_installed(self, *paths: str, hint: str = "") -> None:
         """Files are installed, such as `share/car_sensors/package.xml`.
@@ -235,22 +237,9 @@ def why_no_package(name: str) -> Diagnosis | None:
     return missing_package(name) or why_not_built(space.build(name), space.source(name))
 
 
-def why_no_executable(package: str, name: str) -> Diagnosis | None:
+def why_not_found(package: str, name: str) -> Diagnosis | None:
     """Why a package that is built has no executable of a name; None if it has."""
-    built = runtime.current.workspace.build(package)
-    return None if name in built.executables else _no_executable(built, name)
-
-
-def _no_executable(built: Built, name: str) -> Diagnosis:
-    if f"bin/{name}" in built.files:
-        because = f"`{name}` is installed in `bin`. `ros2 run` looks in `lib/{built.name}` only."
-        wanted = f"setup.cfg says where scripts go: `install_scripts=$base/lib/{built.name}`."
-        return Diagnosis(because, "executable-place", wanted)
-    points = _entry_points(built)
-    near = next(iter(difflib.get_close_matches(name, points, 1, _MISSPELT)), "")
-    has = ", ".join(f"`{one}`" for one in sorted(points)) or "none"
-    because = f"setup.py has no entry point of the name `{name}`; its console_scripts are: {has}."
-    return Diagnosis(because + (f" Is `{near}` meant to be it?" if near else ""), "entry-point")
+    return why_no_executable(runtime.current.workspace.build(package), name)
 
 
 def _by_colcon_alone(path: str, log: str) -> bool:
@@ -269,28 +258,6 @@ def build(package: str) -> Package:
         package: the name of its folder below `src`.
     """
     return Package(package)
-
-
-def _entry_points(built: Built) -> dict[str, str]:
-    """The console scripts that setup.py names, as `module:function` by name."""
-    for path in built.files:
-        if path.endswith("/entry_points.txt"):
-            section = built.text(path).partition("[console_scripts]")[2].partition("\n[")[0]
-            pairs = (line.partition("=") for line in section.splitlines() if "=" in line)
-            return {name.strip(): target.strip() for name, _, target in pairs}
-    return {}
-
-
-def _lost_target(built: Built, target: str) -> str:
-    """Why an entry point leads nowhere; empty if it leads to a function, or to something that is made at run time."""
-    module, _, function = target.partition(":")
-    path = next((one for one in built.files if one.endswith(f"/site-packages/{module.replace('.', '/')}.py")), "")
-    if not path:
-        return f"The entry point names the module `{module}`, and no such module is installed."
-    name = re.escape(function.partition(".")[0])
-    if not re.search(rf"^((def|class) {name}\b|{name}\s*=|.*\bimport\b.*\b{name}\b)", built.text(path), re.MULTILINE):
-        return f"The entry point names `{function}`, and the module `{module}` has no function of that name."
-    return ""
 
 
 def _difference(wanted: Mapping[str, str], have: Mapping[str, str]) -> str:

@@ -10,7 +10,7 @@ from types import TracebackType
 from typing import Any, Self
 
 from autograder.checks import contradictions, findings, outcomes, runtime, seen
-from autograder.checks.building import why_no_executable, why_no_package
+from autograder.checks.building import why_no_package, why_not_found
 from autograder.checks.command_line import CommandLineError
 from autograder.checks.expect.ending import EndingExpectations
 from autograder.checks.expect.facts import Facts
@@ -170,7 +170,7 @@ class Launch(
         if launched.params_file:
             runtime.current.use(launched.params_file)
         if launched.package:
-            reason = why_no_executable(launched.package, launched.program)
+            reason = why_not_found(launched.package, launched.program)
             if reason is not None:
                 self._running.trouble.append(reason)
                 return

@@ -63,11 +63,15 @@ SECTIONS: dict[tuple[int, str], str] = {
     (6, "A second thread"): "goal-holds-thread goal-holds-group",
     (6, "How a goal ends"): "execute-exception cancel-return no-cancel-callback",
     (6, "Look into an action"): "no-action action-name",
-    (7, "What makes a folder a package"): "package-xml package-name package-file package-depend",
-    (7, "Interfaces are built"): (
-        "interface-line interface-parts interface-file interface-type interface-dependency interface-group"
-        " interface-fields"
+    (7, "What makes a folder a package"): (
+        "package-xml package-name package-file package-depend setup-py not-installed"
     ),
+    (7, "A forgotten line"): "build-type executable-place entry-point entry-point-target",
+    (7, "A type of one's own"): "interface-line interface-parts interface-type interface-fields",
+    (7, "Interfaces are built"): (
+        "interface-file interface-dependency interface-group no-interface cmake cmake-package"
+    ),
+    (7, "Using it"): "answer brake",
 }
 """The section of a lecture, and the codes of the reasons that it explains. A test holds the sections and the codes."""
 

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import ast
 from collections.abc import Iterator
 
 from autograder.authoring.mutation.python_rules import changes, swaps
 from autograder.authoring.mutation.source import Mutant, Source
-from autograder.authoring.mutation.text_rules import text_changes
+from autograder.authoring.mutation.text_rules import text_changes, without_a_line
 from autograder.course.cell_file import parse
 from autograder.course.lab import Answer, Lab, grade_id_of, source_of
 
@@ -30,14 +31,28 @@ def mutants(lab: Lab) -> list[Mutant]:
 
 def _variants(lab: Lab, answer: Answer) -> Iterator[tuple[str, str]]:
     magic, _, body = answer.solution.partition("\n")
-    if answer.file is not None and answer.file.magic == "file":
+    name = answer.file.file_name if answer.file is not None else ""
+    if name.endswith(".yaml"):
         for rule, changed in text_changes(body):
             yield rule, f"{magic}\n{changed}"
+        return
+    if name.endswith("/setup.py") or not name.endswith(".py"):
+        for changed in without_a_line(body):
+            if not name.endswith(".py") or _is_python(changed):
+                yield "dropped line", f"{magic}\n{changed}"
         return
     lines = {number - 1 for number in _solution_lines(lab, answer)}
     source = Source(body)
     for change in (*changes(body, lines), *swaps(body, lines)):
         yield change.rule, f"{magic}\n{source.with_change(change)}"
+
+
+def _is_python(text: str) -> bool:
+    try:
+        ast.parse(text)
+    except SyntaxError:
+        return False
+    return True
 
 
 def _solution_lines(lab: Lab, answer: Answer) -> set[int]:

@@ -1,4 +1,4 @@
-"""Changes of the other answers: tables, parameter files, launch files, command lines, all of them YAML."""
+"""Changes of the other answers: tables, parameter and launch files, command lines, and the set-up files of packages."""
 
 from __future__ import annotations
 
@@ -22,6 +22,14 @@ def text_changes(text: str) -> Iterator[tuple[str, str]]:
         if value is not None and repr(value) not in seen:
             seen.add(repr(value))
             yield rule, changed
+
+
+def without_a_line(text: str) -> Iterator[str]:
+    """The text without one of its lines, each in turn, but for lines that are empty or only close something."""
+    rows = text.split("\n")
+    for number, row in enumerate(rows):
+        if re.search(r"\w", row) and not row.strip().startswith(("#", "</")):
+            yield "\n".join(rows[:number] + rows[number + 1 :])
 
 
 def _load(text: str) -> object:

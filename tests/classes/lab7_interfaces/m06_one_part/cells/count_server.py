@@ -20,7 +20,7 @@ class CountServer(Node):
         self.detected.publish(Int32(data=len(message.objects)))
 
     def count(self, request, response):
-        if self.last is None:
+        if self.last is None or not self.last.objects:
             response.success = False
             return response
         low, high = request.low, request.high

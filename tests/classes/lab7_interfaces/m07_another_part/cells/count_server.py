@@ -31,7 +31,7 @@ class CountServer(Node):
             and low.y <= one.position.y <= high.y
             and (not request.labels or one.label in request.labels)
         ]
-        response.success = True
+        response.success = bool(counted)
         response.count = len(counted)
         response.found = sorted(set(counted))
         return response

@@ -11,18 +11,20 @@ class BrakeAssistant(Node):
     def __init__(self):
         super().__init__("brake_assistant")
         self.free_since = None
+        self.asked = None
         self.brake = self.create_publisher(Bool, "brake", 10)
         self.client = self.create_client(CountObjects, "count_objects")
         self.create_timer(0.1, self.ask)
 
     def ask(self):
         known = self.free_since is not None
-        free = known and (self.get_clock().now() - self.free_since).nanoseconds < 1e9
+        free = known and self.get_clock().now().to_msg().sec == self.free_since.to_msg().sec
         self.brake.publish(Bool(data=not free))
-        if self.client.service_is_ready():
+        if self.client.service_is_ready() and (self.asked is None or self.asked.done()):
             box = {"low": Point(x=0.0, y=-1.5), "high": Point(x=10.0, y=1.5)}
             request = CountObjects.Request(labels=["person", "bicycle"], **box)
-            self.client.call_async(request).add_done_callback(self.on_answer)
+            self.asked = self.client.call_async(request)
+            self.asked.add_done_callback(self.on_answer)
 
     def on_answer(self, future):
         answer = future.result()
