@@ -136,6 +136,24 @@ CASES: dict[str, tuple[dict[str, str], str, str, str]] = {
         "VERSION",
     ),
     "no_setup_cfg": (without(SENSORS, "setup.cfg"), RUNS, "executable-place", "`bin`"),
+    "other_folder": (
+        changed(SENSORS, "setup.cfg", "install_scripts=$base/lib/NAME", "install_scripts=$base/lib/other"),
+        RUNS,
+        "executable-place",
+        "installed in `lib/other`",
+    ),
+    "no_packages": (
+        changed(SENSORS, "setup.py", '    packages=["NAME"],\n', ""),
+        EXPECT,
+        "setup-py",
+        "does not name the Python package",
+    ),
+    "no_comma": (
+        changed(SENSORS, "setup.py", ":main", ":main lamp = NAME.sensor:main"),
+        EXPECT,
+        "setup-py",
+        "arguments setuptools accepts",
+    ),
     "misspelt_entry": (
         changed(SENSORS, "setup.py", "speed_sensor =", "speed_senser ="),
         RUNS,
@@ -170,6 +188,12 @@ CASES: dict[str, tuple[dict[str, str], str, str, str]] = {
         "setup.py does not install",
     ),
     "float": (changed(INTERFACES, "msg/Thing.msg", "float32", "float"), EXPECT, "interface-line", "float x"),
+    "msg_in_type": (
+        changed(INTERFACES, "msg/Things.msg", "std_msgs/Header", "std_msgs/msg/Header"),
+        EXPECT,
+        "interface-line",
+        "is not accepted: std_msgs/msg/Header.",
+    ),
     "capital": (changed(INTERFACES, "msg/Thing.msg", "label", "Label"), EXPECT, "interface-line", "string Label"),
     "one_part": (changed(INTERFACES, "srv/Count.srv", "---\n", ""), EXPECT, "interface-parts", "---"),
     "no_such_file": (
@@ -212,7 +236,18 @@ CASES: dict[str, tuple[dict[str, str], str, str, str]] = {
     "typo_in_cmake": (changed(INTERFACES, "CMakeLists.txt", "project(", "projekt("), EXPECT, "cmake", "line 2"),
 }
 
-ALIKE = ("no_license", "lost_function", "capital", "no_generators", "typo_in_cmake")
+ALIKE = (
+    "no_license",
+    "no_packages",
+    "no_comma",
+    "msg_in_type",
+    "other_folder",
+    "other_function",
+    "lost_function",
+    "capital",
+    "no_generators",
+    "typo_in_cmake",
+)
 """Cases whose code another one has, too."""
 
 SET_UP = "from autograder.checks import Program, build, launch, launch_file\nfrom std_msgs.msg import Int64, String\n"

@@ -169,6 +169,27 @@ def test_a_wrong_node_loses_the_points_for_its_own_reason(
     assert because in outcome.because, outcome
 
 
+def test_an_int_where_a_float_belongs_is_told(grade: Grade) -> None:
+    result = grade(
+        """\
+        from std_msgs.msg import Float64
+        with launch("speed") as ros:
+            ros.expect_messages("/speed", Float64, where=lambda m: m.data == 5.0, within=3)
+        ros.score(1)
+        """,
+        speed__py="""\
+import rclpy
+from std_msgs.msg import Float64
+rclpy.init()
+node = rclpy.create_node("speed")
+publisher = node.create_publisher(Float64, "speed", 10)
+node.create_timer(0.1, lambda: publisher.publish(Float64(data=5)))
+rclpy.spin(node)
+""",
+    )
+    assert "what becomes of an `int`" in failure(result).because
+
+
 CAREFUL = TALKER.replace(
     "    rclpy.spin(Talker())\n",
     "    try:\n        rclpy.spin(Talker())\n    except (KeyboardInterrupt, ExternalShutdownException):\n        pass\n"

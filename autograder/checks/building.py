@@ -116,7 +116,8 @@ class Package:
             told = ", ".join(f"`{one}`" for one in has) or "none"
             because = f"package.xml does not name `{lacking[0]}` as needed at run time.{by.get(lacking[0], '')}"
             because += f" It names: {told}."
-            self._fail(title, Diagnosis(because, "package-depend"), hint)
+            wanted = f"It needs `<exec_depend>{lacking[0]}</exec_depend>`."
+            self._fail(title, Diagnosis(because, "package-depend", wanted), hint)
         outcomes.passed(title)
 
     def expect_executable(self, name: str, target: str = "", hint: str = "") -> None:

@@ -44,7 +44,7 @@ class Place:
         if self.loop:
             lines = f"line {self.first}" if self.first == self.last else f"lines {self.first} to {self.last}"
             return f"the loop in {lines} (`{self.code}`)"
-        return f"line {self.first} (`{self.code}`)"
+        return f"line {self.first} (`{self.code}`)" if self.code else f"line {self.first}"
 
 
 def look(program: DiagnosedProgram, times: int = LOOKS) -> list[Stacks]:

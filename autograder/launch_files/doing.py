@@ -167,9 +167,11 @@ class Doing:
             ) from None
         if program.endswith(".py") or not packages.has(program, self.place.file):
             listed = ", ".join(f"`{name}`" for name in sorted(packages.programs or []))
+            hint = "A program is called as in the first line of its cell, `%%node NAME`, without `.py`."
+            if packages.is_built(package):
+                hint = "setup.py names the programs (`entry_points`), and setup.cfg says where they go."
             raise self.place.at("exec").error(
-                f"the package `{package}` has no program `{program}`.{f' It has {listed}.' if listed else ''}",
-                "A program is called as in the first line of its cell, `%%node NAME`, without `.py`.",
+                f"the package `{package}` has no program `{program}`.{f' It has {listed}.' if listed else ''}", hint
             )
 
 

@@ -52,6 +52,10 @@ class Packages:
         place = self.folder(name)
         return str(place) if _is_installed(place, name) else f"{place}/share/{name}"
 
+    def is_built(self, name: str) -> bool:
+        """Whether a package has been built, and its folder is the one that it is installed in."""
+        return _is_installed(self.folder(name), name)
+
     def in_installed(self, text: str) -> str:
         """The path below the folder that a package was installed in; empty if it is in no such folder."""
         path = os.path.normpath(text)

@@ -16,8 +16,10 @@ def why_no_executable(built: Built, name: str) -> Diagnosis | None:
     """Why `ros2 run` finds no executable of a name; None if it does."""
     if name in built.executables:
         return None
-    if f"bin/{name}" in built.files:
-        because = f"`{name}` is installed in `bin`. `ros2 run` looks in `lib/{built.name}` only."
+    places = (path.rpartition("/")[0] for path in sorted(built.files) if path.endswith(f"/{name}"))
+    where = next((place for place in places if place.split("/")[0] in ("bin", "lib") and "python" not in place), "")
+    if where:
+        because = f"`{name}` is installed in `{where}`. `ros2 run` looks in `lib/{built.name}` only."
         wanted = f"setup.cfg says where scripts go: `install_scripts=$base/lib/{built.name}`."
         return Diagnosis(because, "executable-place", wanted)
     points = _entry_points(built)

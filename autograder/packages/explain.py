@@ -17,7 +17,7 @@ CODES = {
     "package-xml": "package.xml is missing, or is no package description that ROS's tools accept",
     "package-name": "package.xml gives the package another name than its folder has",
     "build-type": "package.xml exports no build type that fits: colcon does not know how to build the package",
-    "setup-py": "setup.py ended with an error, which is quoted",
+    "setup-py": "setup.py ended with an error, which is quoted, or without a call of `setup` that names what is there",
     "package-file": "setup.py names a file or folder that is not in the package",
     "cmake": "CMake stopped at a line of CMakeLists.txt with the error that is quoted",
     "cmake-package": "CMakeLists.txt uses a package that it has not looked up with find_package",
@@ -96,7 +96,10 @@ def not_described(sources: Path, name: str) -> Diagnosis | None:
 
 def _interface_line(match: re.Match[str]) -> Diagnosis:
     line, name, said = match.groups()
-    because = f"The line `{line}` of the interface `{name}` is not accepted: {said.strip()}."
+    because = f"The line `{line}` of the interface `{name}` is not accepted: {said.strip().strip(chr(39))}."
+    full = re.search(r"\b(\w+)/msg/(\w+)", line)
+    if full:
+        return Diagnosis(because, "interface-line", f"In an interface file it is `{full[1]}/{full[2]}`, without `msg`.")
     hint = (
         "A line is a type and a name. Types are built in (`string`, `int32`, `float32`, `bool`, …) or messages; names"
         " of fields are written in small letters."
@@ -118,6 +121,22 @@ _REASONS: list[tuple[str, _Reason]] = [
     (
         r"error: package directory '([^']+)' does not exist",
         lambda m: Diagnosis(f"setup.py names the Python package `{m[1]}`; there is no such folder.", "package-file"),
+    ),
+    (
+        r"Multiple top-level packages discovered in a flat-layout: \[([^\]]{0,1000})\]",
+        lambda m: Diagnosis(
+            f"setup.py does not name the Python package; setuptools looked for one, and found several folders: {m[1]}.",
+            "setup-py",
+            "`packages=[…]` names it.",
+        ),
+    ),
+    (
+        r"RuntimeError: 'distutils.core.setup\(\)' was never called",
+        lambda m: Diagnosis(
+            "setup.py ends without a call of `setup(…)` whose arguments setuptools accepts.",
+            "setup-py",
+            "Is `setup(…)` called? Has each entry point the form `name = module:function`, and a comma after it?",
+        ),
     ),
     (
         r"Error processing '([^']{0,1000})' of '([^']{0,200})': '?('.{0,1000}?)'? Traceback",

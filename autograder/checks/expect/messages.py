@@ -14,7 +14,7 @@ from autograder.checks import outcomes
 from autograder.checks.expect import rates
 from autograder.checks.expect.expectations import WITHIN, objection
 from autograder.checks.expect.sources import SourceExpectations
-from autograder.checks.message_text import in_words, shorten
+from autograder.checks.message_text import in_words, int_in_float, shorten
 from autograder.checks.misuse import Misuse
 from autograder.core.cpu_use import cpu_uses, kept_waiting
 from autograder.diagnosis import Diagnosis
@@ -72,6 +72,14 @@ def _numbers(at_least: int, at_most: int | None, exactly: int | None, rate: floa
     if exactly is not None:
         return exactly, exactly
     return at_least or (0 if at_most == 0 else 10 if rate else 1), at_most
+
+
+def _an_int(message: Any) -> Diagnosis | None:
+    """Whether a message has an `int` in a field of floats."""
+    field = int_in_float(message)
+    because = f"Messages came, and `{field}` in them is what becomes of an `int` where a `float` belongs."
+    hint = "Write `5.0` for `5`. Lecture 7, section 'Python does not check what you assign'."
+    return Diagnosis(because, "content", hint) if field else None
 
 
 def _number(messages: int) -> str:
@@ -165,6 +173,7 @@ class MessageExpectations(SourceExpectations):
                 diagnosis.program_trouble(scene)
                 or diagnosis.inside_reason(scene)
                 or diagnosis.lifecycle_silence(scene)
+                or _an_int(recording.messages[-1].msg)
                 or Diagnosis(f"Messages came, but none {which}; the last of them is `{last}`.", "content")
             )
         else:

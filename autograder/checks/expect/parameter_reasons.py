@@ -122,6 +122,8 @@ def _file_for_others(running: Running, node: str) -> Diagnosis | None:
     for launched, _ in running.programs:
         if launched.warnings:
             hint = "Write `$(dirname)/NAME.yaml`; NAME is a cell's `%%file`."
+            if "the build installs no" in launched.warnings[0]:
+                hint = "Compare the path with `data_files` in setup.py: only what stands there is installed."
             return Diagnosis(f"{launched.warnings[0]} The node started without it.", "params-file-missing", hint)
         for option, file in itertools.pairwise(launched.arguments()):
             if option != "--params-file":
