@@ -175,7 +175,7 @@ def test_an_int_where_a_float_belongs_is_told(grade: Grade) -> None:
         from std_msgs.msg import Float64
         with launch("speed") as ros:
             ros.expect_messages("/speed", Float64, where=lambda m: m.data == 5.0, within=3)
-        ros.score(1)
+        ros.score(2)
         """,
         speed__py="""\
 import rclpy
