@@ -130,7 +130,8 @@ def _file_for_others(running: Running, node: str) -> Diagnosis | None:
                 continue
             because = params_file.why_not_reached(params_file.text_of(runtime.current.folder, file), node)
             if because:
-                return Diagnosis(because, "params-file-key", "The key is the node's full name, namespace included.")
+                hint = "The key is the node's full name, namespace included; `/**/NAME` is a node in every namespace."
+                return Diagnosis(because, "params-file-key", hint)
     return None
 
 
