@@ -39,6 +39,11 @@ def _comes_back(where: str) -> str:
             f"`spin_until_future_complete` comes back once its future is done{over}: that of `call_async` when the "
             "answer comes, one of your own by `set_result` of that very object."
         )
+    if any(call in where for call in (".send_goal(", ".cancel_goal(", ".get_result(")):
+        return (
+            "This call comes back only if another thread spins the node meanwhile. Without one call its `_async` twin, "
+            "and spin until the future is done."
+        )
     return "`spin` does not come back by itself." if ".spin(" in where else ""
 
 
