@@ -147,7 +147,8 @@ def test_a_right_node_earns_the_points_under_names_and_values_that_vary(grade: G
         ("", "", 'ros.expect_parameter("/talker", "period", 1.0)', "parameter-value", "0.05"),
         ("", "", 'ros.publish("/topic", String())', "no-topic", ""),
         ("", "", 'ros.expect_exit("talker", within=4)', "still-running", "still runs"),
-        ("    rclpy.spin(Talker())", "    from rclpy.action import ActionClient\n    from test_msgs.action import Fibonacci\n"
+        ("    rclpy.spin(Talker())",
+         "    from rclpy.action import ActionClient\n    from test_msgs.action import Fibonacci\n"
          "    ActionClient(Talker(), Fibonacci, 'far').send_goal(Fibonacci.Goal())",
          'ros.expect_exit("talker", within=4)', "still-running", "only if another thread spins"),
     ],
