@@ -223,8 +223,8 @@ def _error(program: str, event: CallbackError) -> Diagnosis:
     if event.kind == "task" and not event.line:
         hint = "What `add_done_callback` is given is called with one argument, the future."
     for exception, word, advice in KNOWN_ERRORS:
-        if exception in error and word.startswith("parameter"):
-            code, hint = word, advice
+        if exception in error and word.startswith(("parameter", "crashed")):
+            code, hint = code if word == "crashed" else word, advice
     return Diagnosis(
         f"{callback} raised {error}{source}. {_AFTER.get(event.kind, 'It ended the spinning.')}".rstrip(), code, hint
     )

@@ -14,6 +14,11 @@ KNOWN_ERRORS = (
         "A callback group is an object: it is made with brackets, `ReentrantCallbackGroup()`, and then handed over.",
     ),
     (
+        "handle cannot be modified after node creation",
+        "crashed",
+        "`handle` is an attribute of rclpy's own `Node`: give yours another name, such as `self.goal_handle`.",
+    ),
+    (
         "ParameterNotDeclaredException",
         "parameter-not-declared",
         "A parameter exists from `declare_parameter` on: declare it before you read it, even if a value was given.",
