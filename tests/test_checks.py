@@ -301,7 +301,9 @@ def test_of_two_runs_of_a_program_the_reason_is_that_of_the_one_that_is_meant(gr
             ros.expect_node("/other/asker", within=30)
             ros.start(Program("asker", namespace="/meant"))
             ros.expect_node("/meant/asker", within=30)
-            ros.expect_exit("asker", within=3)
+            ros.serve("/meant/gate", Trigger, lambda request, response: response)
+            ros.wait(lambda: ros.requests("/meant/gate"), 30)
+            ros.expect_exit("asker", within=1)
         ros.score(2)
         """,
         asker__py="""\
@@ -310,13 +312,15 @@ from rclpy.node import Node
 from std_srvs.srv import Trigger
 rclpy.init()
 node = Node("asker")
-if node.get_namespace() == "/other":
-    node.create_client(Trigger, "gate").wait_for_service()
-while rclpy.ok():
+client = node.create_client(Trigger, "gate")
+client.wait_for_service()
+future = client.call_async(Trigger.Request())
+while not future.done():
     time.sleep(0.1)
 """,
     )
-    assert failure(result).code == "still-running" and "while rclpy.ok()" in failure(result).because
+    assert failure(result).code == "still-running" and "while not future.done()" in failure(result).because
+    assert "Nobody spins the node" in failure(result).hint
 
 
 def test_what_follows_a_failure_is_listed_as_not_checked_and_hidden_lines_stay_marked(grade: Grade) -> None:

@@ -31,8 +31,8 @@ _RACE_OF_RCLPY = "failed to initialize wait set: the given context is not valid"
 """What rclpy raises once in a while if the signal comes just when it begins to wait: no mistake of the program's."""
 
 
-def _comes_back(where: str) -> str:
-    """When the call comes back in which a program is that should have ended; empty if that is no call that spins."""
+def _comes_back(where: str, never_spun: bool) -> str:
+    """When the call comes back in which a program is that should have ended; empty if nothing is known of that."""
     if "spin_until_future_complete(" in where:
         over = " or its `timeout_sec` is over" if "timeout_sec" in where else ""
         return (
@@ -44,6 +44,8 @@ def _comes_back(where: str) -> str:
             "This call comes back only if another thread spins the node meanwhile. Without one call its `_async` twin, "
             "and spin until the future is done."
         )
+    if never_spun and (".call(" in where or ".done()" in where):
+        return "Nobody spins the node while it waits here, and only spinning takes an answer that has come."
     return "`spin` does not come back by itself." if ".spin(" in where else ""
 
 
@@ -70,7 +72,7 @@ class EndingExpectations(ProgramExpectations):
         title = f"`{name}` ends by itself" + ("" if status is None else f" with exit status {status}")
         if not self.wait(lambda: not program.running(), within):
             where = self._place_of(program)
-            hint = f"{_comes_back(where)} {hint}".strip()
+            hint = f"{_comes_back(where, self._never_spun(program))} {hint}".strip()
             others = self._other_runs(program)
             reason = diagnosis.reason_inside([one for one in self._scene().insides if one.program not in others])
             if reason and reason.code in ("spinning-ended", "not-spinning"):  # a program that ends need not spin
@@ -159,6 +161,11 @@ class EndingExpectations(ProgramExpectations):
         """Whether a program has come to spin; its node is on the graph before its `__init__` is over."""
         inside = self._scene().inside(program)
         return any(executor.spins for executor in inside.executors)
+
+    def _never_spun(self, program: RunningProgram) -> bool:
+        """Whether a program is known to have let no executor spin so far."""
+        inside = self._scene().inside(program)
+        return inside.attached and not any(executor.spins for executor in inside.executors)
 
     def _place_of(self, program: RunningProgram) -> str:
         """Where the main thread of a program is, as the end of a sentence; empty if that cannot be seen."""
