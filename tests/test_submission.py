@@ -21,6 +21,7 @@ from hypothesis import strategies as st
 from autograder.core.errors import KitError
 from autograder.course.cell_file import BadNameError, parse
 from autograder.course.lab import Lab, grade_id_of, load_lab
+from autograder.course.markers import hidden_lines, without_hidden_tests
 from autograder.intake.collect import collect
 from autograder.submission.cell_files import OWN_FILES
 from autograder.submission.notebook_file import NOTEBOOK_BYTES
@@ -99,7 +100,7 @@ def test_the_lab_knows_its_cells(lab: Lab) -> None:
     ]
     assert lab.given == {"helper.py": "# %%node helper\nprint('given')\n"}
     assert list(lab.answers) == ["talker", "answers", "why"]
-    assert (lab.max_points, lab.max_manual_points) == (5, 4)
+    assert (lab.max_points, lab.answers["why"].points) == (5, 4)
     assert "secret" in lab.checks[0].source
     assert "secret" not in json.dumps(lab.released) and "hello" not in json.dumps(lab.released)
 
@@ -255,6 +256,12 @@ def test_the_labs_own_source_is_a_notebook_without_defects(lab: Lab, tmp_path: P
     assert "HIDDEN TESTS" in json.dumps(lab.raw)
     submission = read(lab, tmp_path, lab.raw["cells"])
     assert submission.readable and codes(submission) == []
+
+
+def test_lines_are_hidden_that_are_cut_from_what_students_receive() -> None:
+    source = "a\n# BEGIN HIDDEN TESTS\nb\n# END HIDDEN TESTS\nc"  # nbgrader asks for no more than these words
+    assert "b" not in without_hidden_tests(source).split("\n")
+    assert 3 in hidden_lines(source.split("\n")) and not {1, 5} & hidden_lines(source.split("\n"))
 
 
 def test_a_given_program_cannot_be_replaced(lab: Lab, tmp_path: Path) -> None:

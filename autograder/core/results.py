@@ -190,11 +190,6 @@ class SubmissionResult(_Model):
         """Contradictions that a person should look at, of all checks, each once."""
         return list(dict.fromkeys(flag for check in self.checks for flag in check.flags))
 
-    @property
-    def needs_instructor(self) -> bool:
-        """Whether a person has to look at it."""
-        return any(check.status is Status.UNKNOWN for check in self.checks)
-
     def save(self, path: Path) -> None:
         """Write the result as JSON, whole or not at all."""
         write_beside(path, self.model_dump_json(indent=1) + "\n")

@@ -10,6 +10,7 @@ import copy
 import hashlib
 import json
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache, cached_property, lru_cache
 from pathlib import Path
@@ -99,11 +100,6 @@ class Lab:
         """Points that the checks can give; answers graded by hand come on top."""
         return sum(cell.points or 0.0 for cell in self.cells)
 
-    @property
-    def max_manual_points(self) -> float:
-        """Points that a person can give for answers in plain text."""
-        return sum(answer.points or 0.0 for answer in self.answers.values())
-
     @cached_property
     def digest(self) -> str:
         """SHA-256 over everything that can change a result: the trusted cells, the files they use, and the kit."""
@@ -119,6 +115,15 @@ class Lab:
     def source_digest(self) -> str:
         """SHA-256 over the lab's notebook: all that the gradebook knows of it, and feedback shows."""
         return hashlib.sha256(json.dumps(self.raw).encode()).hexdigest()
+
+    def files_with(self, sources: Mapping[str, str]) -> dict[str, str]:
+        """The files of a submission: the lab's own, and those of the answers, whose cells are given by `grade_id`."""
+        files = dict(self.given)
+        for grade_id, answer in self.answers.items():
+            file = parse(sources[grade_id]) if answer.file is not None else None
+            if file is not None:
+                files[file.file_name] = file.text
+        return files
 
     def clean_notebook(self, sources: dict[str, str]) -> dict[str, Any]:
         """Return the released notebook with these sources in its answer cells: nothing else of a student's is in it."""

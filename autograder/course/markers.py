@@ -8,7 +8,10 @@ from collections.abc import Sequence
 MORE_AT_GRADING = "# More is checked here when the lab is graded."
 """The line that stands in a released check cell where hidden tests were taken out."""
 
-_BEGIN_HIDDEN, _END_HIDDEN = "### BEGIN HIDDEN TESTS", "### END HIDDEN TESTS"
+MARK = re.compile(r"\b(BEGIN|END) (SOLUTION|HIDDEN TESTS|MARK SCHEME)\b")
+"""Each of the marks: which end of a region, and of which."""
+
+_HIDDEN = "HIDDEN TESTS"
 
 
 def without_region(source: str, mark: str, stub: str | None = None) -> str:
@@ -29,14 +32,14 @@ def without_region(source: str, mark: str, stub: str | None = None) -> str:
 
 def without_hidden_tests(source: str) -> str:
     """Return a check cell as students receive it: a line says where more is checked at grading."""
-    return without_region(source, "HIDDEN TESTS", MORE_AT_GRADING)
+    return without_region(source, _HIDDEN, MORE_AT_GRADING)
 
 
 def hidden_lines(lines: Sequence[str]) -> set[int]:
     """Return the numbers of the lines that are hidden from students, counted from 1."""
     hidden, inside = set(), False
     for number, line in enumerate(lines, start=1):
-        inside = (inside or _BEGIN_HIDDEN in line) and _END_HIDDEN not in line
+        inside = (inside or f"BEGIN {_HIDDEN}" in line) and f"END {_HIDDEN}" not in line
         if inside:
             hidden.add(number)
     return hidden

@@ -10,8 +10,7 @@ from typing import Any
 from autograder.authoring.lint.finding import Finding
 from autograder.course.cell_file import BadNameError, parse
 from autograder.course.lab import grade_id_of, nbgrader_of, source_of
-
-_MARKER = re.compile(r"\b(BEGIN|END) (SOLUTION|HIDDEN TESTS|MARK SCHEME)\b")
+from autograder.course.markers import MARK
 
 
 def metadata_findings(cells: list[dict[str, Any]]) -> Iterator[Finding]:
@@ -63,7 +62,7 @@ def _answer(cell: dict[str, Any]) -> Iterator[str]:
 def _outside(cell: dict[str, Any]) -> Iterator[str]:
     """Markers that nothing cuts, because the cell is of another kind."""
     marks = nbgrader_of(cell)
-    found = {match[2] for match in _MARKER.finditer(source_of(cell))}
+    found = {match[2] for match in MARK.finditer(source_of(cell))}
     if "SOLUTION" in found and not marks.get("solution"):
         yield "a solution stands in a cell that is not to be filled in; students would receive it."
     check = marks.get("grade") and not marks.get("solution") and cell["cell_type"] == "code"
@@ -74,7 +73,7 @@ def _outside(cell: dict[str, Any]) -> Iterator[str]:
 def _markers(source: str) -> Iterator[str]:
     is_open: dict[str, int] = {}
     for number, line in enumerate(source.split("\n"), start=1):
-        for which, mark in _MARKER.findall(line):
+        for which, mark in MARK.findall(line):
             if which == "BEGIN" and mark in is_open:
                 yield f"line {number}: `BEGIN {mark}` stands inside of the one of line {is_open[mark]}."
             elif which == "END" and mark not in is_open:

@@ -10,7 +10,6 @@ from autograder.authoring.mutation.generate import handed_in, mutants
 from autograder.authoring.mutation.reach import reached
 from autograder.authoring.mutation.source import Mutant
 from autograder.core.results import Isolation, SubmissionResult
-from autograder.course.cell_file import parse
 from autograder.course.lab import Cell, Lab
 from autograder.grading.job import Job
 from autograder.grading.supervisor import run_in_worker
@@ -27,10 +26,12 @@ def run_findings(lab: Lab, isolation: Isolation, jobs: int) -> Iterator[Finding]
         isolation: how the programs are kept apart.
         jobs: how many run at once.
     """
+    solutions = {grade_id: answer.solution for grade_id, answer in lab.answers.items()}
+    blanks = {grade_id: answer.blank for grade_id, answer in lab.answers.items()}
     with ThreadPoolExecutor(jobs) as pool:
-        solved = pool.submit(_run, lab, isolation, _files(lab, blank=False), {}, list(lab.cells))
+        solved = pool.submit(_run, lab, isolation, lab.files_with(solutions), {}, list(lab.cells))
         answers = {file.file_name: True for answer in lab.answers.values() if (file := answer.file) is not None}
-        blank = pool.submit(_run, lab, isolation, _files(lab, blank=True), answers, list(lab.cells))
+        blank = pool.submit(_run, lab, isolation, lab.files_with(blanks), answers, list(lab.cells))
         yield from _solution(solved.result())
         yield from _blank(blank.result())
         every = mutants(lab)
@@ -63,15 +64,6 @@ def _unbeaten(lab: Lab, isolation: Isolation, check: Cell, every: list[Mutant]) 
         if points is not None and points < (check.points or 0):
             return None
     return Finding(check.grade_id, f"none of {len(tried)} solutions with one mistake each loses points in it.")
-
-
-def _files(lab: Lab, blank: bool) -> dict[str, str]:
-    files = dict(lab.given)
-    for answer in lab.answers.values():
-        file = parse(answer.blank if blank else answer.solution)
-        if file is not None:
-            files[file.file_name] = file.text
-    return files
 
 
 def _run(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -13,9 +12,8 @@ from autograder.authoring.lint.finding import Finding
 from autograder.authoring.lint.metadata import metadata_findings
 from autograder.core.errors import KitError
 from autograder.course.lab import Lab, load_lab
+from autograder.course.markers import MARK
 from autograder.course.paths import CoursePaths
-
-_HIDDEN = re.compile(r"\b(?:BEGIN|END) (SOLUTION|HIDDEN TESTS|MARK SCHEME)\b")
 
 
 def read_findings(root: Path, name: str) -> list[Finding]:
@@ -68,6 +66,6 @@ def release_findings(files: dict[Path, bytes]) -> list[Finding]:
         for number, cell in enumerate(json.loads(content)["cells"], start=1):
             name = cell["metadata"].get("nbgrader", {}).get("grade_id", str(number))
             source = cell["source"] if isinstance(cell["source"], str) else "".join(cell["source"])
-            marks = {match[1].lower() for match in _HIDDEN.finditer(source)}
+            marks = {match[2].lower() for match in MARK.finditer(source)}
             found += [Finding(name, f"students would receive its {mark}.") for mark in sorted(marks)]
     return found

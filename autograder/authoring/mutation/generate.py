@@ -8,7 +8,6 @@ from collections.abc import Iterator
 from autograder.authoring.mutation.python_rules import changes, swaps
 from autograder.authoring.mutation.source import Mutant, Source
 from autograder.authoring.mutation.text_rules import text_changes, without_a_line
-from autograder.course.cell_file import parse
 from autograder.course.lab import Answer, Lab, grade_id_of, source_of
 
 
@@ -82,10 +81,5 @@ def _difference(before: str, after: str) -> tuple[str, str]:
 
 def handed_in(lab: Lab, mutant: Mutant) -> dict[str, str]:
     """The files of a submission that is the solution but for this change."""
-    files = dict(lab.given)
-    for answer in lab.answers.values():
-        if answer.file is not None:
-            file = parse(mutant.source if answer.grade_id == mutant.answer else answer.solution)
-            if file is not None:
-                files[file.file_name] = file.text
-    return files
+    solutions = {grade_id: answer.solution for grade_id, answer in lab.answers.items()}
+    return lab.files_with(solutions | {mutant.answer: mutant.source})
