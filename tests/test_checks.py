@@ -697,6 +697,7 @@ def test_the_fields_that_a_check_looked_at_stand_first_in_what_was_observed(grad
         """\
         from sensor_msgs.msg import Range
         with launch("talker") as ros:
+            ros.expect_messages("/chatter", Range)
             ros.expect_messages("/chatter", Range, where=lambda m: m.range > 3 and m.header.frame_id == "x", within=2)
         ros.score(2)
         """,
@@ -743,6 +744,7 @@ def test_an_argument_without_a_default_is_needed(grade: Grade, default: str, poi
 def test_a_parameter_file_that_is_no_yaml_is_named_with_its_line(grade: Grade) -> None:
     check = """\
         with launch("talker", params_file="p.yaml") as ros:
+            ros.expect_node("/talker")
             ros.expect_parameter("/talker", "word", "hi", within=2)
         ros.score(2)
         """
@@ -780,6 +782,7 @@ def test_a_parameter_file_that_ros2_launch_would_not_find_is_the_reason(grade: G
     check = """\
         from autograder.checks import launch_file
         with launch_file("a.launch.yaml", package="lab") as ros:
+            ros.expect_node("/talker")
             ros.expect_parameter("/talker", "word", "hi", within=2)
         ros.score(2)
         """

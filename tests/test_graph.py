@@ -198,7 +198,7 @@ def test_time_in_which_a_program_got_no_cpu_does_not_count_against_it(
 def test_a_program_that_waits_for_a_cpu_has_waited_as_long_as_strangers_ran(programs: Callable[[str], int]) -> None:
     programs(WORKS_NOW_AND_THEN)
     before = cpu_uses()
-    deadline = time.monotonic() + 20
+    deadline = time.monotonic() + 60
     while (kept := kept_waiting(before, cpu_uses())) < 0.5 and time.monotonic() < deadline:
         time.sleep(0.05)
     assert kept >= 0.5
@@ -215,5 +215,6 @@ def test_a_program_that_only_computes_gains_no_time_by_it(programs: Callable[[st
         time.sleep(0.05)
     before = uses()
     while sum(use.cpu for use in uses().values()) < sum(use.cpu for use in before.values()) + 1.0:
+        assert time.monotonic() < deadline, "they got no CPU"
         time.sleep(0.05)
     assert kept_waiting(before, uses()) == 0.0
