@@ -168,7 +168,9 @@ def ros() -> Finding:
         return Finding(name, False, f"rclpy comes from {place.parent}, not from this environment", ANEW)
     if found["middleware"] != "rmw_fastrtps_cpp":
         return Finding(name, False, f"the middleware is {found['middleware']}", "Run: unset RMW_IMPLEMENTATION")
-    return Finding(name, True, f"Jazzy, rclpy {found['version']}, Fast DDS: a message arrived".replace("  ", " "))
+    where = "this environment" if place.is_relative_to(sys.prefix) else "/opt/ros/jazzy"
+    which = f"rclpy {found['version']}".strip()
+    return Finding(name, True, f"Jazzy of {where}, {which}, Fast DDS: a message arrived")
 
 
 def probe() -> Finding:
