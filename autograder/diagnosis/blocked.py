@@ -69,7 +69,8 @@ def waits_for_a_service(inside: Inside) -> Diagnosis | None:
         lasting = call.blocks or (call.what == "wait_for_service" and call.begun > 1)
         services = inside.observer.services()
         if lasting and client.name and client.name not in services:
-            return _nobody_offers(client, services, f"{_at(inside, call)}it waits for ")
+            limit = " If it may be missing, wait with `timeout_sec`." if call.what == "wait_for_service" else ""
+            return _nobody_offers(client, services, f"{_at(inside, call)}it waits for ", limit)
     return None
 
 
@@ -84,7 +85,7 @@ def asks_nobody(inside: Inside) -> Diagnosis | None:
     return None
 
 
-def _nobody_offers(client: Thing, services: dict[str, list[str]], said: str) -> Diagnosis:
+def _nobody_offers(client: Thing, services: dict[str, list[str]], said: str, else_do: str = "") -> Diagnosis:
     own = ("rcl_interfaces/", "type_description")  # what each node offers by itself
     close = nearest(client.name, [n for n, types in services.items() if not types[0].startswith(own)])
     given = f" (`{client.given}` in the code)" if client.given and client.given != client.name else ""
@@ -96,7 +97,7 @@ def _nobody_offers(client: Thing, services: dict[str, list[str]], said: str) -> 
         if not close
         else "The name in the code begins with a slash, so no namespace reaches it: write it without."
         if client.given.startswith("/") and close.endswith(client.given)
-        else "Compare the names, namespace included.",
+        else f"Compare the names, namespace included.{else_do}",
     )
 
 
