@@ -76,6 +76,7 @@ def test_a_timeline_has_rows_by_group_and_names_the_threads() -> None:
     for text in ("two threads", "exclusive group", "default group (exclusive)", "beat", "threads 2, 3", "no callback"):
         assert text in shown
     assert "slow ran 2 times, each for at most 0.30 seconds, on threads 2, 3; at most 3 at once" in picture.alt
+    assert "slow ran once for at most 0.30 seconds, on thread 2;" in timeline(Runs(SLOW[:1])).alt
     assert "url(#h1)" in picture.svg  # a hatching beside the colour
 
 

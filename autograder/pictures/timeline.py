@@ -207,8 +207,9 @@ def _alt(shown: Mapping[str, Sequence[Run]], length: float) -> str:
         rows = []
         for name in own.callbacks():
             threads = sorted(own.threads(name))
+            times = "once" if own.count(name) == 1 else f"{own.count(name)} times, each"
             rows.append(
-                f"{name} ran {own.count(name)} times, each for at most {own.longest(name):.2f} seconds, on "
+                f"{name} ran {times} for at most {own.longest(name):.2f} seconds, on "
                 f"{'thread' if len(threads) == 1 else 'threads'} {_listed(threads)}"
             )
         most = own.overlap()

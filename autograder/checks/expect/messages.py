@@ -191,10 +191,11 @@ class MessageExpectations(SourceExpectations):
         self._observer.wait(lambda: len(wanted.counted()) > most, for_seconds)
         came = len(wanted.counted())
         if came > most:
+            asked = f"at most {most}" if most else "none"
             self._fail(
                 wanted.title,
-                Diagnosis(f"{came} messages came where at most {most} were expected.", "too-many"),
-                expected=f"at most {most}",
+                Diagnosis(f"{_number(came)} came where {asked} {'were' if most > 1 else 'was'} expected.", "too-many"),
+                expected=asked,
                 observed=f"{came}",
                 hint=wanted.hint,
             )
@@ -270,6 +271,6 @@ class MessageExpectations(SourceExpectations):
             f"Nothing is published on `{topic}`",
             lambda: Diagnosis(because or f"Messages came on `{topic}` that should not.", code or "not-silent"),
             expected="no message",
-            observed=f"{recording.count - before} messages",
+            observed=_number(recording.count - before),
             hint=hint,
         )
