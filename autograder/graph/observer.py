@@ -217,8 +217,8 @@ class Observer:
         """Services of all nodes, with their type names; the observer itself offers none."""
         found: dict[str, list[str]] = {}
         for name, namespace in self._names():
-            # A node may go away between the two questions (rclpy raises NodeNameNonExistentError).
-            with contextlib.suppress(Exception):
+            # A node may go away between the two questions, which is an RCLError, and forged names may be no UTF-8.
+            with contextlib.suppress(RuntimeError, ValueError):
                 found.update(self.node.get_service_names_and_types_by_node(name, namespace))
         return found
 
