@@ -1,0 +1,45 @@
+%%node follower
+import queue
+import threading
+import time
+
+import rclpy
+from rclpy.executors import ExternalShutdownException
+from rclpy.node import Node
+from rclpy.time import Time
+from std_msgs.msg import Float64, Header
+
+
+class Follower(Node):
+    def __init__(self):
+        super().__init__("follower")
+        self.work = self.declare_parameter("work", 0.05).value
+        self.publisher = self.create_publisher(Float64, "age", 10)
+        # The queue is deep and soon emptied: the work is done in a thread of its own, and what counts is what came last.
+        self.newest = queue.LifoQueue()
+        self.create_subscription(Header, "frames", self.newest.put, 100)
+        threading.Thread(target=self.keep_up, daemon=True).start()
+
+    def keep_up(self):
+        while True:
+            frame = self.newest.get()
+            with self.newest.mutex:
+                self.newest.queue.clear()
+            self.follow(frame)
+
+    def follow(self, frame):
+        age = self.get_clock().now() - Time.from_msg(frame.stamp)
+        self.publisher.publish(Float64(data=age.nanoseconds / 1e9))
+        time.sleep(self.work)
+
+
+def main():
+    rclpy.init()
+    try:
+        rclpy.spin(Follower())
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    rclpy.try_shutdown()
+
+
+main()
