@@ -8,6 +8,7 @@ slowest timer takes, and a while more. Where that evidence is missing, the deadl
 from __future__ import annotations
 
 import time
+from collections import Counter
 from collections.abc import Sequence
 
 from autograder.diagnosis.events import Event, ExecutorSeen, NodeSeen, ProbeFailed, Thing, read
@@ -68,10 +69,12 @@ def shows_all(observer: Observer, events: Sequence[Event]) -> bool:
     if any(isinstance(event, NodeSeen) and not event.destroyed and event.name not in nodes for event in events):
         return False
     look = {"publisher": observer.publishers, "subscription": observer.subscriptions}
+    made = Counter(
+        (thing.kind, thing.name, thing.node) for thing in _things(events) if thing.kind in look and not thing.destroyed
+    )
     return all(
-        any(full_name(end.node_namespace, end.node_name) == thing.node for end in look[thing.kind](thing.name))
-        for thing in _things(events)
-        if thing.kind in look and not thing.destroyed
+        sum(full_name(end.node_namespace, end.node_name) == node for end in look[kind](topic)) >= many
+        for (kind, topic, node), many in made.items()
     )
 
 

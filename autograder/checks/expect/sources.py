@@ -8,6 +8,7 @@ from collections.abc import Sequence
 
 from autograder.checks.expect.endpoints import EndExpectations
 from autograder.diagnosis import Diagnosis
+from autograder.diagnosis.events import Thing
 from autograder.graph.names import UNKNOWN_NODE, full_name
 from autograder.graph.recording import Received
 
@@ -24,14 +25,13 @@ class SourceExpectations(EndExpectations):
         """Fail if the messages may come from another publisher than the one that is meant."""
         if not received:
             return
-        self._observer.wait(
-            lambda: all(end.node_name != UNKNOWN_NODE for end in self._ends(topic, msg_type, "publisher", "")),
-            _NAMED_WITHIN,
-        )
+        self._observer.wait(lambda: self._knows_publishers(topic, msg_type), _NAMED_WITHIN)
         ends = self._ends(topic, msg_type, "publisher", "")
         owners = [full_name(end.node_namespace, end.node_name) for end in ends]
         named = ", ".join(f"{many} of {name}" if many > 1 else name for name, many in sorted(Counter(owners).items()))
-        if len(ends) > publishers and not (len(set(owners)) == publishers == 1 and not _numbers_repeat(received)):
+        if len(ends) > publishers and not (
+            len(set(owners)) == publishers == 1 and not self._several_used(topic, received)
+        ):
             self._fail(
                 title,
                 Diagnosis(
@@ -51,6 +51,28 @@ class SourceExpectations(EndExpectations):
             named = named or "nobody any more"
             because = f"The messages on `{topic}` come from {named}, not from `{node}`."
             self._fail(title, Diagnosis(because, "wrong-node"), expected=node, observed=named)
+
+    def _knows_publishers(self, topic: str, msg_type: type) -> bool:
+        """Whether all publishers of a topic that the programs say they made are on the graph, each with its node."""
+        on_graph = Counter(
+            full_name(end.node_namespace, end.node_name) if end.node_name != UNKNOWN_NODE else UNKNOWN_NODE
+            for end in self._ends(topic, msg_type, "publisher", "")
+        )
+        made = Counter(thing.node for thing in self._publishers_made(topic))
+        return UNKNOWN_NODE not in on_graph and made <= on_graph
+
+    def _several_used(self, topic: str, received: Sequence[Received]) -> bool:
+        """Whether more than one publisher of a topic has sent something."""
+        return _numbers_repeat(received) or sum(thing.runs > 0 for thing in self._publishers_made(topic)) > 1
+
+    def _publishers_made(self, topic: str) -> list[Thing]:
+        """The publishers of a topic that the programs which run say they made."""
+        return [
+            event
+            for told in self._told()
+            for event in told
+            if isinstance(event, Thing) and event.kind == "publisher" and event.name == topic and not event.destroyed
+        ]
 
 
 def _numbers_repeat(received: Sequence[Received]) -> bool:
