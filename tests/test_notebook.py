@@ -268,6 +268,8 @@ class Shown:
     text: str = ""
     """Streams and plain text, in order."""
     html: str = ""
+    result: str = ""
+    """The plain text of the cell's value, which nbgrader reads."""
     error: str = ""
     types: list[str] = field(default_factory=list)
     seconds: float = 0.0
@@ -318,6 +320,8 @@ class Notebook:
             elif "data" in content:
                 shown.text += content["data"].get("text/plain", "") + "\n"
                 shown.html += content["data"].get("text/html", "")
+                if kind == "execute_result":
+                    shown.result = content["data"]["text/plain"]
 
     def restart(self) -> None:
         self._client.stop_channels()
@@ -372,7 +376,7 @@ def test_nbgrader_still_reads_the_points(tmp_path: Path) -> None:
     try:
         made.run(SET_UP)
         made.run("%%node talker\nprint('no node')")
-        plain = made.run(CHECK).text.strip()
+        plain = made.run(CHECK).result
     finally:
         made.close()
     cell = new_code_cell(outputs=[new_output("execute_result", {"text/plain": plain}, execution_count=1)])
