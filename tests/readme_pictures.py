@@ -66,7 +66,7 @@ def feedback(browser: Any, course: Path) -> None:
     """Take a picture of the first check on a feedback page."""
     page = browser.new_page(viewport={"width": 900, "height": 1000}, device_scale_factor=1.5)
     page.goto((course / "build" / "feedback" / STUDENT / LAB / f"{LAB}.html").as_uri())
-    report = page.locator("section > div").first
+    report = page.locator("section [role=group]").first
     report.screenshot(path=PICTURES / "report.png")
     page.close()
 
