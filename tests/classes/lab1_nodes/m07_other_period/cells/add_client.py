@@ -19,7 +19,7 @@ class AddClient(Node):
 def ask(node):
     """Ask for the sum, log what came of it, and return the exit status."""
     if not node.client.wait_for_service(timeout_sec=node.server_within):
-        node.get_logger().error("no server")
+        node.get_logger().error("no servers")
         return 1
     node.client.call_async(BasicTypes.Request(int32_value=node.a, int64_value=node.b))
     future = node.client.call_async(BasicTypes.Request(int32_value=node.a, int64_value=node.b))
