@@ -192,7 +192,7 @@ CASES: dict[str, tuple[dict[str, str], str, str, str]] = {
         changed(INTERFACES, "msg/Things.msg", "std_msgs/Header", "std_msgs/msg/Header"),
         EXPECT,
         "interface-line",
-        "is not accepted: std_msgs/msg/Header.",
+        "is not accepted: 'std_msgs/msg/Header'.",
     ),
     "capital": (changed(INTERFACES, "msg/Thing.msg", "label", "Label"), EXPECT, "interface-line", "string Label"),
     "one_part": (changed(INTERFACES, "srv/Count.srv", "---\n", ""), EXPECT, "interface-parts", "---"),
@@ -267,6 +267,9 @@ ros.score(1)""",
     package.expect_interface("srv/Count", {"label": "string"}, {"count": "int32"})
 with launch("counter", packages=["good_interfaces"], listen=[("/counted", String)]) as ros:
     ros.expect_messages("/counted", String, at_least=1, where=lambda m: m.data == "2 of car")
+ros.score(1)""",
+    "float for int": """with launch("halves", packages=["good_interfaces"], listen=[("/counted", String)]) as ros:
+    ros.expect_messages("/counted", String, at_least=1, where=lambda m: m.data == "2 of car", within=5)
 ros.score(1)""",
     "fields": """with build("good_interfaces") as package:
     package.expect_interface("msg/Thing", {"label": "string", "x": "float64"})
@@ -365,6 +368,7 @@ def found(request: pytest.FixtureRequest) -> dict[str, CheckResult]:
     for name, setup in HOSTILE.items():
         files |= package(name, {**SENSORS, "setup.py": setup.replace("ROOT", str(ROOT))})
         checks[name] = HOSTILE_CHECK.replace("NAME", name)
+    files["halves.py"] = COUNTER.replace("sum(", "0.5 * sum(").replace("counter", "halves")
     checks |= GOOD
     cells = [Cell(grade_id=name, points=1, source=source) for name, source in checks.items()]
     what: dict[str, Any] = {"files": files, "cells": [Cell(grade_id="set_up", source=SET_UP), *cells]}
@@ -390,6 +394,11 @@ def test_a_package_is_built_and_run_and_launched_from_where_it_is_installed(foun
 
 def test_interfaces_are_built_and_a_program_uses_them(found: dict[str, CheckResult]) -> None:
     assert found["interfaces"].points == 1, found["interfaces"]
+
+
+def test_a_field_with_a_value_of_another_type_ends_a_program_and_that_is_told(found: dict[str, CheckResult]) -> None:
+    first = next(one for one in found["float for int"].outcomes if one.because)
+    assert "has to be `int` and holds a value of another type" in first.because, first
 
 
 def test_a_field_of_another_type_is_named(found: dict[str, CheckResult]) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 from autograder.arguments import params_file, remap_rules
 from autograder.diagnosis import callbacks
 from autograder.diagnosis.inside import Inside
@@ -9,6 +11,13 @@ from autograder.diagnosis.reason import Diagnosis
 from autograder.diagnosis.scene import Scene
 from autograder.diagnosis.spinning import SHUT_DOWN_IN_MAIN
 from autograder.diagnosis.traces import last_traceback
+
+
+_WRONG_FIELD = re.compile(
+    r"(\w{1,100}?)__(?:msg|srv|action)__\w{1,100}convert_from_py.{0,200}Assertion `Py(\w{1,9})_Check"
+)
+"""What the C code of an interface prints when a field does not hold what it should."""
+_KINDS = {"Long": "int", "Float": "float", "Bool": "bool", "Unicode": "str"}
 
 
 def program_trouble(scene: Scene) -> Diagnosis | None:
@@ -45,6 +54,14 @@ def _death(inside: Inside) -> Diagnosis:
     if found:
         return found
     status = program.exit_status()
+    wrong = _WRONG_FIELD.search(program.output()[-10_000:])
+    if wrong and wrong[2] in _KINDS:
+        return Diagnosis(
+            f"`{program.name}` sent something of `{wrong[1]}` with a field that has to be `{_KINDS[wrong[2]]}` and holds"
+            " a value of another type. That ended the program, without a word of Python's.",
+            "crashed",
+            "Lecture 7, section 'Python does not check what you assign'.",
+        )
     if status is not None and status < 0:
         return Diagnosis(
             f"`{program.name}` was ended by signal {-status}.", "crashed", "The log says what came before."

@@ -96,7 +96,8 @@ def not_described(sources: Path, name: str) -> Diagnosis | None:
 
 def _interface_line(match: re.Match[str]) -> Diagnosis:
     line, name, said = match.groups()
-    because = f"The line `{line}` of the interface `{name}` is not accepted: {said.strip().strip(chr(39))}."
+    said = said.strip() + "'" * (said.count("'") % 2)  # the pattern leaves the last one out
+    because = f"The line `{line}` of the interface `{name}` is not accepted: {said}."
     full = re.search(r"\b(\w+)/msg/(\w+)", line)
     if full:
         return Diagnosis(because, "interface-line", f"In an interface file it is `{full[1]}/{full[2]}`, without `msg`.")
