@@ -12,7 +12,6 @@ from autograder.diagnosis.scene import Scene
 from autograder.diagnosis.spinning import SHUT_DOWN_IN_MAIN
 from autograder.diagnosis.traces import last_traceback
 
-
 _WRONG_FIELD = re.compile(
     r"(\w{1,100}?)__(?:msg|srv|action)__\w{1,100}convert_from_py.{0,200}Assertion `Py(\w{1,9})_Check"
 )
@@ -57,8 +56,8 @@ def _death(inside: Inside) -> Diagnosis:
     wrong = _WRONG_FIELD.search(program.output()[-10_000:])
     if wrong and wrong[2] in _KINDS:
         return Diagnosis(
-            f"`{program.name}` sent something of `{wrong[1]}` with a field that has to be `{_KINDS[wrong[2]]}` and holds"
-            " a value of another type. That ended the program, without a word of Python's.",
+            f"`{program.name}` sent something of `{wrong[1]}` with a field that has to be `{_KINDS[wrong[2]]}`"
+            " and holds a value of another type. That ended the program, without a word of Python's.",
             "crashed",
             "Lecture 7, section 'Python does not check what you assign'.",
         )
