@@ -1,7 +1,7 @@
 import rclpy
 from car_interfaces.srv import CountObjects
 from geometry_msgs.msg import Point
-from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
 from rclpy.executors import ExternalShutdownException, MultiThreadedExecutor
 from rclpy.node import Node
 from std_msgs.msg import Bool
@@ -14,7 +14,7 @@ class BrakeAssistant(Node):
         self.brake = self.create_publisher(Bool, "brake", 10)
         group = MutuallyExclusiveCallbackGroup()
         self.client = self.create_client(CountObjects, "count_objects", callback_group=group)
-        self.create_timer(0.2, self.ask, callback_group=MutuallyExclusiveCallbackGroup())
+        self.create_timer(0.2, self.ask, callback_group=ReentrantCallbackGroup())
         self.create_timer(0.2, self.tell, callback_group=MutuallyExclusiveCallbackGroup())
 
     async def ask(self):
