@@ -273,6 +273,8 @@ class Shown:
     error: str = ""
     types: list[str] = field(default_factory=list)
     seconds: float = 0.0
+    number: int = 0
+    """In the brackets beside the cell."""
 
 
 class Notebook:
@@ -313,6 +315,8 @@ class Notebook:
                 shown.seconds = time.monotonic() - began
                 return shown
             shown.types.append(kind)
+            if kind == "execute_input":
+                shown.number = content["execution_count"]
             if kind == "stream":
                 shown.text += content["text"]
             elif kind == "error":
@@ -356,9 +360,12 @@ def answer(source: str, grade_id: str = "talker", blank: str = "") -> tuple[str,
     return grade_id, source, {"nbgrader": marks, "autograder": blank_mark(blank)}
 
 
-def write(notebook: Notebook, source: str = TALKER) -> None:
+def write(notebook: Notebook, source: str = TALKER) -> int:
+    """Save and run the cell; gives its number."""
     notebook.save(answer(source))
-    assert "written" in notebook.run(source, "talker").text
+    shown = notebook.run(source, "talker")
+    assert "written" in shown.text
+    return shown.number
 
 
 def test_a_score_reads_as_a_report_in_every_front_end(notebook: Notebook) -> None:
@@ -385,9 +392,9 @@ def test_nbgrader_still_reads_the_points(tmp_path: Path) -> None:
 
 
 def test_a_report_names_the_cell_and_the_time(notebook: Notebook) -> None:
-    write(notebook)
+    number = write(notebook)
     shown = notebook.run(CHECK)
-    assert "`talker` from cell [" in shown.text and ", run at " in shown.text
+    assert f"`talker` from cell [{number}], run at " in shown.text
     assert "not saved" not in shown.text and "!" not in shown.text
 
 

@@ -106,7 +106,8 @@ class Kernel:
     @property
     def number(self) -> int:
         """The number in the brackets beside the cell that runs."""
-        return int(self.shell.execution_count)
+        # The shell's own count is that of the next cell in some releases of IPython, and of this one in others.
+        return len(self.shell.history_manager.input_hist_parsed) - 1
 
     @property
     def updates_outputs(self) -> bool:
