@@ -529,6 +529,50 @@ executor.spin()
 """
 
 
+ASKS_BESIDE_A_THREAD = """
+import threading
+import time
+
+import rclpy
+from rclpy.action import ActionClient
+from test_msgs.action import Fibonacci
+
+
+class Slow(dict):
+    def __contains__(self, key):  # rclpy asks this between sending a request and noting it: a busy machine may stop there
+        time.sleep(0.3)
+        return super().__contains__(key)
+
+
+rclpy.init()
+node = rclpy.create_node("asks")
+client = ActionClient(node, Fibonacci, "count")
+client._pending_goal_requests, client._pending_result_requests = Slow(), Slow()
+threading.Thread(target=rclpy.spin, args=(node,), daemon=True).start()
+client.wait_for_server()
+asked = client.send_goal_async(Fibonacci.Goal(order=2))
+while not asked.done():
+    time.sleep(0.01)
+ended = asked.result().get_result_async()
+while not ended.done():
+    time.sleep(0.01)
+rclpy.shutdown()
+"""
+
+
+def test_an_answer_to_an_action_client_is_not_lost_by_chance(grade: Grade) -> None:
+    result = grade(
+        """\
+        with launch("counter", "asks") as ros:
+            ros.expect_exit("asks", within=30)
+        ros.score(2)
+        """,
+        counter__py=COUNTER,
+        asks__py=ASKS_BESIDE_A_THREAD,
+    )
+    assert result.points == 2.0, result
+
+
 def test_an_action_is_followed_from_the_goal_to_its_end(grade: Grade) -> None:
     result = grade(
         """\

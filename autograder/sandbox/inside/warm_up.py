@@ -5,6 +5,7 @@ import gc
 import importlib
 import sys
 
+from .action_answers import keep_answers
 from .kernel import PR_SET_CHILD_SUBREAPER, PR_SET_DUMPABLE, libc, prctl
 from .probe import attach
 
@@ -40,6 +41,8 @@ def warm_up() -> None:
     load_ros()
     with contextlib.suppress(Exception):
         attach.prepare()
+    with contextlib.suppress(Exception):  # the probe says what of rclpy has moved
+        keep_answers(sys.modules["rclpy.action"].ActionClient)
     keep_shared()
     # After the imports: no program can trace a process of these, or open their memory or descriptors, from here on.
     prctl(PR_SET_DUMPABLE, 0)

@@ -1,4 +1,4 @@
-"""Every private name of rclpy that the probe uses, and whether the installed rclpy still has them.
+"""Every private name of rclpy that is used inside a program, and whether the installed rclpy still has them.
 
 Written for rclpy 7.1, the one of Jazzy. What rclpy promises to everyone is used where it is needed.
 """
@@ -12,6 +12,8 @@ TAKES = ("_take_timer", "_take_subscription", "_take_service")
 TAKE_ANSWER = "_take_client"
 SET_PARAMETERS = "_set_parameters_atomically"
 """Of `Node`: what every way of setting parameters comes to."""
+ACTION_REQUESTS = ("send_goal_async", "_cancel_goal_async", "_get_result_async")
+"""Methods of `ActionClient` that send a request and note that its answer is waited for."""
 REGISTER_TRANSITION = "_LifecycleNodeMixin__register_callback"
 RUN_CALLBACK = "await_or_execute"
 """What runs a callback: a function, imported by name into each module that uses it."""
@@ -78,6 +80,9 @@ def _differences(rclpy: Any) -> Iterator[tuple[str, str]]:
             yield f"{owner.__name__}.{name}", "does not have"
         elif len(inspect.signature(function).parameters) != count:
             yield f"{owner.__name__}.{name}", "calls with other arguments"
+    for name in (*ACTION_REQUESTS, "execute"):
+        if not hasattr(rclpy.action.ActionClient, name):
+            yield f"ActionClient.{name}", "does not have"
     if not hasattr(rclpy.node.Node, SET_PARAMETERS):
         yield f"Node.{SET_PARAMETERS}", "does not have"
     if not hasattr(rclpy.lifecycle.node._rclpy.LifecycleStateMachine, "current_state"):
