@@ -539,7 +539,7 @@ from test_msgs.action import Fibonacci
 
 
 class Slow(dict):
-    def __contains__(self, key):  # rclpy asks this between sending a request and noting it: a busy machine may stop there
+    def __contains__(self, key):  # rclpy asks this after sending, before noting: a busy machine may stop there
         time.sleep(0.3)
         return super().__contains__(key)
 
