@@ -11,7 +11,6 @@ from typing import Any, Self
 
 from autograder.checks import contradictions, findings, outcomes, runtime, seen
 from autograder.checks.building import why_no_package, why_not_found
-from autograder.checks.command_line import CommandLineError
 from autograder.checks.expect.ending import EndingExpectations
 from autograder.checks.expect.facts import Facts
 from autograder.checks.expect.feedback import FeedbackExpectations
@@ -30,7 +29,7 @@ from autograder.checks.parts import part
 from autograder.checks.program import Program
 from autograder.checks.robot import LIMITS, Robot, make_room
 from autograder.checks.scoring import Score, score
-from autograder.checks.starting import file_of, refused_words
+from autograder.checks.starting import file_of, words_of
 from autograder.checks.try_out import Log, log_of, try_out
 from autograder.checks.waiting import NotLaunchedError, watched
 from autograder.core.front_end import Watcher
@@ -177,14 +176,9 @@ class Launch(
         elif not runtime.current.has(file):
             self._miss(launched.program)
             return
-        try:
-            words = launched.arguments()
-        except CommandLineError as error:
-            self._running.trouble.append(Diagnosis(error.because, error.code, error.hint))
-            return
-        refused = refused_words(words)
-        if refused is not None:
-            self._running.trouble.append(refused)
+        words = words_of(launched)
+        if isinstance(words, Diagnosis):
+            self._running.trouble.append(words)
             return
         environment = {"ROS_DOMAIN_ID": str(self._domain_id), **launched.environment, **profile_environment()}
         assert self._group is not None  # begun on entering

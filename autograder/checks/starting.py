@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from autograder.arguments import params_file, remap_rules
 from autograder.checks import runtime
+from autograder.checks.command_line import CommandLineError
 from autograder.checks.program import Program
 from autograder.diagnosis import Diagnosis
 from autograder.packages.workspace import INSTALLED
@@ -16,6 +17,15 @@ def file_of(node: Program) -> str:
     if node.package:
         return f"{INSTALLED}/{node.package}/lib/{node.package}/{node.program}"
     return f"{node.program}.py"
+
+
+def words_of(node: Program) -> list[str] | Diagnosis:
+    """The words that a program is started with, or why it would not start with them."""
+    try:
+        words = node.arguments()
+    except CommandLineError as error:
+        return Diagnosis(error.because, error.code, error.hint)
+    return refused_words(words) or words
 
 
 def refused_words(words: Sequence[str]) -> Diagnosis | None:
