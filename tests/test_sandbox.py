@@ -384,3 +384,9 @@ def _wait_for(look: Any, seconds: float) -> Any:
         assert time.monotonic() < deadline, "it did not happen in time"
         time.sleep(0.01)
     return found
+
+
+def test_processes_that_make_their_folders_at_once_take_none_from_each_other() -> None:
+    makes = "from autograder.sandbox.scratch import Scratch\nfor _ in range(300):\n    Scratch().remove()"
+    makers = [subprocess.Popen([sys.executable, "-c", makes], stderr=subprocess.PIPE, text=True) for _ in range(6)]
+    assert [maker.communicate(timeout=120)[1] for maker in makers] == [""] * len(makers)

@@ -28,7 +28,10 @@ class Scratch:
         self.folder = Path()
         while not self.folder.name:  # another process may have taken it for an abandoned one, before it was locked
             made = Path(tempfile.mkdtemp(prefix=_PREFIX))
-            self._held = os.open(made, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
+            try:
+                self._held = os.open(made, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
+            except FileNotFoundError:
+                continue
             fcntl.flock(self._held, fcntl.LOCK_EX)
             if made.is_dir():
                 self.folder = made

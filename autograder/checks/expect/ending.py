@@ -134,7 +134,10 @@ class EndingExpectations(ProgramExpectations):
         self._observer.wait(lambda: self._spun(program) or not program.running(), _SPINS_WITHIN)
         said_before = len(program.output())
         program.signal(getattr(signal, by))
-        if not self._observer.wait(lambda: not program.running(), within):
+        if not self._observer.wait(lambda: not program.running(), within) and self._woke_too_soon(program, by):
+            program.signal(getattr(signal, by))
+            self._observer.wait(lambda: not program.running(), within)
+        if program.running():
             because = f"{within:g} s after {_SAID[by]} it still runs{self._place_of(program)}."
             self._fail(
                 title, Diagnosis(because, "signal-ignored"), expected="ended", observed="still running", hint=hint
@@ -161,6 +164,14 @@ class EndingExpectations(ProgramExpectations):
         """Whether a program has come to spin; its node is on the graph before its `__init__` is over."""
         inside = self._scene().inside(program)
         return any(executor.spins for executor in inside.executors)
+
+    def _woke_too_soon(self, program: RunningProgram, by: str) -> bool:
+        """Whether rclpy may have missed SIGTERM, which is no fault of the program.
+
+        rclpy 7.1 wakes its executor first and shuts the context down after that (`signal_handler.cpp`). An executor
+        that looks at the context in between waits again, for as long as nothing else wakes it.
+        """
+        return by == "SIGTERM" and "spin" in self._place_of(program)
 
     def _never_spun(self, program: RunningProgram) -> bool:
         """Whether a program is known to have let no executor spin so far."""
