@@ -9,7 +9,10 @@ import os
 from _tries import call, others, tries
 
 for pid in others():
-    handle = os.pidfd_open(pid)
+    try:
+        handle = os.pidfd_open(pid)
+    except ProcessLookupError:  # it has ended meanwhile
+        continue
     tries(f"setns {pid}", lambda handle=handle: call(308, handle, 0x20000000 | 0x20000 | 0x10000000))
     tries(f"pidfd_getfd {pid}", lambda handle=handle: call(438, handle, 0, 0))
 for name in ("user", "pid", "mnt", "net", "ipc"):
