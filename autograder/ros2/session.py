@@ -6,10 +6,13 @@ it when it has settled.
 
 from __future__ import annotations
 
+import contextlib
 import os
 import re
+import signal
+import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import cached_property
 from typing import Any, TypeVar
 
@@ -159,7 +162,8 @@ class Session:
                 return False
             self._go_on(now)
             left = [at - now for at in (deadline, self._ends) if at is not None]
-            self._joined[1].spin_once(timeout_sec=max(0.0, min([0.1, *left])))
+            with _whole_round():
+                self._joined[1].spin_once(timeout_sec=max(0.0, min([0.1, *left])))
         return True
 
     def answer(self, future: Any, within: float | None = None) -> Any:
@@ -189,6 +193,26 @@ class Session:
             executor.shutdown(timeout_sec=1.0)
             self.node.destroy_node()
             context.try_shutdown()
+
+
+@contextlib.contextmanager
+def _whole_round() -> Iterator[None]:
+    """Let Ctrl-C wait until an executor's round is over.
+
+    In the midst of one it would leave an answer half taken, or a callback group that is never free again; whoever then
+    asks for one thing more, as for a goal to be cancelled, would wait in vain.
+    """
+    if threading.current_thread() is not threading.main_thread():  # signals come to the main thread only
+        yield
+        return
+    came: list[int] = []
+    before = signal.signal(signal.SIGINT, lambda number, _: came.append(number))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+    if came:
+        raise KeyboardInterrupt
 
 
 def is_hidden(name: str) -> bool:
