@@ -154,12 +154,10 @@ class Launch(
             runtime.current.robot = robot = self._enter(LIMITS)
             robot.wait_for_nodes()
             print(robot)
-        elif self._group is None and self._entered:
-            pass  # a package was not built, which every expectation tells
-        elif self._group is None:
-            raise Misuse("This launch does not run yet: name all its programs in launch(…), then .start() begins it.")
-        else:
+        elif self._group is not None:
             self._start(node)
+        elif not self._entered:  # else a package was not built, which every expectation tells
+            raise Misuse("This launch does not run yet: name all its programs in launch(…), then .start() begins it.")
         return self
 
     def _start(self, node: Program | str) -> None:
