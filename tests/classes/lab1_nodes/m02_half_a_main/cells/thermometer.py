@@ -14,7 +14,7 @@ class Thermometer(Node):
         self.create_timer(0.1, self.measure)
 
     def measure(self):
-        self.publisher.publish(Temperature(temperature=random.uniform(10, 40)))
+        self.publisher.publish(Temperature(temperature=random.uniform(-15, 65)))
 
 
 def main():

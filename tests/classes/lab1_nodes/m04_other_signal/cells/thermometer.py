@@ -16,7 +16,7 @@ class Thermometer(Node):
     value = 15.0
 
     def next(self):
-        self.value += 0.25
+        self.value += 0.05
         return self.value
 
     def measure(self):

@@ -18,11 +18,11 @@ class AddClient(Node):
 
 def ask(node):
     """Ask for the sum, log what came of it, and return the exit status."""
-    if not node.client.wait_for_service(timeout_sec=5.0):
+    if not node.client.wait_for_service(timeout_sec=4.0):
         node.get_logger().error("no server")
         return 1
     future = node.client.call_async(BasicTypes.Request(int32_value=node.a, int64_value=node.b))
-    rclpy.spin_until_future_complete(node, future, timeout_sec=0.5)
+    rclpy.spin_until_future_complete(node, future, timeout_sec=0.2)
     if not future.done():
         node.get_logger().error("no answer")
         return 2

@@ -16,7 +16,7 @@ class LongTimer(Node):
         self.numbers = itertools.count(1)  # the runs are numbered, so that they can be told apart
         self.activity = self.create_publisher(String, "activity", 10)
         self.create_timer(
-            0.2, self.tick, callback_group=ReentrantCallbackGroup()
+            0.04, self.tick, callback_group=ReentrantCallbackGroup()
         )
 
     def tick(self):

@@ -18,7 +18,7 @@ class Heartbeat(Node):
         self.activity = self.create_publisher(String, "activity", 10)
         period = self.get_parameter("heartbeat_period").value
         self.slow_group = MutuallyExclusiveCallbackGroup()
-        self.create_timer(0.1, self.beat)
+        self.create_timer(0.02, self.beat)
         self.create_timer(1.5 * self.work, self.slow, callback_group=self.slow_group)
 
     def beat(self):

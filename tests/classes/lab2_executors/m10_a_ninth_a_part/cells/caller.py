@@ -13,7 +13,7 @@ class Caller(Node):
         self.count = 0
         self.ticks = self.create_publisher(Int64, "ticks", 10)
         self.reply = self.create_publisher(String, "reply", 10)
-        self.create_timer(0.1, self.tick)
+        self.create_timer(0.02, self.tick)
         self.create_subscription(Empty, "request", self.on_request, 10)
         self.gate = self.create_client(Trigger, "gate")
 

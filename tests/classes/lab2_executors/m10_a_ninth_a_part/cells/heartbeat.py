@@ -19,7 +19,7 @@ class Heartbeat(Node):
         period = self.get_parameter("heartbeat_period").value
         self.slow_group = MutuallyExclusiveCallbackGroup()
         self.create_timer(period, self.beat)
-        self.create_timer(0.0, self.slow, callback_group=self.slow_group)
+        self.create_timer(3 * self.work, self.slow, callback_group=self.slow_group)
 
     def beat(self):
         self.count += 1

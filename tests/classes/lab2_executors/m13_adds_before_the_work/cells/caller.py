@@ -11,11 +11,11 @@ class Caller(Node):
         super().__init__("caller")
         self.declare_parameter("tick_period", 0.1)  # seconds
         self.count = 0
-        self.replied = False
+        self.asked = False
         self.ticks = self.create_publisher(Int64, "ticks", 10)
         self.reply = self.create_publisher(String, "reply", 10)
         self.create_timer(self.get_parameter("tick_period").value, self.tick)
-        self.requests = self.create_subscription(Empty, "request", self.on_request, 10)
+        self.create_subscription(Empty, "request", self.on_request, 10)
         self.gate = self.create_client(Trigger, "gate")
 
     def tick(self):
@@ -23,22 +23,19 @@ class Caller(Node):
         self.ticks.publish(Int64(data=self.count))
 
     def on_request(self, _):
-        """Ask the gate; publish the message of its response on `reply`."""
+        if self.asked:
+            return
+        self.asked = True
         future = self.gate.call_async(Trigger.Request())
         future.add_done_callback(self.on_response)
 
     def on_response(self, future):
-        self.replied = True
         self.reply.publish(String(data=future.result().message))
 
 
 def spin(node):
     """Run the node's callbacks until the program is told to end."""
-    while rclpy.ok():
-        rclpy.spin_once(node)
-        if node.replied:
-            node.destroy_subscription(node.requests)
-            node.replied = False
+    rclpy.spin(node)
 
 
 def main():

@@ -24,14 +24,16 @@ def main():
     rclpy.init()
     node = TwoMutex()
     period, work = node.get_parameter("period").value, node.get_parameter("work").value
+    due = time.monotonic()
     try:
         while rclpy.ok():
             for number in "12":
+                due += period / 2
                 node.say(f"a{number} begin", f"b{number} begin")
                 rclpy.spin_once(node, timeout_sec=0)
                 time.sleep(work)
                 node.say(f"a{number} end", f"b{number} end")
-                time.sleep(period / 2 - work)
+                time.sleep(max(0.0, due - time.monotonic()))
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
     finally:
