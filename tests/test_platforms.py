@@ -233,7 +233,153 @@ def test_zips_with_a_notebook_each_are_a_class(
 def test_a_name_that_leaves_nothing_of_the_student_is_refused_and_stops_nobody_else(tmp_path: Path) -> None:
     collected = collect(lay_out({"toy_.ipynb": "?", "toy_ann.ipynb": "ann"}, tmp_path, False), toy.LAB, tmp_path / "c")
     assert texts(collected) == {"ann": "ann"}
-    assert "'' cannot be a student's name" in collected.refused[0]
+    assert "without a student's name was left out" in collected.refused[0]
+
+
+@pytest.mark.parametrize("zipped", [False, True], ids=["folder", "zip"])
+def test_every_name_is_taken_and_two_names_stay_two(tmp_path: Path, zipped: bool) -> None:
+    names = ["Robert Downey Jr.", "'Amr", "Jane & Bob", "Jane ; Bob", "\N{GRINNING FACE}"]
+    collected = collect(lay_out({f"{name}/toy.ipynb": name for name in names}, tmp_path, zipped), toy.LAB, tmp_path)
+    assert sorted(texts(collected).values()) == sorted(names) and not collected.refused
+    assert "'Amr" in collected.notebooks and len(collected.notes) == len(names) - 1
+
+
+WRAPPED = {
+    "a folder around all": {"all/ann/toy.ipynb": "a", "all/bob/toy.ipynb": "b", "readme.txt": ""},
+    "two folders around all": {"2026/all/ann/toy.ipynb": "a", "2026/all/bob/toy.ipynb": "b", "readme.txt": ""},
+    "folders inside": {"ann/work/toy.ipynb": "a", "bob/toy.ipynb": "b", "readme.txt": ""},
+    "files and folders": {"toy_ann.ipynb": "a", "bob/toy.ipynb": "b", "readme.txt": ""},
+    "the kit's own folders": {
+        "ann/ros2-labs/labs/toy/toy.ipynb": "a",
+        "bob/ros2-labs/labs/toy/toy.ipynb": "b",
+        "readme.txt": "",
+    },
+}
+
+
+@pytest.mark.parametrize("zipped", [False, True], ids=["folder", "zip"])
+@pytest.mark.parametrize("files", WRAPPED.values(), ids=WRAPPED)
+def test_folders_around_a_class_or_a_notebook_do_no_harm(tmp_path: Path, files: dict[str, str], zipped: bool) -> None:
+    collected = collect(lay_out(files, tmp_path, zipped), toy.LAB, tmp_path / "course")
+    assert texts(collected) == {"ann": "a", "bob": "b"}
+    assert len(collected.refused) == 1 and "'readme.txt'" in collected.refused[0]
+
+
+def zip_with(files: Mapping[str, str | bytes]) -> bytes:
+    content = io.BytesIO()
+    with zipfile.ZipFile(content, "w") as archive:
+        for name, text in files.items():
+            archive.writestr(name, text)
+    return content.getvalue()
+
+
+@pytest.mark.parametrize("zipped", [False, True], ids=["folder", "zip"])
+def test_a_students_zip_in_the_zip_of_a_class_that_lies_in_a_folder_is_read(tmp_path: Path, zipped: bool) -> None:
+    upload = zip_with({"labs/toy/toy.ipynb": "jm", "submitted/eve/toy/toy.ipynb": "not a class"})
+    inner = {"Jane Doe_501_assignsubmission_file_/toy.ipynb": "jd", "Jo_502_assignsubmission_file_/all.zip": upload}
+    collected = collect(lay_out({"download.zip": zip_with(inner)}, tmp_path, zipped), toy.LAB, tmp_path / "course")
+    assert (collected.format, texts(collected)["Jane Doe"]) == ("Moodle", "jd")
+    assert collected.notebooks.keys() == {"Jane Doe", "Jo"}
+
+
+def test_a_zip_of_zips_in_a_folder_is_a_class(tmp_path: Path) -> None:
+    inner = {"ann.zip": zip_of("a"), "bob.zip": zip_of("b")}
+    collected = collect(lay_out({"all.zip": zip_with(inner)}, tmp_path, False), toy.LAB, tmp_path / "course")
+    assert texts(collected) == {"ann": "a", "bob": "b"} and not collected.refused
+
+
+INCOMPLETE: dict[str, tuple[dict[str, str], dict[str, str], list[str]]] = {
+    # name: (files, notebooks, what is said about what was left out)
+    "Moodle's files without folders": (
+        {"Jane Doe_501_assignsubmission_file_toy.ipynb": "jd", "Jo_502_assignsubmission_file_mine.ipynb": "jo",
+         "Jo_502_assignsubmission_onlinetext.html": "", "Cem_503_assignsubmission_file_a.pdf": ""},
+        {"Jane Doe": "jd", "Jo": "jo"}, ["Cem handed in no notebook"],
+    ),
+    "two notebooks of other names": (
+        {"Jane_501_assignsubmission_file_/a.ipynb": "", "Jane_501_assignsubmission_file_/b.ipynb": "",
+         "Jo_502_assignsubmission_file_/toy (1).ipynb": "jo", "Jo_502_assignsubmission_file_/old.ipynb": "old"},
+        {"Jo": "jo"}, ["Jane handed in 'a.ipynb' and 'b.ipynb', none called toy.ipynb"],
+    ),
+    "a second file in Canvas": (
+        {"doe_1_10_toy.ipynb": "jd", "doe_1_11_scratch.ipynb": "no", "roe_2_12_toy.ipynb": "jr"},
+        {"doe": "jd", "roe": "jr"}, [],
+    ),
+    "a user name with a line in Blackboard": (
+        {"Lab_2_a_doe_attempt_2026-11-19-10-00-00_toy.ipynb": "ad", "Lab_2_bob_attempt_2026-11-19-10-00-00.txt": "",
+         "Lab_2_b_doe_attempt_2026-11-19-10-00-00_toy.ipynb": "bd"},
+        {"a_doe": "ad", "b_doe": "bd"}, ["bob handed in no notebook"],
+    ),
+    "a group in Gradescope": (
+        {"submission_metadata.yml": """submission_1:
+  :submitters: [{":name": Ann}, {":name": Bob}]
+submission_2:
+  :submitters: [{":name": Cem}]
+""", "submission_1/toy.ipynb": "ab", "submission_2/a.pdf": "", "submission_3/toy.ipynb": "?"},
+        {"Ann": "ab", "Bob": "ab"}, ["Cem handed in no notebook", "submission_3 is of nobody"],
+    ),
+    "repositories without a notebook": (
+        {"toy-ann/labs/toy/toy.ipynb": "a", "toy-bob/labs/toy/toy.ipynb": "b", "toy-cem/README.md": "",
+         "toy-dan/labs/toy/mine.ipynb": "d"},
+        {"ann": "a", "bob": "b", "dan": "d"}, ["toy-cem holds no notebook of toy"],
+    ),
+    "nbgrader's folders": (
+        {"submitted/ann/toy/toy.ipynb": "a", "submitted/bob/toy/mine.ipynb": "b", "submitted/cem/toy/a.pdf": "",
+         "submitted/dan/other/other.ipynb": ""},
+        {"ann": "a", "bob": "b"}, ["cem handed in no notebook"],
+    ),
+    "files": (
+        {"ann.ipynb": "a", "bob.pdf": "", "toy.ipynb": "", "roster.csv": "id"},
+        {"ann": "a"}, ["'bob.pdf' is no student's notebook", "'toy.ipynb' is no student's notebook"],
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("files, taken, said", INCOMPLETE.values(), ids=INCOMPLETE)
+def test_whatever_has_no_notebook_is_named(
+    tmp_path: Path, files: dict[str, str], taken: dict[str, str], said: list[str]
+) -> None:
+    collected = collect(lay_out(files, tmp_path, True), toy.LAB, tmp_path / "course")
+    assert texts(collected) == taken and len(collected.refused) == len(said)
+    for words in said:
+        assert any(words in sentence for sentence in collected.refused)
+
+
+AS_EXCEL = ROSTER.replace('"Doe, Jane"', "Jane Doe")
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        AS_EXCEL.encode("utf-8-sig"),
+        AS_EXCEL.replace(",", ";").encode("cp1252"),
+        AS_EXCEL.replace(",", "\t").replace("\n", "\r\n").encode("utf-16"),
+        b"\n" + AS_EXCEL.encode(),
+    ],
+    ids=["mark", "semicolons", "tabs", "empty line"],
+)
+def test_a_roster_is_read_as_spreadsheets_write_it(tmp_path: Path, content: bytes) -> None:
+    (tmp_path / "roster.csv").write_bytes(content)
+    names = {"Jane Doe/toy.ipynb": "jd", "Jürgen Müller/toy.ipynb": "jm"}
+    collected = collect(lay_out(names, tmp_path, True), toy.LAB, tmp_path)
+    assert texts(collected) == {"jd01": "jd", "mm02": "jm"} and not collected.notes
+
+
+def test_an_id_means_its_student_whatever_others_are_called(tmp_path: Path) -> None:
+    roster = "id,name,section,github\njane,Jane Roe,x,jroe\njd01,Jane Doe,bob,jane\nmm-2,Jo,x,jo-an\n"
+    (tmp_path / "roster.csv").write_text(roster)
+    names = {f"{name}/toy.ipynb": name for name in ("jane", "bob", "garcia")}
+    collected = collect(lay_out(names, tmp_path, True), toy.LAB, tmp_path)
+    assert collected.notebooks.keys() == {"jane", "bob", "garcia"} and len(collected.notes) == 2
+    (tmp_path / "repositories").mkdir()
+    files = {"toy-jo-an/labs/toy/toy.ipynb": "jo", "toy-jo-b/labs/toy/toy.ipynb": "?"}
+    collected = collect(lay_out(files, tmp_path / "repositories", True), toy.LAB, tmp_path)
+    assert texts(collected) == {"mm-2": "jo"} and len(collected.refused) == 1
+
+
+def test_canvas_names_are_found_with_and_without_accents(tmp_path: Path) -> None:
+    (tmp_path / "roster.csv").write_text("id,name\nmg,María José García\nbm,Bob Müller\n", encoding="utf-8")
+    files = {"garciamariajose_1_2_toy.ipynb": "mg", "müllerbob_3_4_toy.ipynb": "bm"}
+    assert texts(collect(lay_out(files, tmp_path, False), toy.LAB, tmp_path)) == {"mg": "mg", "bm": "bm"}
 
 
 def test_two_folders_of_one_student_in_the_roster_do_not_replace_each_other_unsaid(tmp_path: Path) -> None:
@@ -262,7 +408,16 @@ def test_nobody_gets_a_zero_for_what_was_not_understood(tmp_path: Path, zipped: 
     assert "holds 2 notebooks" in told and "'report.pdf' and no notebook" in told and len(collected.refused) == 2
 
 
-@pytest.mark.parametrize("text, words", [("name\nJane", "has no `id`"), ("id\na\na\n", "twice"), ("\xff", "UTF-8")])
+@pytest.mark.parametrize(
+    "text, words",
+    [
+        ("name\nJane", "no column `id`; its first line is 'name'"),
+        ("id\na\na\n", "twice"),
+        ("\x81", "UTF-8"),
+        ("id,name\n", "nobody"),
+        ("id,a\n,b\n", "Line 2"),
+    ],
+)
 def test_a_roster_that_is_none_is_a_sentence(tmp_path: Path, text: str, words: str) -> None:
     course = tmp_path / "course"
     course.mkdir()

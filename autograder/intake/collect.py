@@ -10,7 +10,6 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import os
-import re
 import unicodedata
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -19,7 +18,9 @@ from pathlib import Path
 from autograder.core.errors import KitError
 from autograder.core.files import read_plain, write_beside
 from autograder.course.paths import CoursePaths
-from autograder.intake.formats import Claim, recognise
+from autograder.intake.claims import Claim
+from autograder.intake.formats import recognise
+from autograder.intake.latest import latest
 from autograder.intake.members import members
 from autograder.intake.plain_class import HandedIn, plain_class
 from autograder.intake.record import Taken, keep_class
@@ -27,6 +28,9 @@ from autograder.intake.roster import FILE_NAME, Roster, read_roster
 from autograder.submission import exchange_secret, timestamp
 from autograder.submission.notebook_file import NOTEBOOK_BYTES
 
+_NOT_FIRST = " .@+-,()"
+"""To a shell, a spreadsheet or a listing these mean something at the beginning of a name."""
+_NOT_LAST = " ."
 _NAME_BYTES = 120
 """A longer name is shortened: a gradebook takes 128 characters, a file's name 255 bytes with what is put around it."""
 
@@ -80,15 +84,15 @@ def collect(source: Path, lab: str, root: Path) -> Collected:
     taken: dict[str, Taken] = {}
     for folder, handed_in in sorted(found.items(), key=lambda item: item[0]):
         student = _student(folder)
-        if student is None:
-            collected.refused.append(f"The folder {folder[:80]!r} cannot be a student's name; it was left out.")
+        if not student:
+            collected.refused.append("A submission without a student's name was left out.")
             continue
         if student in owners:
             collected.refused.append(_twice(owners[student], folder))
             continue
         owners[student] = folder
         if student != unicodedata.normalize("NFC", folder):
-            collected.notes.append(f"The name {folder[:80]!r} is too long; the student is called {student!r} here.")
+            collected.notes.append(f"{folder[:80]!r} cannot be a file's name here; the student is called {student!r}.")
         path = paths.submitted_notebook(student, lab)
         # An unchanged file keeps its time: nbgrader and people can see that nothing new was handed in.
         if _read(paths.submitted, [student, lab, path.name]) != handed_in.notebook:
@@ -133,7 +137,11 @@ def _of_platform(source: Path, lab: str, roster: Roster | None, collected: Colle
             by_student.setdefault(student, []).append(claim)
     found: dict[str, HandedIn] = {}
     for student, claims in by_student.items():
-        *earlier, last = sorted(claims, key=lambda claim: claim.turn)
+        last = latest(claims, lab)
+        if last is None:
+            names = " and ".join(sorted(repr(claim.member.name[:100]) for claim in claims)[:2])
+            collected.refused.append(f"{student} handed in {names}, none called {lab}.ipynb; it was left out.")
+            continue
         try:
             content = last.member.read(NOTEBOOK_BYTES + 1)
         except Exception as error:  # each way of packing fails in its own way; the class goes on
@@ -144,8 +152,9 @@ def _of_platform(source: Path, lab: str, roster: Roster | None, collected: Colle
         found[student] = HandedIn(
             content, last.handed_in.encode(), last.secret, "/".join(last.member.path), last.owner, last.late
         )
-        for claim in earlier:
-            collected.notes.append(f"{student}: {last.member.name[:100]!r} replaces {claim.member.name[:100]!r}.")
+        for claim in claims:
+            if claim is not last:
+                collected.notes.append(f"{student}: {last.member.name[:100]!r} replaces {claim.member.name[:100]!r}.")
         if last.late:
             collected.notes.append(f"{student}: {recognised.format} has marked it as late.")
     return found
@@ -189,24 +198,28 @@ def _keep(submitted: Path, parts: Sequence[str], text: str) -> None:
         write_beside(path, text)
 
 
-def _student(folder: str) -> str | None:
-    """The name by which a student is known here; None if the folder's name cannot be made one.
+def _student(given: str) -> str:
+    """The name by which a student is known here, which files and pages can have; empty if nothing was given.
 
-    Accents are joined to their letters: a Mac writes `José` with two characters where other systems write one. A long
-    name is cut and made different again by a digest of the whole.
+    Accents are joined to their letters: a Mac writes `José` with two characters where other systems write one. A name
+    that is long, or has characters that would mean something to a program, is made different from all others by a
+    digest of the whole.
     """
-    name = unicodedata.normalize("NFC", folder)
-    if not all(_in_names(character) for character in name) or not re.match(r"\w", name) or name[-1] in " .":
-        return None
-    if len(os.fsencode(name)) <= _NAME_BYTES:
+    name = unicodedata.normalize("NFC", given)
+    plain = "".join(character if _in_names(character) else "_" for character in name)
+    if plain[:1] in _NOT_FIRST:
+        plain = f"_{plain[1:]}"
+    if plain[-1:] in _NOT_LAST:
+        plain = f"{plain[:-1]}_"
+    if not name or (plain == name and len(os.fsencode(name)) <= _NAME_BYTES):
         return name
-    digest = hashlib.sha256(name.encode("utf-8")).hexdigest()[:8]
-    return f"{name.encode()[: _NAME_BYTES - 9].decode('utf-8', 'ignore').rstrip(' .')}-{digest}"
+    digest = hashlib.sha256(name.encode("utf-8", "surrogatepass")).hexdigest()[:8]
+    return f"{plain.encode()[: _NAME_BYTES - 9].decode('utf-8', 'ignore').rstrip(_NOT_LAST)}-{digest}"
 
 
 def _in_names(character: str) -> bool:
     """Letters and digits of any script with their marks, and what stands between the parts of names."""
-    return unicodedata.category(character)[0] in "LMN" or character in "_ .@+-,'\u2019()"
+    return unicodedata.category(character)[0] in "LMN" or character in "_ .@+-,'\u2018\u2019()"
 
 
 def _read(folder: Path, parts: Sequence[str]) -> bytes | None:

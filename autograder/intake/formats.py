@@ -6,68 +6,37 @@ which of several submissions of one student is the last. Sources: the platforms'
 
 from __future__ import annotations
 
-import contextlib
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Any
 
 import yaml
 
-from autograder.intake.members import Member
-from autograder.submission import exchange_secret, timestamp
+from autograder.intake import nbgrader_folders
+from autograder.intake.claims import Claim, Recognised, nothing_from
+from autograder.intake.members import Member, is_notebook
+from autograder.intake.roster import FILE_NAME as ROSTER
 from autograder.submission.timestamp import moment
 
 _METADATA_BYTES = 8 * 1024 * 1024
 
 
-@dataclass(frozen=True)
-class Claim:
-    """A notebook that somebody handed in."""
-
-    member: Member
-    owner: Mapping[str, str]
-    """What the platform calls the student, by kind: `name`, `email`, `id`, `canvas_id`, `moodle_id`, `github`."""
-    turn: tuple[Any, ...] = ()
-    """Of two of one student, the greater one is the later."""
-    handed_in: str = ""
-    """Date and time, as nbgrader reads them; empty if nothing says so."""
-    late: bool = False
-    """The platform has marked it as late."""
-    secret: str = ""
-    """By what nbgrader's exchange knows the feedback on it; empty if it did not come from there."""
-
-
-@dataclass
-class Recognised:
-    """What a format makes of the files."""
-
-    format: str
-    claims: list[Claim] = field(default_factory=list)
-    strange: list[str] = field(default_factory=list)
-    """Sentences about what was recognised and holds no notebook."""
-
-
 _CANVAS = re.compile(r"(?P<name>[^_]+)(?P<late>_LATE)?_(?P<user>\d+)_(?P<number>\d+)_(?P<file>.+)", re.IGNORECASE)
 """`doejane_LATE_12345_678910_lab2_executors-1.ipynb`: who, the user, the upload, and the file as it was called."""
-_MOODLE = re.compile(r"(?P<name>.+)_(?P<id>\d+)_assignsubmission_(?P<kind>\w+?)_?")
-"""The folder `Jane Doe_12345_assignsubmission_file_`."""
-_BLACKBOARD = re.compile(r".+?_(?P<user>[^_]+)_attempt_(?P<when>\d{4}(?:-\d\d){5})(?:_(?P<file>.+)|\.txt)")
+_MOODLE = re.compile(r"(?P<name>.+)_(?P<id>\d+)_assignsubmission_[a-z]+(?:_(?P<file>.*))?")
+"""The folder `Jane Doe_12345_assignsubmission_file_`, or the beginning of a file's name: Moodle offers both."""
+_BLACKBOARD = re.compile(r"(?P<head>.+?_(?P<user>[^_]+))_attempt_(?P<when>\d{4}(?:-\d\d){5})(?:_(?P<file>.+)|\.txt)")
 """`Lab 2_jdoe_attempt_2026-11-20-18-30-00_lab2_executors.ipynb`, and a text with the same beginning."""
-_INBOUND = re.compile(r"(?P<student>.+?)\+(?P<lab>[^+]+)\+(?P<when>\d{4}-\d\d-\d\d \d\d:\d\d:\d\d(\.\d+)?[^+]*)(\+.+)?")
-"""nbgrader's exchange: `inbound/jane+lab2_executors+2026-11-20 18:30:00.123456 UTC+Hc2x`. What stands behind the time
-keeps others from guessing the folder's name, and may be switched off; it says nothing about the student."""
 _SUBMISSION = re.compile(r"submission_(?P<number>\d+)")
 """Gradescope's folders; whose they are stands in `submission_metadata.yml`."""
 
 
-def _is_notebook(member: Member) -> bool:
-    return member.name.lower().endswith(".ipynb")
-
-
 def _given_out(member: Member, form: re.Pattern[str]) -> re.Match[str] | None:
-    """What a platform calls a file, or else the zip that it lies in; None if neither name is of the form."""
-    return form.fullmatch(member.name) or form.fullmatch(member.zip)
+    """What a platform calls a file, or else a zip that it lies in; None if no name is of the form."""
+    return next(filter(None, map(form.fullmatch, (member.name, *member.zips))), None)
+
+
+def _called(member: Member, match: re.Match[str]) -> str:
+    return match["file"] or member.name if match.string == member.name else member.name
 
 
 def canvas(files: Sequence[Member], lab: str) -> Recognised:
@@ -77,11 +46,11 @@ def canvas(files: Sequence[Member], lab: str) -> Recognised:
     others: dict[str, str] = {}
     for member in files:
         match = _given_out(member, _CANVAS)
-        if match and _is_notebook(member):
+        if match and is_notebook(member.name):
             with_notebook.add(match.string)
             owner = {"canvas": match["name"], "canvas_id": match["user"]}
             turn = (int(match["number"]), member.name == f"{lab}.ipynb", member.path)
-            found.claims.append(Claim(member, owner, turn, late=bool(match["late"])))
+            found.claims.append(Claim(member, owner, _called(member, match), turn=turn, late=bool(match["late"])))
         elif match:
             others.setdefault(match.string, match["name"])
     found.strange += _no_notebooks(others, with_notebook)
@@ -94,41 +63,43 @@ def _no_notebooks(others: Mapping[str, str], with_notebook: set[str]) -> list[st
 
 
 def moodle(files: Sequence[Member], lab: str) -> Recognised:
-    """Moodle, "Download all submissions": a folder for each student and kind of submission."""
+    """Moodle, "Download all submissions": a folder for each student and kind of submission, or files with its name."""
     found = Recognised("Moodle")
-    with_notebook: set[str] = set()
-    others: dict[str, str] = {}
+    everybody: dict[str, str] = {}
     for member in files:
-        for part in member.path[:-1]:
-            match = _MOODLE.fullmatch(part)
-            if match and _is_notebook(member):
-                with_notebook.add(match["id"])
-                exact = member.name == f"{lab}.ipynb"
-                found.claims.append(
-                    Claim(member, {"name": match["name"], "moodle_id": match["id"]}, (exact, member.path))
-                )
-            elif match:
-                others.setdefault(match["id"], match["name"])
-    found.strange += [f"{name} handed in no notebook." for key, name in others.items() if key not in with_notebook]
+        match = next(filter(None, map(_MOODLE.fullmatch, member.path)), None)
+        if match:
+            everybody.setdefault(match["id"], match["name"])
+        if match and is_notebook(member.name):
+            owner = {"name": match["name"], "moodle_id": match["id"]}
+            called = _called(member, match)
+            found.claims.append(Claim(member, owner, called, turn=(called == f"{lab}.ipynb", member.path)))
+    found.strange += nothing_from(everybody, {claim.owner["moodle_id"] for claim in found.claims})
     return found
 
 
 def blackboard(files: Sequence[Member], lab: str) -> Recognised:
     """Blackboard, "Assignment file download": one flat folder, with a text for each attempt."""
     found = Recognised("Blackboard")
+    matches = [(member, match) for member in files if (match := _given_out(member, _BLACKBOARD))]
+    heads = list({match["head"]: None for _, match in matches})
+    start = len(_common_start(heads, "_")) if len(heads) > 1 else 0  # the assignment; a user's name may have a `_`, too
     with_notebook: set[str] = set()
+    everybody: dict[str, str] = {}
     others: dict[str, str] = {}
-    for member in files:
-        match = _given_out(member, _BLACKBOARD)
-        if match and _is_notebook(member):
-            with_notebook.add(match.string)
+    for member, match in matches:
+        user = match["head"][start:] if start else match["user"]
+        everybody[user] = user
+        if is_notebook(member.name):
+            with_notebook |= {match.string, user}
             numbers = match["when"].split("-")
             when = f"{'-'.join(numbers[:3])} {':'.join(numbers[3:])}"
-            turn = (match["when"], member.name == f"{lab}.ipynb", member.path)
-            found.claims.append(Claim(member, {"id": match["user"]}, turn, when))
-        elif match and match["file"]:
-            others.setdefault(match.string, match["user"])
+            turn = (member.name == f"{lab}.ipynb", member.path)
+            found.claims.append(Claim(member, {"id": user}, _called(member, match), (match["when"],), turn, when))
+        elif match["file"]:
+            others.setdefault(match.string, user)
     found.strange += _no_notebooks(others, with_notebook)
+    found.strange += nothing_from(everybody, with_notebook | set(others.values()))
     return found
 
 
@@ -139,113 +110,102 @@ def gradescope(files: Sequence[Member], lab: str) -> Recognised:
     if metadata is None:
         return found
     told = _gradescope_metadata(metadata)
+    with_notebook: set[str] = set()
     for member in files:
         folder = next((part for part in member.path[:-1] if _SUBMISSION.fullmatch(part)), "")
-        if folder and _is_notebook(member):
-            owner, when = told.get(folder, ({}, ""))
-            number = int(folder.removeprefix("submission_"))
-            found.claims.append(Claim(member, owner or {"id": folder}, (when, number), moment(when.encode()) or ""))
+        if folder in told and is_notebook(member.name):
+            with_notebook.add(folder)
+            owners, when = told[folder]
+            attempt = (when, int(folder.removeprefix("submission_")))
+            turn, handed_in = (member.name == f"{lab}.ipynb", member.path), moment(when.encode()) or ""
+            found.claims += [Claim(member, owner, member.name, attempt, turn, handed_in) for owner in owners]
+        elif folder:
+            told.setdefault(folder, ([], ""))
+    names = {folder: ", ".join(next(iter(owner.values())) for owner in told[folder][0]) or folder for folder in told}
+    found.strange += [
+        f"{name} handed in no notebook." if told[folder][0] else f"{folder} is of nobody in {metadata.name}."
+        for folder, name in names.items() if folder not in with_notebook
+    ]  # fmt: skip
     return found
 
 
-def _gradescope_metadata(member: Member) -> dict[str, tuple[dict[str, str], str]]:
-    """Of each folder, the first submitter and when it was handed in."""
+def _gradescope_metadata(member: Member) -> dict[str, tuple[list[dict[str, str]], str]]:
+    """Of each folder, who handed it in, which may be a group, and when."""
     try:
         # Ruby writes its keys as symbols, `:name:`, which YAML takes for texts that begin with a colon.
         read = yaml.safe_load(member.read(_METADATA_BYTES))
     except Exception:  # what PyYAML does not understand raises many kinds
         return {}
-    told: dict[str, tuple[dict[str, str], str]] = {}
+    told: dict[str, tuple[list[dict[str, str]], str]] = {}
     for folder, entry in (read if isinstance(read, dict) else {}).items():
         who = entry.get(":submitters") if isinstance(entry, dict) else None
-        if isinstance(who, list) and who and isinstance(who[0], dict):
+        if isinstance(who, list):
             kinds = {":name": "name", ":email": "email", ":sid": "id"}
-            owner = {kind: str(who[0][key]) for key, kind in kinds.items() if who[0].get(key)}
-            told[str(folder)] = (owner, str(entry.get(":created_at", "")))
+            group = [{kind: str(one[key]) for key, kind in kinds.items() if one.get(key)}
+                     for one in who if isinstance(one, dict)]  # fmt: skip
+            told[str(folder)] = ([owner for owner in group if owner], str(entry.get(":created_at", "")))
     return told
-
-
-def exchange(files: Sequence[Member], lab: str) -> Recognised:
-    """nbgrader's exchange, before `collect`: the folder `inbound`."""
-    found = Recognised("nbgrader's exchange")
-    secrets = _secrets(files)
-    for member in files:
-        for part in member.path[:-1]:
-            match = _INBOUND.fullmatch(part)
-            if match and match["lab"] == lab and member.name == f"{lab}.ipynb":
-                owner, when, secret = {"id": match["student"]}, match["when"], secrets.get(member.path[:-1], "")
-                found.claims.append(Claim(member, owner, (when,), when, secret=secret))
-    return found
-
-
-def submitted(files: Sequence[Member], lab: str) -> Recognised:
-    """nbgrader's `submitted` folder, or a whole course with one: `submitted/STUDENT/LAB/LAB.ipynb`."""
-    found = Recognised("nbgrader's folder submitted")
-    stamps = {member.path[:-1]: member for member in files if member.name == timestamp.FILE_NAME}
-    secrets = _secrets(files)
-    for member in files:
-        if member.path[-4:-3] == ("submitted",) and member.path[-2:] == (lab, f"{lab}.ipynb"):
-            stamp = stamps.get(member.path[:-1])
-            when = moment(_start(stamp, timestamp.MOST_BYTES)) if stamp is not None else ""
-            secret = secrets.get(member.path[:-1], "")
-            found.claims.append(Claim(member, {"id": member.path[-3]}, (), when or "", secret=secret))
-    return found
-
-
-def _secrets(files: Sequence[Member]) -> dict[tuple[str, ...], str]:
-    """What nbgrader's exchange put beside notebooks, by folder."""
-    named = [member for member in files if member.name == exchange_secret.FILE_NAME]
-    return {member.path[:-1]: exchange_secret.secret(_start(member, exchange_secret.MOST_BYTES)) for member in named}
-
-
-def _start(member: Member, most: int) -> bytes:
-    """How a file begins; nothing if it cannot be read, which in a damaged zip has many kinds."""
-    with contextlib.suppress(Exception):
-        return member.read(most)
-    return b""
 
 
 def classroom(files: Sequence[Member], lab: str) -> Recognised:
     """GitHub Classroom: a repository for each student, whose name is that of the assignment and the student's."""
     found = Recognised("GitHub Classroom")
     where = [(member, member.path.index("labs")) for member in files
-             if "labs" in member.path[1:-1] and member.path[-2:] == (lab, f"{lab}.ipynb")]  # fmt: skip
-    repositories = {member.path[at - 1]: member for member, at in where}
-    start = _common_start(list(repositories))
-    if len(repositories) > 1 and start:
-        found.claims = [Claim(member, {"github": name[len(start) :]}) for name, member in repositories.items()]
+             if "labs" in member.path[1:-1] and is_notebook(member.name)]  # fmt: skip
+    where = [(member, at) for member, at in where if member.path[at + 1 : -1] == (lab,)]
+    repositories = {member.path[:at]: member.path[at - 1] for member, at in where}
+    names = list(repositories.values())
+    start = _common_start(names, "-")
+    if len(set(names)) == len(names) > 1 and start:
+        for member, at in where:
+            turn = (member.name == f"{lab}.ipynb",)
+            found.claims.append(Claim(member, _github(member.path[at - 1], start), member.name, turn=turn))
+        folders = {path[:-1] for path in repositories}
+        others = {member.path[:at]: member.path[at - 1] for member in files
+                  for at in range(1, len(member.path)) if member.path[: at - 1] in folders}  # fmt: skip
+        found.strange = [f"{name} holds no notebook of {lab}." for path, name in others.items()
+                         if path not in repositories and name.startswith(start)]  # fmt: skip
     return found
+
+
+def _github(repository: str, start: str) -> dict[str, str]:
+    return {"github": repository[len(start) :], "repository": repository}
 
 
 def flat(files: Sequence[Member], lab: str) -> Recognised:
-    """A folder of notebooks, or of zips with one notebook each, named after the students."""
+    """A folder of notebooks named after the students."""
     found = Recognised("a folder of files")
-    notebooks = [member for member in files if _is_notebook(member)]
-    if notebooks and all(len(member.path) == 1 and member.name != f"{lab}.ipynb" for member in notebooks):
-        for member in notebooks:
-            found.claims.append(Claim(member, {"id": member.name[: -len(".ipynb")].removeprefix(f"{lab}_")}))
+    notebooks = [member for member in files if is_notebook(member.name)]
+    if all(len(member.path) == 1 for member in notebooks) and any(m.name != f"{lab}.ipynb" for m in notebooks):
+        for member in files:
+            if is_notebook(member.name) and member.name != f"{lab}.ipynb":
+                found.claims.append(Claim(member, {"id": member.name[: -len(".ipynb")].removeprefix(f"{lab}_")}))
+            elif member.name != ROSTER:
+                found.strange.append(f"{'/'.join(member.path)[:100]!r} is no student's notebook.")
     return found
 
 
-def _common_start(names: Sequence[str]) -> str:
-    """What all names begin with, up to a hyphen; empty if that is nothing, or all of one."""
+def _common_start(names: Sequence[str], end: str) -> str:
+    """What all names begin with, up to a character at which it may end; empty if that is nothing, or all of one."""
     start = names[0] if names else ""
     for name in names:
         while not name.startswith(start):
             start = start[:-1]
-    return start[: start.rfind("-") + 1]
+    return start[: start.rfind(end) + 1]
 
 
 FORMATS: tuple[Callable[[Sequence[Member], str], Recognised], ...] = (
-    gradescope, exchange, submitted, moodle, blackboard, canvas, classroom, flat,
+    gradescope, nbgrader_folders.exchange, nbgrader_folders.submitted, moodle, blackboard, canvas, classroom,
 )  # fmt: skip
-"""In the order in which they are tried: those whose names nobody else would give come first."""
+"""Those whose names nobody else would give come first; it counts where two find the same number of students."""
 
 
 def recognise(files: Sequence[Member], lab: str) -> Recognised | None:
-    """Return what the first fitting format makes of the files; None if none fits: then it is a plain class."""
-    for read in FORMATS:
-        found = read(files, lab)
-        if found.claims:
-            return found
-    return None
+    """Return what a format makes of the files; None if none fits: then it is a plain class.
+
+    Of several that fit, the one that finds most students counts: what a student packed may look like a format, too.
+    """
+    found = [read(files, lab) for read in FORMATS]
+    best = max(found, key=lambda one: len({tuple(claim.owner.items()) for claim in one.claims}))
+    best = best if best.claims else flat(files, lab)
+    return best if best.claims else None

@@ -7,7 +7,8 @@ import os
 import stat
 import zipfile
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path, PurePosixPath
 
 from autograder.core.files import read_plain
@@ -18,6 +19,8 @@ _DEPTH = 8
 """Folders inside each other that are looked into; a wrapper, a repository and its folders are five."""
 _ZIP_BYTES = 64 * 1024 * 1024
 """The largest zip inside another, in bytes; one student's repository."""
+_ZIPS = 3
+"""Zips inside each other that are looked into: a class in a folder's zip, a student's, and what they packed."""
 PACKERS = (".", "__MACOSX")
 """What the names of folders and files begin with that a system or a packer made."""
 
@@ -30,8 +33,8 @@ class Member:
     """From the source on; a zip inside is a folder of its name without `.zip`."""
     read: Callable[[int], bytes]
     """At most so many bytes of it. Raises OSError, or what a damaged zip raises."""
-    zip: str = ""
-    """The name, without `.zip`, of the zip inside the source that it lies in; empty if it lies in none."""
+    zips: tuple[str, ...] = ()
+    """The names, without `.zip`, of the zips inside the source that it lies in, the outermost first."""
 
     @property
     def name(self) -> str:
@@ -46,16 +49,21 @@ def members(source: Path) -> list[Member]:
         zipfile.BadZipFile: the source is a zip that cannot be read, or one of those errors that zipfile has besides.
     """
     found: list[Member] = []
-    listing = _of_folder(source, ()) if source.is_dir() else in_zip(zipfile.ZipFile(source), [])
+    listing = in_folder(source, ()) if source.is_dir() else in_zip(zipfile.ZipFile(source), [])
     for member in listing:
         if len(found) >= MOST:
             break
-        inside = unpacked(member) if is_zip(member.name) else []
-        found += inside or [member]
+        found += unpacked(member) or [member]
     return found[:MOST]
 
 
-def _of_folder(source: Path, parts: tuple[str, ...]) -> Iterator[Member]:
+def in_folder(source: Path, parts: tuple[str, ...]) -> Iterator[Member]:
+    """Give the files of a folder, with those below it.
+
+    Args:
+        source: from which paths count.
+        parts: the folder's path in it.
+    """
     folder = source.joinpath(*parts)
     try:
         entries = sorted(os.scandir(folder), key=lambda entry: entry.name)
@@ -67,7 +75,7 @@ def _of_folder(source: Path, parts: tuple[str, ...]) -> Iterator[Member]:
             continue
         if entry.is_dir(follow_symlinks=False):
             if len(path) < _DEPTH:
-                yield from _of_folder(source, path)
+                yield from in_folder(source, path)
         elif entry.is_file(follow_symlinks=False):
             yield Member(path, lambda most, path=path: read_plain(source, path, most))  # type: ignore[misc]
 
@@ -110,14 +118,43 @@ def is_zip(name: str) -> bool:
     return name.lower().endswith(".zip")
 
 
+def is_notebook(name: str) -> bool:
+    """Whether a file is a notebook by its name."""
+    return name.lower().endswith(".ipynb")
+
+
 def unpacked(member: Member) -> list[Member]:
-    """Return the files of a zip inside; none if it is no zip, or too large."""
+    """Return the files of a zip inside, and of zips in that; none if it is no zip, or too large.
+
+    What a zip holds is read out of it anew for each file that is wanted: large zips do not fill the memory.
+    """
+    return _held(member, member, _ZIPS)
+
+
+def _held(zipped: Member, now: Member, depth: int) -> list[Member]:
+    """The files of a zip, which is `now` in an archive that is open, and `zipped` when that is closed again."""
+    if not is_zip(zipped.name) or not depth:
+        return []
+    name = zipped.name[: -len(".zip")]
+    above = (*zipped.path[:-1], name)
+
+    def read_again(path: tuple[str, ...], most: int) -> bytes:
+        return next(again for again in in_zip(_opened(zipped), [], above) if again.path == path).read(most)
+
+    files: list[Member] = []
     try:
-        content = member.read(_ZIP_BYTES + 1)
-        if len(content) > _ZIP_BYTES:
-            return []
-        name = member.name[: -len(".zip")]
-        files = in_zip(zipfile.ZipFile(io.BytesIO(content)), [], (*member.path[:-1], name))
-        return [replace(file, zip=name) for file in files]
+        for file in in_zip(_opened(now), [], above):
+            later = Member(file.path, partial(read_again, file.path), (*zipped.zips, name))
+            files += _held(later, file, depth - 1) or [later]
+            if len(files) >= MOST:
+                break
     except Exception:  # a damaged zip raises many kinds; it is then a file as any other
         return []
+    return files[:MOST]
+
+
+def _opened(member: Member) -> zipfile.ZipFile:
+    content = member.read(_ZIP_BYTES + 1)
+    if len(content) > _ZIP_BYTES:
+        raise OSError("it is too large")
+    return zipfile.ZipFile(io.BytesIO(content))

@@ -10,7 +10,9 @@ from pathlib import Path
 
 from autograder.core.errors import KitError
 from autograder.core.files import read_plain
-from autograder.intake.members import MOST, PACKERS, Member, in_zip, is_zip, members, unpacked
+from autograder.intake.members import MOST, Member, in_folder, in_zip, is_notebook, is_zip, members, unpacked
+from autograder.intake.roster import FILE_NAME as ROSTER
+from autograder.intake.wrappers import beside_all, unwrapped, visible, wrapper
 from autograder.submission import exchange_secret, timestamp
 from autograder.submission.notebook_file import NOTEBOOK_BYTES
 
@@ -49,34 +51,38 @@ def plain_class(source: Path, lab: str, refused: list[str]) -> dict[str, HandedI
     Raises:
         KitError: it is neither, or no class.
     """
+    source = unwrapped(source, lab, refused)
     return (_from_folder if source.is_dir() else _from_zip)(source, lab, refused)
 
 
 def _from_folder(source: Path, lab: str, refused: list[str]) -> dict[str, HandedIn]:
     found: dict[str, HandedIn] = {}
-    for entry in sorted(source.iterdir()):
-        if entry.name.startswith(PACKERS):
-            continue
-        if entry.is_symlink():
-            refused.append(f"{_shown(entry)} is a link; links are not followed, so it was left out.")
-        elif entry.is_file() and is_zip(entry.name):
-            try:
-                notebook = _notebook_in_zip(_files_of(entry), lab)
-            except _NotUnderstood as reason:
-                refused.append(f"{_shown(entry)} {reason}; it was left out.")
-                continue
-            if entry.stem in found:
+    for entry in visible(source):
+        student = _owner(entry.name, lab) if entry.is_file() else entry.name
+        try:
+            if entry.is_symlink():
+                refused.append(f"{_shown(entry)} is a link; links are not followed, so it was left out.")
+            elif student in found:
                 refused.append(f"{_shown(entry)} and another entry mean the same student; it was left out.")
-            else:
-                found[entry.stem] = HandedIn(notebook)
-        elif entry.is_dir():
-            try:
-                found[entry.name] = _handed_in(source, entry.name, lab)
-            except OSError as error:  # such as a folder that may not be entered: the class goes on
-                refused.append(f"{_shown(entry)} cannot be read ({error.strerror}); it was left out.")
-            except _NotUnderstood as reason:
-                refused.append(f"{_shown(entry)} {reason}; it was left out.")
+            elif entry.is_dir():
+                found[student] = _handed_in(source, student, lab)
+            elif student and is_zip(entry.name):
+                found[student] = HandedIn(_notebook_in_zip(_files_of(entry), lab))
+            elif student:
+                found[student] = HandedIn(read_plain(source, [entry.name], NOTEBOOK_BYTES + 1))
+            elif entry.name != ROSTER:
+                refused.append(beside_all(entry.name))
+        except OSError as error:  # such as a folder that may not be entered: the class goes on
+            refused.append(f"{_shown(entry)} cannot be read ({error.strerror}); it was left out.")
+        except _NotUnderstood as reason:
+            refused.append(f"{_shown(entry)} {reason}; it was left out.")
     return found
+
+
+def _owner(file: str, lab: str) -> str:
+    """The student after whom a notebook or a zip is named; empty if it is neither, or has the lab's name."""
+    stem = file.rpartition(".")[0]
+    return stem.removeprefix(f"{lab}_") if is_zip(file) or (is_notebook(file) and stem != lab) else ""
 
 
 def _shown(path: Path) -> str:
@@ -97,6 +103,9 @@ def _notebook_in(source: Path, student: str, lab: str) -> bytes:
         paths.append((lab, f"{lab}.ipynb"))  # reading it says what is in the way
     elif inner.is_dir():
         paths += [(lab, path.name) for path in sorted(inner.iterdir())]
+    for deeper in visible(folder):
+        if deeper != inner and deeper.is_dir() and not deeper.is_symlink():
+            paths += [member.path[1:] for member in in_folder(source, (student, deeper.name))]
     chosen = _choose(paths, lab)
     return read_plain(source, [student, *chosen], NOTEBOOK_BYTES + 1) if chosen else b""
 
@@ -124,7 +133,7 @@ def _notebook_in_zip(held: Sequence[Member], lab: str) -> bytes:
         if next(iter(files))[0] == lab:
             break
         files = {parts[1:]: member for parts, member in files.items()}
-    chosen = _choose([parts for parts in files if len(parts) == 1 or parts[:-1] == (lab,)], lab)
+    chosen = _choose(list(files), lab)
     return _read(files[chosen]) if chosen else b""
 
 
@@ -137,13 +146,15 @@ def _choose(paths: Sequence[tuple[str, ...]], lab: str) -> tuple[str, ...]:
     for exact in ((f"{lab}.ipynb",), (lab, f"{lab}.ipynb")):
         if exact in paths:
             return exact
-    notebooks = [path for path in paths if path[-1].casefold().endswith(".ipynb")]
-    notebooks = [path for path in notebooks if len(path) == 1] or notebooks
+    notebooks = [path for path in paths if is_notebook(path[-1])]
+    at_top, in_lab = ([path for path in notebooks if path[:-1] == place] for place in ((), (lab,)))
+    notebooks = at_top or in_lab or notebooks
     named = [path for path in notebooks if path[-1].casefold() == f"{lab}.ipynb".casefold()]
     if len(named) == 1 or len(notebooks) == 1:
         return (named or notebooks)[0]
     if notebooks:
-        raise _NotUnderstood(f"holds {len(notebooks)} notebooks, of which none is called {lab}.ipynb")
+        which = "several are" if named else "none is"
+        raise _NotUnderstood(f"holds {len(notebooks)} notebooks, of which {which} called {lab}.ipynb")
     ours = (timestamp.FILE_NAME, exchange_secret.FILE_NAME)
     strange = [path[-1] for path in paths if path[-1] not in ours and not path[-1].startswith(".")]
     if strange:
@@ -186,23 +197,28 @@ def _from_zip(source: Path, lab: str, refused: list[str]) -> dict[str, HandedIn]
         if len(archive.infolist()) > MOST:
             raise KitError(f"{source} has {len(archive.infolist())} entries; that is no class.", "Check the file.")
         files = list(in_zip(archive, bad))
-        depth = _depth([member.path for member in files], lab)
+        above = wrapper([member.path for member in files], lab)
         for member in files:
-            inside = member.path[depth:]
+            inside = member.path[len(above) :] if member.path[: len(above)] == above else ()
+            student = _owner(inside[0], lab) if len(inside) == 1 else ""
             if len(inside) > 1:
                 students.setdefault(inside[0], {})[inside[1:]] = member
-            elif inside and is_zip(inside[0]):
-                packed[inside[0][: -len(".zip")]] = member
+            elif student:
+                packed.setdefault(student, member)
+            elif member.name != ROSTER:
+                refused.append(beside_all(member.name))
         for student in dict.fromkeys([*students, *packed]):
             try:
                 if student in students:
                     found[student] = _in_folder(students[student], lab)
-                else:
+                elif is_zip(packed[student].name):
                     found[student] = HandedIn(_notebook_in_zip(_unpacked(packed[student]), lab))
+                else:
+                    found[student] = HandedIn(_read(packed[student]))
             except _NotUnderstood as reason:
                 refused.append(f"{student[:80]!r} {reason}; it was left out.")
     for student in sorted(packed.keys() & students.keys()):
-        refused.append(f"{student[:80]!r} is a folder and a zip of one student; the zip was left out.")
+        refused.append(f"{student[:80]!r} is a folder and a file of one student; the file was left out.")
     if bad:
         names = ", ".join(repr(name[:60]) for name in bad[:_NAMED])
         more = f" and {len(bad) - _NAMED} more" if len(bad) > _NAMED else ""
@@ -216,7 +232,7 @@ def _in_folder(files: Mapping[tuple[str, ...], Member], lab: str) -> HandedIn:
     Raises:
         _NotUnderstood: it cannot be read, or nothing says which notebook counts.
     """
-    chosen = _choose([rest for rest in files if len(rest) == 1 or rest[:-1] == (lab,)], lab)
+    chosen = _choose(list(files), lab)
     stamp, secret = (
         files.get((name,)) or files.get((lab, name)) for name in (timestamp.FILE_NAME, exchange_secret.FILE_NAME)
     )
@@ -232,13 +248,6 @@ def _unpacked(member: Member) -> list[Member]:
     if not held:
         raise _NotUnderstood("cannot be read as a zip")
     return [Member(inner.path[len(member.path) :], inner.read) for inner in held]
-
-
-def _depth(paths: list[tuple[str, ...]], lab: str) -> int:
-    """How many folders to skip: 1 if everything lies in one folder that holds the students' folders."""
-    one_top = len({path[0] for path in paths}) == 1
-    is_student = any(path[1:] == (f"{lab}.ipynb",) or path[1:2] == (lab,) for path in paths)
-    return 1 if one_top and not is_student and any(len(path) >= 3 for path in paths) else 0
 
 
 def _read(member: Member) -> bytes:
