@@ -18,6 +18,8 @@ from autograder.sandbox.running_program import RunningProgram
 
 ATTACKS: dict[str, str] = globals().get("ATTACKS", {})
 AT_ONCE = 6
+WITHIN = 120
+"""Seconds for what takes one or two where the machine does nothing else."""
 HONEST_NODE = """
 import rclpy
 from std_msgs.msg import String
@@ -44,7 +46,7 @@ def fewest_processes() -> int:
 
 def left_over(resting: int) -> int:
     """How many processes more there are than the sandbox keeps, once those that are ending had time to."""
-    deadline = time.monotonic() + 20
+    deadline = time.monotonic() + WITHIN
     while (more := len(descendants(os.getpid())) - resting) > 0 and time.monotonic() < deadline:
         time.sleep(0.02)
     return max(more, 0)
@@ -58,7 +60,7 @@ def run(sandbox: NodeSandbox, names: list[str], resting: int) -> dict[str, Any]:
         programs = {name: group.start(name, env=given) for name in names}
         report = {name: watched(program, must(name)) for name, program in programs.items()}
         after = group.start("honest")
-        after.wait(20)
+        after.wait(WITHIN)
         end = time.monotonic()
     teardown = time.monotonic() - end
     common = {
@@ -76,7 +78,7 @@ def watched(program: RunningProgram, wanted: str) -> dict[str, Any]:
         if not program.wait(1.0):
             program.stop(0.1)
     else:
-        program.wait(20)
+        program.wait(WITHIN)
     return {
         "ended": program.exit_status(),
         "stopped_by": program.stopped_by(),
@@ -100,16 +102,16 @@ def run_beside_honest_node(sandbox: NodeSandbox, names: list[str]) -> dict[str, 
         attacks = {name: group.start(name, env={"ROS_DOMAIN_ID": "7"}) for name in names}
         honest = group.start("honest_node", env={"ROS_DOMAIN_ID": "7"})
         observer.wait(lambda: observer.nodes(), 5)
-        heard = talk.wait_for(1, 40)
+        heard = talk.wait_for(1, WITHIN)
         talk.wait_for(talk.count + 50, 2)  # in vain, if it floods the observer: that harms its own launch alone
         grown = memory(os.getpid()) - before
         for attack in attacks.values():
             attack.stop(0.0)
-        heard = heard and talk.wait_for(talk.count + 20, 40)
+        heard = heard and talk.wait_for(talk.count + 20, WITHIN)
         entry = {
             "heard": heard,
             "own": all(message.msg.data == "honest" for message in talk.messages),
-            "seen": observer.wait(lambda: "/honest" in observer.nodes(), 40),
+            "seen": observer.wait(lambda: "/honest" in observer.nodes(), WITHIN),
             "running": honest.running(),
             "grown": grown >> 20,
             "flood": flood.count,

@@ -59,7 +59,7 @@ class Cluster:
             cwd=self._folder, env=os.environ | {"PYTHONPATH": str(kit)},
             stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
         )  # fmt: skip
-        self._ending.callback(process.wait, 30)
+        self._ending.callback(process.wait, 120)
         self._ending.callback(process.kill)
         return process
 

@@ -27,9 +27,9 @@ MUST = {
     if name[0] != "_" and name != "honest"
 }
 BESIDE_NODE = [name for name, source in ATTACKS.items() if "Must, beside an honest node:" in source]
-RUN = 600.0
+RUN = 1800.0
 """Seconds for all attacks together: about 40 on a quiet machine."""
-TEARDOWN = 20.0
+TEARDOWN = 50.0
 """Seconds: far beyond what it takes on a crowded machine, and far less than what an attack would go on for."""
 GROWN = 400
 """MiB that flooding may make an observer grow."""

@@ -27,7 +27,7 @@ from served import address_of
 from autograder.course.lab import lab_names, load_lab
 
 ROOT = Path(__file__).resolve().parent.parent
-START_SECONDS, RUN_SECONDS = 90, 240
+START_SECONDS, RUN_SECONDS = 180, 600
 """Far beyond what it takes (5 s and 35 s on two cores), for a machine that does much else."""
 
 # All cells in the page at once: JupyterLab otherwise keeps only those in view.
@@ -86,6 +86,7 @@ def jupyter_lab(tmp_path: Path) -> Iterator[tuple[Path, str]]:
 def window(browser: Any) -> Iterator[Any]:
     """Where pages are opened: they share what the browser has read and compiled of JupyterLab."""
     opened = browser.new_context(viewport={"width": 1400, "height": 900})
+    opened.set_default_timeout(START_SECONDS * 1000)
     yield opened
     opened.close()
 
@@ -118,7 +119,7 @@ def run_all(window: Any, address: str, name: str) -> tuple[Any, list[dict[str, A
     while any("*" in prompt or "[ ]" in prompt for prompt in page.evaluate(PROMPTS)):
         assert time.monotonic() < deadline, [c for c in page.evaluate(CELLS) if not re.search(r"\d", c["prompt"])]
         page.wait_for_timeout(500)
-    page.wait_for_selector(".jp-Notebook-ExecutionIndicator[data-status='idle']", timeout=30_000)
+    page.wait_for_selector(".jp-Notebook-ExecutionIndicator[data-status='idle']", timeout=START_SECONDS * 1000)
     cells: list[dict[str, Any]] = page.evaluate(CELLS)
     assert not outside, f"the page asked for {outside}"
     return page, cells

@@ -32,10 +32,9 @@ TALKS, HAS_A_PARAMETER = 'ros.expect_messages("/talk", String, within=4)', 'ros.
 SOON_STUCK = """
 import sys
 worker = sys.modules["autograder.grading.worker"]  # of which this process is a fork
-worker.CELL_SECONDS, worker.STUCK_SECONDS = 15, 1
-from autograder.checks import outcomes
-from autograder.checks.scoring import score
+worker.CELL_SECONDS, worker.STUCK_SECONDS = 15, 1  # from the next check on, until another worker goes on
 """
+SCORES = "from autograder.checks import outcomes\nfrom autograder.checks.scoring import score\n"
 GOOD = "outcomes.passed('good')\nscore(1)"
 MAKE_STUCK = [name for name, source in PROGRAMS.items() if "\nMust: stuck.\n" in source]
 
@@ -55,7 +54,7 @@ def test_the_check_fails_and_says_why(name: str) -> None:
 def test_a_check_in_which_the_grader_is_made_stuck_costs_no_other_and_is_flagged(name: str) -> None:
     if not preflight().full:
         pytest.skip(preflight().why_not_full)
-    before, check, after = run_in_worker(job(name, SET_UP + SOON_STUCK, GOOD, check_of(name), GOOD)).checks
+    before, check, after = run_in_worker(job(name, SET_UP + SCORES, SOON_STUCK + GOOD, check_of(name), GOOD)).checks
     assert (before.points, after.points) == (1, 1)
     assert check.status is Status.UNKNOWN and check.points is None and check.flags, check
     assert check.outcomes[0].code == supervisor.STUCK, check

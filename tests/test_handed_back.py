@@ -18,6 +18,7 @@ from typing import Any
 
 import pytest
 import toy
+from conftest import BROWSER_SECONDS
 from junitparser import JUnitXml
 
 from autograder.core.grades import CellGrade, Grade
@@ -125,7 +126,7 @@ def nbgraders_own_export(root: Path, folder: Path) -> dict[str, float]:
     shutil.copy(KIT / "nbgrader_config.py", root)
     done = subprocess.run(
         [sys.executable, "-m", "nbgrader", "export", "--to", str(folder / "all.csv")],
-        cwd=root, env=os.environ | {"PYTHONPATH": str(KIT)}, capture_output=True, text=True, timeout=120, check=False,
+        cwd=root, env=os.environ | {"PYTHONPATH": str(KIT)}, capture_output=True, text=True, timeout=300, check=False,
     )  # fmt: skip
     (root / "nbgrader_config.py").unlink()
     assert done.returncode == 0, done.stderr
@@ -284,6 +285,7 @@ def test_a_page_on_which_most_is_wrong_is_no_longer_than_eight_screens(browser: 
     day = datetime.date(2026, 11, 22)
     text = feedback_html(Heading("Toy", "ann"), tasks, result, Grade("ann", "toy", tuple(cells), 0), day)
     window = browser.new_page(viewport={"width": 1280, "height": 800})
+    window.set_default_timeout(1000 * BROWSER_SECONDS)
     window.set_content(text)
     assert window.evaluate("document.documentElement.scrollHeight") < 8 * 800
     window.close()
@@ -294,6 +296,7 @@ def test_both_pages_can_be_read_by_everybody_on_a_phone_and_on_paper(graded: Gra
     page = graded.root / "build" / "report" / "toy.html"
     write_class_page(page, class_entries(graded.root, toy.LAB), datetime.date(2026, 11, 22))
     window = browser.new_page(viewport={"width": 390, "height": 800})
+    window.set_default_timeout(1000 * BROWSER_SECONDS)
     outside: list[str] = []
     window.on("request", lambda request: None if request.url.startswith("file:") else outside.append(request.url))
     for path in (page, graded.root / "build" / "feedback" / "bob" / "toy" / "toy.html"):

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from conftest import BROWSER_SECONDS
 
 ROOT = Path(__file__).resolve().parent.parent
 LECTURES = sorted(path.stem for path in (ROOT / "lectures").glob("*.md"))
@@ -83,6 +84,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def page(browser: Any) -> Iterator[Any]:
     """Open a window as large as a projector; whatever a page asks for beyond its own folder fails the test."""
     window = browser.new_page(viewport={"width": 1280, "height": 720})
+    window.set_default_timeout(1000 * BROWSER_SECONDS)
     outside: list[str] = []
     window.on(
         "request", lambda request: None if request.url.startswith(("file:", "data:")) else outside.append(request.url)

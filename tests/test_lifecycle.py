@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 import rclpy
 from lifecycle_msgs.msg import TransitionEvent
+from lifecycle_msgs.srv import ChangeState
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.lifecycle import LifecycleNode, TransitionCallbackReturn
@@ -120,6 +121,8 @@ def test_a_callback_without_a_return_value_leaves_no_answer(observer: Observer) 
     client = LifecycleClient(observer, "/part")
     with spinning(observer, "part", configure=lambda: None):
         assert client.state() == "unconfigured"
+        assert "configure" in client.available()
+        assert observer.wait(client._clients[ChangeState].service_is_ready, 60.0)
         with pytest.raises(NoAnswer):
             client.transition("configure", within=0.6)
 
@@ -144,6 +147,7 @@ def test_a_node_whose_events_never_end_does_not_keep_the_check_waiting_for_ever(
     thread.start()
     try:
         with spinning(observer, "part"):
+            assert client.state(within=60.0) == "unconfigured"
             assert client.wait_for_state("active", within=2.0) == "unconfigured"
     finally:
         over.set()

@@ -492,7 +492,7 @@ def nbgrader(root: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
     environment.pop("TRAITLETS_APPLICATION_RAISE_CONFIG_FILE_ERROR", None)
     return subprocess.run(
         [sys.executable, "-m", "nbgrader", *arguments],
-        cwd=root, env=environment, capture_output=True, text=True, timeout=120,
+        cwd=root, env=environment, capture_output=True, text=True, timeout=300,
     )  # fmt: skip
 
 

@@ -54,7 +54,7 @@ def environment(folder: Path) -> dict[str, str]:
 def nbgrader(folder: Path, *arguments: str | Path) -> tuple[int, str]:
     done = subprocess.run(
         [sys.executable, "-m", "nbgrader", *map(str, arguments)],
-        cwd=folder, env=environment(folder), capture_output=True, text=True, timeout=240, check=False,
+        cwd=folder, env=environment(folder), capture_output=True, text=True, timeout=300, check=False,
     )  # fmt: skip
     assert "Traceback" not in done.stdout, done.stdout
     return done.returncode, done.stdout + done.stderr
@@ -123,12 +123,12 @@ def jupyter(folder: Path) -> Iterator[str]:
         yield address_of(process, runtime)
     finally:
         process.terminate()
-        process.wait(30)
+        process.wait(120)
 
 
 def post(address: str, where: str, **content: str) -> Any:
     request = urllib.request.Request(f"{address}{where}", json.dumps(content).encode(), {"Authorization": "token x"})
-    with urllib.request.urlopen(request, timeout=240) as answer:
+    with urllib.request.urlopen(request, timeout=300) as answer:
         return json.load(answer)
 
 

@@ -23,7 +23,7 @@ from autograder.notebook import hints
 from autograder.notebook.kernel import Kernel
 from autograder.notebook.program_folder import MANIFEST
 
-START = 60
+START = 180
 """Far beyond what a kernel, or a cell, takes on a busy machine, in seconds."""
 
 TALKER = """%%node talker

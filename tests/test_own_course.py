@@ -11,6 +11,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from linked import link_tree
 
 from autograder.core.version import VERSION
 
@@ -34,7 +35,7 @@ class Environment:
         # The dependencies come from this environment, as hard links: no network, and no second copy on the disk. The
         # sandbox shows an environment's own folder, so a .pth file that leads here would not do.
         for name in ("lib", "share"):  # ROS has its libraries beside Python's packages
-            subprocess.run(["cp", "-al", f"{sys.prefix}/{name}/.", self.folder / name], check=True)
+            link_tree(Path(sys.prefix, name), self.folder / name)
         next(self.folder.glob("lib/python*/site-packages/autograder.pth")).unlink()
         for program in ("alembic", "jupyter", "jupyter-nbconvert"):
             text = Path(sys.prefix, "bin", program).read_text(encoding="utf-8")

@@ -187,7 +187,7 @@ def programs(tmp_path: Path) -> Iterator[Path]:
 def test_a_launch_draws_what_its_programs_did(programs: Path) -> None:
     with launch("robot") as ros:
         ros.expect_publisher("/activity", String, node="/robot")
-        assert ros.wait(lambda: ros.runs().count("camera") >= 2 and ros.runs().count("beat") >= 2)
+        assert ros.wait(lambda: ros.runs().count("camera") >= 2 and ros.runs().count("beat") >= 2, 60)
         on_graph = ros.graph()
     runs = ros.runs()
     assert runs.overlap() == 1 and runs.threads() == {1} and runs.longest("camera") > 0.1
@@ -198,6 +198,7 @@ def test_a_launch_draws_what_its_programs_did(programs: Path) -> None:
 
 def test_a_failed_check_shows_the_picture_that_explains_it(programs: Path) -> None:
     with launch("robot") as ros:
+        assert ros.wait(lambda: ros.runs().count("camera") >= 2 and ros.runs().count("beat") >= 2, 60)
         ros.expect_overlap("/activity", ["beat", "camera"], within=1)
     shown = ros.score(1).result
     failure = shown.first_failure

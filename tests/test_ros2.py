@@ -28,8 +28,10 @@ MEASURED = [
     for block in re.split(r"^\$ ", (ROBOT / "measured.txt").read_text(encoding="utf-8"), flags=re.MULTILINE)[1:]
 ]
 NODES = ["/demo", "/vehicle/camera_driver", "/vehicle/right_demo"]
-WITHIN = 30
+WITHIN = 120
 """Far beyond what a start takes on a busy machine, in seconds."""
+A_WHILE = (3.5, 15.0, 60.0)
+"""For how long what goes on until it is ended is looked at, in seconds: for longer where a busy machine shows less."""
 
 
 class Robot:
@@ -90,8 +92,11 @@ def test_it_prints_what_the_real_tool_prints(
     if command.endswith("d.yaml"):
         Path("d.yaml").write_text(say(robot, "param dump /demo")[0])
     if status == "2":  # goes on until it is ended
-        found, ended = say(robot, command, seconds=3.5)
         expected = [line for line in lines_alike(said) if line != "…"]
+        for seconds in A_WHILE:
+            found, ended = say(robot, command, seconds)
+            if len(found.splitlines()) >= len(expected):
+                break
         assert (lines_alike(found)[: len(expected)], ended) == (expected, 2)
         return
     found, ended = say(robot, command)
@@ -150,11 +155,36 @@ def test_a_terminal_sees_programs_of_a_notebook_and_of_another_terminal(settings
         made.close()
 
 
+def test_what_a_shell_has_made_deaf_to_ctrl_c_goes_on(robot: Robot) -> None:
+    """As it does with what it puts into the background."""
+    deaf = 'trap "" INT; exec "$@"'
+    command = [
+        "sh",
+        "-c",
+        deaf,
+        "sh",
+        Path(sys.executable).with_name("autograder"),
+        "ros2",
+        "topic",
+        "echo",
+        "/chatter",
+    ]
+    with subprocess.Popen(command, env=robot.environment, stdout=subprocess.PIPE, text=True) as heard:
+        assert heard.stdout is not None
+        try:
+            assert heard.stdout.readline().startswith("data: hello")
+            for _ in range(20):
+                heard.send_signal(signal.SIGINT)
+                assert heard.stdout.readline() and heard.stdout.readline()
+        finally:
+            heard.kill()
+
+
 def test_a_goal_that_is_interrupted_is_cancelled(robot: Robot) -> None:
     sent = terminal(robot, "action", "send_goal", "/fibonacci", "test_msgs/action/Fibonacci", "{order: 40}")
     assert sent.stdout is not None
-    while "accepted" not in sent.stdout.readline():
-        pass
+    while "accepted" not in (line := sent.stdout.readline()):
+        assert line, "it ended"
     sent.send_signal(signal.SIGINT)
     said, _ = sent.communicate(timeout=WITHIN)
     assert said.endswith("Canceling goal...\nGoal canceled.\n") and sent.returncode == 2
@@ -209,10 +239,15 @@ def test_a_program_that_ends_by_itself_is_told(notebook: Notebook) -> None:
 
 
 def test_what_goes_on_ends_with_the_cell(notebook: Notebook) -> None:
-    notebook.run("from autograder.notebook import ros2_magic\nros2_magic._ENDLESS = 6.0")
+    notebook.run("from autograder.notebook import ros2_magic")
     notebook.run('robot = launch("talker").start()')
-    shown = notebook.run("%ros2 topic hz /chatter")
-    assert "average rate: " in shown.text and "(stopped after 6 s" in shown.text
+    for seconds in A_WHILE:
+        notebook.run(f"ros2_magic._ENDLESS = {seconds}")
+        shown = notebook.run("%ros2 topic hz /chatter").text
+        assert f"(stopped after {seconds:g} s" in shown
+        if "average rate: " in shown:
+            break
+    assert "average rate: " in shown
     notebook.run("robot.stop()")
 
 
@@ -281,7 +316,7 @@ def test_a_node_that_nothing_spins_is_told(notebook: Notebook) -> None:
     stuck = "import threading\nimport rclpy\nrclpy.init()\nnode = rclpy.create_node('stuck')\nthreading.Event().wait()"
     notebook.run(f"%%node stuck\n{stuck}", "stuck")
     notebook.run('robot = launch("stuck", "talker").start()')
-    notebook.run("from autograder.notebook import ros2_magic\nros2_magic._ENDLESS = 10.0")
+    notebook.run("from autograder.notebook import ros2_magic\nros2_magic._ENDLESS = 50.0")
     shown = notebook.run("%ros2 param list").text
     assert "/stuck:\nException while calling service of node '/stuck': None\n/talker:\n  start" in shown
     notebook.run("ros2_magic._ENDLESS = 1.0")

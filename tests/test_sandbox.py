@@ -50,11 +50,11 @@ def test_when_the_parent_is_killed_nothing_remains(kind: Isolation, processes: i
     parent = subprocess.Popen([sys.executable, "-c", outer], cwd=ROOT)
     try:
         # python, bwrap (outer, its first process), worker, bwrap, launcher, the launch's first process, two programs
-        family = _wait_for(lambda: found if len(found := descendants(parent.pid)) >= processes else None, 60)
+        family = _wait_for(lambda: found if len(found := descendants(parent.pid)) >= processes else None, 120)
     finally:
         parent.kill()
         parent.wait()
-    _wait_for(lambda: not [pid for pid in family if Path(f"/proc/{pid}").exists()], 30)
+    _wait_for(lambda: not [pid for pid in family if Path(f"/proc/{pid}").exists()], 120)
     assert Path("/proc/self/mounts").read_text() == mounts
 
 
@@ -127,7 +127,7 @@ def test_what_the_launcher_loads_is_never_a_students_file() -> None:
         "folder = Path(tempfile.mkdtemp()); (folder / 'honest.py').write_text('print(\"fine\")')\n"
         "(folder / 'numpy.py').write_text('import os; os._exit(3)')\n"
         "with NodeSandbox(folder, Isolation.FULL) as sandbox, sandbox.group() as group:\n"
-        "    program = group.start('honest'); program.wait(30); print(program.output())\n"
+        "    program = group.start('honest'); program.wait(120); print(program.output())\n"
     )
     assert "fine" in run.stdout, run.stdout + run.stderr
 
@@ -152,7 +152,7 @@ def test_a_program_runs_as_python_runs_a_file(local: NodeSandbox) -> None:
         "fail()\n"
     )
     program = local.group().start("shown", ["--ros-args", "-r", "a:=b"], {"ROS_DOMAIN_ID": "9"}, cores=2)
-    assert program.wait(30)
+    assert program.wait(120)
     assert program.exit_status() == 1
     said = program.output()
     assert "__main__ ['--ros-args', '-r', 'a:=b'] imported 9 2" in said
@@ -176,7 +176,7 @@ def test_a_program_ends_as_python_does(tmp_path: Path, source: str, status: int,
     (tmp_path / "it.py").write_text(source)
     with NodeSandbox(tmp_path, Isolation.NONE) as sandbox:
         program = sandbox.group().start("it")
-        assert program.wait(30)
+        assert program.wait(120)
         assert program.exit_status() == status
         assert said in program.output()
         assert "launcher.py" not in program.output()
@@ -187,15 +187,15 @@ def test_a_program_starts_no_process_in_a_notebook_either(local: NodeSandbox) ->
         (local.folder / f"{name}.py").write_text(ATTACKS[name])
     for name in ("fork_bomb", "daemon"):
         program = local.group().start(name)
-        assert program.wait(30)
+        assert program.wait(120)
         assert "ESCAPED" not in program.output()
 
 
 def test_stacks_name_the_waiting_line(local: NodeSandbox) -> None:
     (local.folder / "stuck.py").write_text("import threading\nprint('here')\nthreading.Event().wait()\n")
     program = local.group().start("stuck")
-    _wait_for(program.output, 30)
-    assert _wait_for(lambda: 'stuck.py", line 3' in program.stacks(), 30)  # it has printed, and goes on to wait
+    _wait_for(program.output, 120)
+    assert _wait_for(lambda: 'stuck.py", line 3' in program.stacks(), 120)  # it has printed, and goes on to wait
     assert program.running()
 
 
@@ -214,7 +214,7 @@ def test_looking_at_a_program_never_ends_it(local: NodeSandbox) -> None:
         "print('here')\n"
     )
     program = local.group().start("restless")
-    _wait_for(program.output, 30)
+    _wait_for(program.output, 120)
     looks = [program.stacks(10) for _ in range(80)]
     assert program.running()
     assert all('restless.py", line' in look for look in looks)
@@ -224,7 +224,7 @@ def test_output_keeps_its_beginning_and_its_end(tmp_path: Path) -> None:
     (tmp_path / "talks.py").write_text("print('first'); print('x' * 100000); print('last')")
     with NodeSandbox(tmp_path, Isolation.NONE, limits=Limits(output_kept=2000)) as sandbox:
         program = sandbox.group().start("talks")
-        assert program.wait(30)
+        assert program.wait(120)
         assert program.truncated()
         assert program.output().startswith("first") and program.output().endswith("last\n")
         assert len(program.output()) < 2100
@@ -234,7 +234,7 @@ def test_a_program_that_takes_too_long_is_ended(tmp_path: Path) -> None:
     (tmp_path / "sleeps.py").write_text("import time; time.sleep(60)")
     with NodeSandbox(tmp_path, Isolation.NONE, limits=Limits(wall_seconds=0.5)) as sandbox:
         program = sandbox.group().start("sleeps")
-        assert program.wait(30)
+        assert program.wait(120)
         assert program.stopped_by() == "time limit"
 
 
@@ -242,7 +242,7 @@ def test_a_program_that_only_computes_is_ended_and_says_so(tmp_path: Path) -> No
     (tmp_path / "burns.py").write_text("while True:\n    pass\n")
     with NodeSandbox(tmp_path, Isolation.NONE, limits=Limits(cpu_seconds=1)) as sandbox, sandbox.group() as group:
         program = group.start("burns")
-        assert program.wait(30)
+        assert program.wait(120)
         assert program.stopped_by() == "CPU time limit"
 
 
@@ -259,7 +259,7 @@ def test_a_submission_that_only_computes_has_little_left_for_its_later_launches(
         "    for name in ('asks', 'burns', 'asks'):\n"
         "        with sandbox.group() as group:\n"
         "            program = group.start(name)\n"
-        "            program.wait(60)\n"
+        "            program.wait(120)\n"
         "            print(name, program.output(), program.stopped_by())\n"
     )
     assert run.stdout.split()[:8] == ["asks", "3", "burns", "CPU", "time", "limit", "asks", "1"], run
@@ -279,7 +279,7 @@ def test_a_launch_keeps_what_its_programs_said_before_the_end(local: NodeSandbox
     (local.folder / "says.py").write_text("print('a word')\nraise SystemExit(3)\n")
     with local.group() as group:
         program = group.start("says")
-        program.wait(30)
+        program.wait(120)
     assert (program.exit_status(), program.output()) == (3, "a word\n")
 
 
@@ -318,7 +318,7 @@ def test_a_killed_notebook_leaves_nothing(tmp_path: Path) -> None:
     finally:
         notebook.kill()
         notebook.wait()
-    _wait_for(lambda: not [pid for pid in family if Path(f"/proc/{pid}").exists()], 30)
+    _wait_for(lambda: not [pid for pid in family if Path(f"/proc/{pid}").exists()], 120)
     assert not list(scratch.iterdir())
 
 
@@ -338,7 +338,7 @@ def test_reduced_isolation_hides_files_and_processes(tmp_path: Path) -> None:
     )
     with NodeSandbox(folder, Isolation.REDUCED) as sandbox:
         program = sandbox.group().start("peeks")
-        assert program.wait(30)
+        assert program.wait(120)
         assert program.output() == "refused\n" * 6
 
 
@@ -362,14 +362,14 @@ def test_a_sandbox_can_be_used_from_threads_that_end(tmp_path: Path) -> None:
     thread.join()
     with made[0] as sandbox:
         program = sandbox.group().start("honest")
-        assert program.wait(30)
+        assert program.wait(120)
         assert program.output() == "fine\n"
 
 
 def test_closing_leaves_nothing_on_the_disk(tmp_path: Path) -> None:
     (tmp_path / "honest.py").write_text(HONEST)
     sandbox = NodeSandbox(tmp_path, Isolation.NONE)
-    sandbox.group().start("honest").wait(30)
+    sandbox.group().start("honest").wait(120)
     assert sandbox._scratch is not None
     scratch = sandbox._scratch.folder
     sandbox.close()

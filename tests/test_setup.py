@@ -47,7 +47,7 @@ def check_out(folder: Path, *, whole_lock: bool = False) -> Path:
         ignore=lambda path, names: [
             name
             for name in names
-            if name in {".git", ".venv", "__pycache__"}
+            if name in {".git", ".venv", "__pycache__", ".hypothesis"}
             or (path == str(ROOT) and name == "build")
             or name.endswith("_cache")
         ],
@@ -177,12 +177,12 @@ def test_an_interrupted_environment_is_made_anew(tmp_path: Path) -> None:
     process = subprocess.Popen(
         [MAKE, "-C", folder, "setup"], env=ENVIRON, stderr=subprocess.PIPE, text=True, start_new_session=True
     )
-    deadline = time.monotonic() + 60
+    deadline = time.monotonic() + 180
     while not (folder / ".venv" / "pyvenv.cfg").exists():
         assert time.monotonic() < deadline
         time.sleep(0.01)
     os.killpg(process.pid, signal.SIGINT)
-    assert "The next run starts over" in process.communicate(timeout=60)[1]
+    assert "The next run starts over" in process.communicate(timeout=180)[1]
     assert process.returncode != 0
     (folder / ".venv" / "left-over").touch()
 

@@ -19,6 +19,7 @@ from pathlib import Path
 
 import pytest
 import toy
+from linked import link_tree
 from served import address_of
 from test_setup import ENVIRON, ROOT, make, write_lock
 
@@ -173,7 +174,7 @@ def the_book_is_served(kit: Path, tmp_path: Path) -> None:
                 assert error.code in (403, 404)
     finally:
         server.terminate()
-        server.wait(timeout=60)
+        server.wait(timeout=120)
 
 
 def test_from_an_unpacked_zip_to_a_verdict(course: Path, tmp_path: Path) -> None:
@@ -188,7 +189,7 @@ def test_from_an_unpacked_zip_to_a_verdict(course: Path, tmp_path: Path) -> None
     assert made.returncode == 0, made.stderr
     # All that the lock would have installed comes from this environment, as hard links.
     for name in ("lib", "share"):
-        subprocess.run(["cp", "-aln", f"{sys.prefix}/{name}/.", kit / ".venv" / name], check=True)
+        link_tree(Path(sys.prefix, name), kit / ".venv" / name)
     for path in kit.glob(".venv/lib/python*/site-packages/autograder.pth"):
         assert str(ROOT) not in path.read_text()
 

@@ -94,7 +94,7 @@ class Observer:
 
     def _own_participant(self) -> bytes:
         """The GUID prefix of the endpoints made here; every rclpy node publishes its parameters' events."""
-        deadline = time.monotonic() + 10.0
+        deadline = time.monotonic() + 30.0
         while time.monotonic() < deadline:
             for end in self.node.get_publishers_info_by_topic("/parameter_events"):
                 if end.node_name == self.name:

@@ -202,7 +202,8 @@ def _whole_round() -> Iterator[None]:
     In the midst of one it would leave an answer half taken, or a callback group that is never free again; whoever then
     asks for one thing more, as for a goal to be cancelled, would wait in vain.
     """
-    if threading.current_thread() is not threading.main_thread():  # signals come to the main thread only
+    # Signals come to the main thread only, and to nobody whom a shell has put into the background.
+    if threading.current_thread() is not threading.main_thread() or signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         yield
         return
     came: list[int] = []

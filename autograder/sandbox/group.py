@@ -22,9 +22,9 @@ from autograder.sandbox.loop import Loop
 from autograder.sandbox.program_pipes import ProgramPipes
 from autograder.sandbox.running_program import RunningProgram
 
-_ANSWER_WITHIN = 10.0
+_ANSWER_WITHIN = 30.0
 """Seconds after which a first process that does not answer is given up."""
-_ENDED_WITHIN = 5.0
+_ENDED_WITHIN = 30.0
 """Seconds that the kernel may take to end killed processes."""
 _SET_BY_THE_SANDBOX = ("FASTRTPS_DEFAULT_PROFILES_FILE", "ROS_LOG_DIR", "HOME", "TMPDIR", "LD_LIBRARY_PATH")
 """What a caller cannot set for a program: it depends on where the program runs."""

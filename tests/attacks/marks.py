@@ -15,6 +15,6 @@ if os.getpid() > 16:
     print("ESCAPED process ids are counted:", os.getpid())
 with open("/proc/1/stat") as first, open("/proc/uptime") as uptime:
     age = float(uptime.read().split()[0]) - int(first.read().rpartition(")")[2].split()[19]) / os.sysconf("SC_CLK_TCK")
-if age > 30:
+if age > 300:
     print("ESCAPED the launch is old:", age)
 print("done", time.monotonic() > 0)
