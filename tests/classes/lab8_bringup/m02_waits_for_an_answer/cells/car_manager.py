@@ -17,6 +17,7 @@ class CarManager(Node):
         self.declare_parameter("patience", 1.0)
         self.car_state = self.create_publisher(String, "car_state", 10)
         self.layers = [layer.split() for layer in self.get_parameter("layers").value]
+        self.answered = set()
         names = [name for layer in self.layers for name in layer]
         self.get = {name: self.create_client(GetState, f"{name}/get_state") for name in names}
         self.change = {name: self.create_client(ChangeState, f"{name}/change_state") for name in names}
@@ -27,10 +28,12 @@ class CarManager(Node):
         if not client.wait_for_service(patience):
             return None
         future = client.call_async(request)
-        rclpy.spin_until_future_complete(self, future, timeout_sec=None)
+        known = client in self.answered  # whoever has answered once will answer again
+        rclpy.spin_until_future_complete(self, future, timeout_sec=None if known else patience)
         if not future.done():
             client.remove_pending_request(future)
             return None
+        self.answered.add(client)
         return future.result()
 
     def bring_up(self, name):

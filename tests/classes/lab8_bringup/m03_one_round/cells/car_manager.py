@@ -27,7 +27,7 @@ class CarManager(Node):
         if not client.wait_for_service(patience):
             return None
         future = client.call_async(request)
-        rclpy.spin_until_future_complete(self, future, timeout_sec=patience)
+        rclpy.spin_until_future_complete(self, future, timeout_sec=max(patience, 5.0))
         if not future.done():
             client.remove_pending_request(future)
             return None
@@ -58,6 +58,11 @@ def main():
     rclpy.init()
     manager = CarManager()
     try:
+        optional = manager.get_parameter("optional").value
+        for name in manager.get:  # the one round begins when all that have to be there are there
+            if name not in optional:
+                manager.get[name].wait_for_service(20.0)
+                manager.change[name].wait_for_service(20.0)
         state = manager.round()
         while rclpy.ok():
             manager.car_state.publish(String(data=state))

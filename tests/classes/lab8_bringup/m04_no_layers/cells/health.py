@@ -12,7 +12,7 @@ class Health(Node):
         super().__init__("health")
         self.declare_parameter("topics", ["scan", "obstacles", "path", "command"])
         self.declare_parameter("silence", 1.0)
-        self.last = {}
+        self.last, self.told = {}, {}
         for topic in self.get_parameter("topics").value:
             self.last[topic] = None
             self.create_subscription(Int32, topic, lambda _, topic=topic: self.hear(topic), 10)
@@ -25,8 +25,10 @@ class Health(Node):
     def tell(self):
         oldest = time.monotonic() - self.get_parameter("silence").value
         silent = [topic for topic, last in self.last.items() if last is None or last < oldest]
-        self.dead = getattr(self, "dead", set()) | {topic for topic in silent if self.last[topic] is not None}
-        silent = [topic for topic in self.last if topic in self.dead or topic in silent]
+        for topic in silent:  # what is told as silent three times in a row, and was heard before, is so for good
+            self.told[topic] = self.told.get(topic, 0) + (self.last[topic] is not None)
+        self.told = {topic: times for topic, times in self.told.items() if topic in silent or times >= 3}
+        silent = [topic for topic in self.last if topic in silent or self.told.get(topic, 0) >= 3]
         self.publisher.publish(String(data=" ".join(silent) or "ok"))
 
 

@@ -11,6 +11,7 @@ class SpeedKeeper(Node):
     def __init__(self):
         super().__init__("speed_keeper")
         self.declare_parameter("patience", 0.5)
+        self.limit, self.less = 2.0, 0
         self.last = {"obstacles": float("-inf"), "scan": float("-inf")}
         for topic in self.last:
             self.create_subscription(Int32, topic, lambda _, topic=topic: self.hear(topic), 10)
@@ -25,9 +26,10 @@ class SpeedKeeper(Node):
 
     def tell(self):
         speed = 2.0 if self.fresh("obstacles") else 0.5 if self.fresh("scan") else 0.0
-        if max(self.last.values()) > 0:
-            self.limit = min(getattr(self, "limit", 2.0), speed)
-        self.publisher.publish(Float64(data=min(speed, getattr(self, "limit", 2.0))))
+        self.less = self.less + 1 if max(self.last.values()) > 0 and speed < self.limit else 0
+        if self.less >= 5:  # half a second
+            self.limit = speed
+        self.publisher.publish(Float64(data=min(speed, self.limit)))
 
 
 def main():

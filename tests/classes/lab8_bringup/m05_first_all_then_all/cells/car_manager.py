@@ -17,6 +17,7 @@ class CarManager(Node):
         self.declare_parameter("patience", 1.0)
         self.car_state = self.create_publisher(String, "car_state", 10)
         self.layers = [layer.split() for layer in self.get_parameter("layers").value]
+        self.up = False
         names = [name for layer in self.layers for name in layer]
         self.get = {name: self.create_client(GetState, f"{name}/get_state") for name in names}
         self.change = {name: self.create_client(ChangeState, f"{name}/change_state") for name in names}
@@ -46,16 +47,17 @@ class CarManager(Node):
 
     def round(self):
         optional = self.get_parameter("optional").value
-        missing = []
-        for layer in self.layers:
+        for layer in self.layers if not self.up else []:
             for name in layer:
                 if self.get[name].service_is_ready():
                     self.bring_up(name, ["configure"])
         missing = []
+        self.up = False
         for layer in self.layers:
             missing += [name for name in layer if not self.bring_up(name, ["configure", "activate"])]
             if not set(missing) <= set(optional):
                 return "waiting"
+        self.up = not missing
         return "degraded" if missing else "running"
 
 

@@ -17,7 +17,7 @@ class Health(Node):
             self.last[topic] = None
             self.create_subscription(Int32, topic, lambda _, topic=topic: self.hear(topic), 10)
         self.publisher = self.create_publisher(String, "health", 10)
-        self.create_timer(1.0, self.tell)
+        self.create_timer(0.6, self.tell)
 
     def hear(self, topic):
         self.last[topic] = time.monotonic()

@@ -17,6 +17,7 @@ class CarManager(Node):
         self.declare_parameter("patience", 1.0)
         self.car_state = self.create_publisher(String, "car_state", 10)
         self.layers = [layer.split() for layer in self.get_parameter("layers").value]
+        self.begun = set()
         names = [name for layer in self.layers for name in layer]
         self.get = {name: self.create_client(GetState, f"{name}/get_state") for name in names}
         self.change = {name: self.create_client(ChangeState, f"{name}/change_state") for name in names}
@@ -37,7 +38,10 @@ class CarManager(Node):
         """Take the steps that are left; return whether the node is active."""
         answer = self.ask(self.get[name], GetState.Request())
         state = answer.current_state.label if answer else ""
-        for label in {"unconfigured": ["configure", "activate"]}.get(state, []):
+        if state == "unconfigured":
+            self.begun.add(name)
+        steps = {"unconfigured": ["configure", "activate"], "inactive": ["activate"] if name in self.begun else []}
+        for label in steps.get(state, []):
             answer = self.ask(self.change[name], ChangeState.Request(transition=Transition(label=label)))
             if answer is None or not answer.success:
                 return False

@@ -50,7 +50,7 @@ class CarManager(Node):
         for layer in self.layers:
             missing += [name for name in layer if not self.bring_up(name)]
             if not set(missing) <= set(optional):
-                for name in self.get:
+                for name in self.get.keys() - missing:
                     self.ask(self.change[name], ChangeState.Request(transition=Transition(label="deactivate")))
                 return "waiting"
         return "degraded" if missing else "running"
