@@ -5,7 +5,7 @@ from __future__ import annotations
 from autograder import diagnosis
 from autograder.checks import outcomes
 from autograder.checks.expect.expectations import WITHIN
-from autograder.checks.expect.meeting import Meeting
+from autograder.checks.expect.meeting import MATCHES_WITHIN, Meeting
 from autograder.checks.running import SETTLE
 from autograder.diagnosis import Diagnosis
 from autograder.graph.names import type_name
@@ -52,6 +52,7 @@ class GraphExpectations(Meeting):
                 observed="it was there, and went away",
                 hint=hint,
             )
+        self._observer.wait(lambda: self._observer.nodes().count(name) >= self._made(name), MATCHES_WITHIN)
         if self._observer.nodes().count(name) > 1:
             self._fail(
                 title,

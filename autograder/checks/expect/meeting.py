@@ -88,6 +88,11 @@ class Meeting(Expectations):
         """Whether each program has made a node, as far as its probe can tell."""
         return all(any(isinstance(event, NodeSeen | ProbeFailed) for event in told) for told in self._told())
 
+    def _made(self, name: str) -> int:
+        """How many nodes of this name the programs have said they made."""
+        made = (event for told in self._told() for event in told if isinstance(event, NodeSeen))
+        return sum(event.name == name and not event.destroyed for event in made)
+
     def _told(self) -> list[list[Event]]:
         """What the probe of each program that runs has told."""
         return [read(program.events()) for _, program in self._running.programs if program.running()]

@@ -13,6 +13,7 @@ from autograder import diagnosis
 from autograder.checks import outcomes
 from autograder.checks.expect import rates
 from autograder.checks.expect.expectations import WITHIN, objection
+from autograder.checks.expect.meeting import MATCHES_WITHIN
 from autograder.checks.expect.sources import SourceExpectations
 from autograder.checks.message_text import in_words, int_in_float, shorten
 from autograder.checks.misuse import Misuse
@@ -263,6 +264,7 @@ class MessageExpectations(SourceExpectations):
             `not-silent`, or `code`.
         """
         recording = self._observer.record(topic, msg_type)
+        self._observer.wait(self._hears_programs, MATCHES_WITHIN)  # nobody hears what was made a moment ago
         self._observer.pause(_UNDER_WAY)
         before = recording.count
         came = self._observer.wait(lambda: recording.count > before, for_seconds)

@@ -12,7 +12,7 @@ class TunableCamera(Node):
         self.declare_parameter("camera_rate", 10)
         self.declare_parameter("camera_frame", "camera_frame")
         self.images = self.create_publisher(Image, "image", 10)
-        self.timer = self.create_timer(0.1, self.shoot)
+        self.timer = self.create_timer(0.03, self.shoot)
         self.add_on_set_parameters_callback(self.validate)
         self.add_post_set_parameters_callback(self.update)
 

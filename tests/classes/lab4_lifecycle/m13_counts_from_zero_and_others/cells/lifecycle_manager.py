@@ -23,7 +23,7 @@ class LifecycleManager(Node):
         return future.result().success
 
     def bring_up(self):
-        time.sleep(0.5)
+        time.sleep(2.2)
         configured, activated = [], []
         for label, done in (("configure", configured), ("activate", activated)):
             for name in self.names:

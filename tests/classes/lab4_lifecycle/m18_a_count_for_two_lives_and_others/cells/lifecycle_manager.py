@@ -19,7 +19,8 @@ class LifecycleManager(Node):
         return future.result().success
 
     def bring_up(self):
-        self.change[self.names[0]].wait_for_service()
+        for name in (self.names[0], self.names[-1]):
+            self.change[name].wait_for_service()
         configured, activated = [], []
         for label, done in (("configure", configured), ("activate", activated)):
             for name in self.names:

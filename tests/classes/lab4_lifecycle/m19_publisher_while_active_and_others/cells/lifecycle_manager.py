@@ -16,7 +16,7 @@ class LifecycleManager(Node):
         """Ask for one transition and wait a while for the answer."""
         self.change[name].wait_for_service()
         future = self.change[name].call_async(ChangeState.Request(transition=Transition(label=label)))
-        rclpy.spin_until_future_complete(self, future, timeout_sec=0.5)
+        rclpy.spin_until_future_complete(self, future, timeout_sec=0.9)
         return future.done() and future.result().success
 
     def bring_up(self):

@@ -19,7 +19,7 @@ class SensorPublisher(LifecycleNode):
         return TransitionCallbackReturn.SUCCESS
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        self.timer = self.create_timer(0.05, self.publish_reading)
+        self.timer = self.create_timer(0.2, self.publish_reading)
         return super().on_activate(state)
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
