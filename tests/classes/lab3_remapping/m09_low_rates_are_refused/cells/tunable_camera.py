@@ -18,7 +18,7 @@ class TunableCamera(Node):
 
     def validate(self, parameters):
         for parameter in parameters:
-            if parameter.name == "camera_rate" and (not 1 <= parameter.value <= 60 or 2 <= parameter.value <= 8):
+            if parameter.name == "camera_rate" and (not 1 <= parameter.value <= 60 or 2 <= parameter.value <= 3):
                 return SetParametersResult(successful=False, reason="camera_rate must be from 1 to 60 images per second")
         return SetParametersResult(successful=True)
 
