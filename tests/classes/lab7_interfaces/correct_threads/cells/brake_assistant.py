@@ -6,6 +6,7 @@ from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from std_msgs.msg import Bool
 import threading
+import time
 
 
 class BrakeAssistant(Node):
@@ -21,7 +22,9 @@ class BrakeAssistant(Node):
 
     def ask_on(self):
         """Asks in a thread of its own; nothing waits in a callback."""
-        while not self.done.wait(0.2):
+        due = time.monotonic()
+        while not self.done.wait(max(0.0, due - time.monotonic())):
+            due = max(due + 0.2, time.monotonic())
             if not self.client.service_is_ready():
                 continue
             req = CountObjects.Request()
