@@ -13,8 +13,9 @@ class Announcer(Node):
         self.timer = self.create_timer(0.05, self.announce)
 
     def announce(self):
+        heard = self.publisher.get_subscription_count() > 0
         self.publisher.publish(String(data=self.get_parameter("text").value))
-        if self.publisher.get_subscription_count() > 0:
+        if heard:
             self.timer.cancel()
 
 

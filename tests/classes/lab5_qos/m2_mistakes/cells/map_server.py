@@ -17,6 +17,7 @@ class MapServer(Node):
             depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
         )
         self.publisher = self.create_publisher(OccupancyGrid, "map", latched)
+        self.publisher.publish(grid)
         self.create_timer(0.2, lambda: self.publisher.publish(grid))
 
 

@@ -18,7 +18,7 @@ class Follower(Node):
     def follow(self, frame):
         age = self.get_clock().now() - Time.from_msg(frame.stamp)
         self.publisher.publish(Float64(data=age.nanoseconds / 1e9))
-        time.sleep(self.work / 2)
+        time.sleep(self.work / 10)
 
 
 def main():

@@ -30,9 +30,9 @@ class Taxi(Node):
 
     def accepted(self, goal_handle):
         """A goal was accepted; `goal_handle.execute()` starts to execute it."""
+        goal_handle.execute()
         with self.lock:
             self.current = goal_handle
-        goal_handle.execute()
 
     def execute(self, goal_handle):
         driven = []

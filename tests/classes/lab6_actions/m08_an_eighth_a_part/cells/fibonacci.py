@@ -31,9 +31,11 @@ class FibonacciServer(Node):
 
     def execute(self, goal_handle):
         sequence = [0, 1]
+        late = 0
         while len(sequence) <= goal_handle.request.order:
             time.sleep(self.step)
-            if goal_handle.is_cancel_requested and len(sequence) % 12 == 0:
+            late += goal_handle.is_cancel_requested
+            if late > 6:
                 goal_handle.canceled()
                 return Fibonacci.Result(sequence=sequence)
             sequence.append(sequence[-1] + sequence[-2])

@@ -55,7 +55,7 @@ class Navigator(Node):
 
     def drive(self, goal_handle):
         goal = goal_handle.request.nested_field
-        target, reach = goal.float64_value, 0.2 * goal.float32_value
+        target, reach = goal.float64_value, 0.3 * goal.float32_value
         way = abs(target - self.position)
         while self.position != target:
             time.sleep(0.1)

@@ -57,11 +57,11 @@ class Navigator(Node):
         goal = goal_handle.request.nested_field
         target, reach = goal.float64_value, 0.1 * goal.float32_value
         way = abs(target - self.position)
-        steps = 0
+        late = 0
         while self.position != target:
             time.sleep(0.1)
-            steps += 1
-            if goal_handle.is_cancel_requested and steps % 12 == 0:
+            late += goal_handle.is_cancel_requested
+            if late > 10:
                 goal_handle.canceled()
                 return result_of(self.position)
             left = target - self.position
