@@ -924,6 +924,50 @@ node.create_subscription(String, "say", out.publish, 10)
 rclpy.spin(node)
 """
 
+HELD_UP = """
+import time
+
+import rclpy
+from rclpy.node import Node
+from std_msgs.msg import String
+
+
+class HeldUp(Node):
+    def __init__(self):
+        super().__init__("held_up")
+        self.publisher = self.create_publisher(String, "chatter", 10)
+        self.create_subscription(String, "stop", self.stop, 10)
+        self.timer = self.create_timer(0.05, self.tick)
+
+    def tick(self):
+        self.publisher.publish(String(data="on"))
+        time.sleep(0.3)  # as on a busy machine: what was sent meanwhile waits, and the next tick comes first
+
+    def stop(self, message):
+        self.timer.cancel()
+
+
+rclpy.init()
+rclpy.spin(HeldUp())
+"""
+
+
+def test_a_program_that_is_held_up_is_silent_from_when_it_has_taken_what_was_sent(grade: Grade) -> None:
+    check = """
+    with launch("held_up", listen=[("/chatter", String)]) as ros:
+        heard = ros.listen("/chatter", String)
+        stop = ros.open_publisher("/stop", String)
+        ros.wait(lambda: stop.get_subscription_count(), 30)
+        ros.expect_node("/held_up")
+        before = heard.count
+        ros.wait(lambda: heard.count > before, 30)  # it sleeps now
+        stop.publish(String())
+        ros.expect_silence("/chatter", String)
+    ros.score(2)"""
+    result = grade(textwrap.dedent(check), held_up__py=HELD_UP)
+    assert result.points == 2, result.first_failure
+
+
 ECHO_OF_TWO = """
 import threading
 
