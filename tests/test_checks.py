@@ -733,6 +733,52 @@ def test_what_is_true_in_another_form_holds_and_none_at_all_means_silence(grade:
     assert failure(result).code == "too-many"
 
 
+def test_a_message_that_was_under_way_does_not_break_a_silence_however_late_it_comes(grade: Grade) -> None:
+    program = """
+import rclpy
+from rclpy.node import Node
+from std_msgs.msg import String
+from std_srvs.srv import Trigger
+
+rclpy.init()
+node = Node("last_words")
+out = node.create_publisher(String, "chatter", 10)
+hold = node.create_client(Trigger, "hold")
+while not (out.get_subscription_count() and hold.service_is_ready()):
+    rclpy.spin_once(node, timeout_sec=0.1)
+
+
+def speak():
+    out.publish(String(data="the last one"))
+    print("published", flush=True)
+    timer.cancel()
+
+
+hold.call_async(Trigger.Request())
+timer = node.create_timer(0.3, speak)
+rclpy.spin(node)
+"""
+    result = grade(
+        """\
+        import time
+
+
+        def hold(request, response):
+            time.sleep(2.0)  # so long the observer hears nothing
+            return response
+
+
+        with launch("last_words", listen=[("/chatter", String)], serve=[("/hold", Trigger, hold)]) as ros:
+            ros.require(ros.wait(lambda: "published" in ros.program("last_words").output()), "It has published")
+            ros.expect_silence("/chatter", String, for_seconds=3.0)
+            ros.require_equal("It came all the same", ros.listen("/chatter", String).count, 1)
+        ros.score(2)
+        """,
+        last_words__py=program,
+    )
+    assert result.points == 2.0, result
+
+
 def test_the_fields_that_a_check_looked_at_stand_first_in_what_was_observed(grade: Grade) -> None:
     program = TALKER.replace("import rclpy\n", "import rclpy\nfrom sensor_msgs.msg import Range\n", 1)
     program = program.replace('String, "chatter"', 'Range, "chatter"')
