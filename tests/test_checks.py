@@ -246,8 +246,18 @@ def test_a_program_that_does_not_end_cleanly_is_told_what_it_did(
     assert (outcome.code, because in outcome.because) == (code, True), outcome
 
 
-def test_what_rclpy_raises_by_chance_at_a_signal_is_no_mistake_of_the_program(grade: Grade) -> None:
-    raced = '        raise RuntimeError("failed to initialize wait set: the given context is not valid, at rcl")'
+@pytest.mark.parametrize(
+    ("what", "where", "points"),
+    [
+        ("initialize wait set", "_wait_for_ready_callbacks", 2),
+        ("create timer", "_wait_for_ready_callbacks", 2),
+        ("create timer", "switch_off", 0),
+    ],
+)
+def test_what_rclpy_raises_by_chance_at_a_signal_is_no_mistake_of_the_program(
+    grade: Grade, what: str, where: str, points: int
+) -> None:
+    fails = f'def {where}():\n    raise RuntimeError("failed to {what}: the given context is not valid, at rcl")'
     result = grade(
         """\
         with launch("talker", parameters={"period": 60.0}) as ros:
@@ -255,9 +265,9 @@ def test_what_rclpy_raises_by_chance_at_a_signal_is_no_mistake_of_the_program(gr
             ros.expect_clean_end("talker", by="SIGTERM")
         ros.score(2)
         """,
-        talker__py=CAREFUL.replace("        pass", raced),
+        talker__py=fails + "\n\n\n" + CAREFUL.replace("        pass", f"        {where}()"),
     )
-    assert result.points == 2, result
+    assert result.points == points, result
 
 
 @pytest.mark.parametrize(("shuts_down", "points"), [("try_shutdown()", 2), ("shutdown()", 0)])
