@@ -247,7 +247,7 @@ def test_every_name_is_taken_and_two_names_stay_two(tmp_path: Path, zipped: bool
 WRAPPED = {
     "a folder around all": {"all/ann/toy.ipynb": "a", "all/bob/toy.ipynb": "b", "readme.txt": ""},
     "two folders around all": {"2026/all/ann/toy.ipynb": "a", "2026/all/bob/toy.ipynb": "b", "readme.txt": ""},
-    "folders inside": {"ann/work/toy.ipynb": "a", "bob/toy.ipynb": "b", "readme.txt": ""},
+    "folders inside": {"ann/lab/toy.ipynb": "a", "bob/toy.ipynb": "b", "readme.txt": ""},
     "files and folders": {"toy_ann.ipynb": "a", "bob/toy.ipynb": "b", "readme.txt": ""},
     "the kit's own folders": {
         "ann/ros2-labs/labs/toy/toy.ipynb": "a",
