@@ -33,8 +33,8 @@ OUTSIDE = """() => Reveal.getSlides().flatMap((slide, number) => {
   return shown && right <= innerWidth && bottom <= innerHeight
     ? [] : [`slide ${number + 1} "${slide.innerText.slice(0, 40)}" reaches ${right} x ${bottom}, title ${title.top}`];
 })"""
-# Runs in a talk: slides without notes, with much code, or with words that a last row cannot read. Of a figure the
-# smallest text counts, as large as it is shown.
+# Runs in a talk: slides without notes, with much code, with lines of code that do not fit, or with words that a last row
+# cannot read. Of a figure the smallest text counts, as large as it is shown.
 UNFIT = """() => Reveal.getSlides().flatMap((slide, number) => {
   const at = Reveal.getIndices(slide), found = [];
   Reveal.slide(at.h, at.v);
@@ -53,6 +53,12 @@ UNFIT = """() => Reveal.getSlides().flatMap((slide, number) => {
   if (!slide.querySelector('aside.notes')) found.push('no notes');
   const lines = [...slide.querySelectorAll('pre')].map(block => block.innerText.trimEnd().split('\\n').length);
   if (Math.max(0, ...lines) > 12) found.push(`${Math.max(...lines)} lines of code`);
+  for (const block of slide.querySelectorAll('pre')) {
+    const style = getComputedStyle(block), padding = parseFloat(style.paddingTop) + parseFloat(style.paddingBottom);
+    const rows = Math.round((block.clientHeight - padding) / parseFloat(style.lineHeight));
+    const lines = block.innerText.trimEnd().split('\\n').length;
+    if (rows > lines) found.push(`code that wraps: ${lines} lines in ${rows} rows`);
+  }
   return found.length ? [`slide ${number + 1} "${slide.querySelector('h1, h2').innerText}": ${found}`] : [];
 })"""
 # Runs in a page of the book: what would have to be scrolled sideways, the window or a part of it.

@@ -66,8 +66,16 @@ class Change(SphinxDirective):
         return [named(f"{self.arguments[0]} → {self.arguments[1]}", listing)]
 
 
+def opened(text: str) -> bool:
+    """Whether a text opens more brackets than it closes."""
+    return sum(text.count(sign) for sign in "([{") > sum(text.count(sign) for sign in ")]}")
+
+
 class Excerpt(SphinxDirective):
-    """`{excerpt} 02_executors car.py`: the lines from the first that holds `from` to the next that holds `to`."""
+    """`{excerpt} 02_executors car.py`: the lines from the first that holds `from` to the next that holds `to`.
+
+    A statement that is longer than a line is shown to its end.
+    """
 
     required_arguments = 2
     option_spec = {"from": directives.unchanged, "to": directives.unchanged}  # noqa: RUF012
@@ -80,6 +88,8 @@ class Excerpt(SphinxDirective):
         rest = lines[first:]
         if "to" in self.options:
             rest = rest[: next(number for number, line in enumerate(rest) if self.options["to"] in line) + 1]
+            while opened("\n".join(rest)) and len(rest) < len(lines) - first:
+                rest = lines[first : first + len(rest) + 1]
         indent = min(len(line) - len(line.lstrip()) for line in rest if line.strip())
         self.env.note_dependency(str(_LIB.parent / f"{page}.md"))
         return [named(file_name, listing_of("\n".join(line[indent:] for line in rest).strip("\n"), file_name))]
