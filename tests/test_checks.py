@@ -600,6 +600,8 @@ def test_an_action_is_followed_from_the_goal_to_its_end(grade: Grade) -> None:
             ros._expect_that(endless.cancel() and endless.wait_for_result(within=10), "cancelling is agreed to")
             ros._expect_that(endless.status == "canceled", "and done", observed=endless.status)
             ros._expect_that(len(endless.result.sequence) >= 3, "with what was counted", observed=endless.result)
+            groups = {run.group for run in ros.runs().of("count")}
+            ros._expect_that(groups == {"outside of all groups"}, "rclpy runs it in no group", observed=groups)
             refused = ros.send_goal("/count", Fibonacci, Fibonacci.Goal(order=-1))
             ros._expect_that(refused.accepted is False, "a goal below zero is rejected")
             ros._expect_that(not refused.cancel(), "and cannot be cancelled")

@@ -80,7 +80,9 @@ def _runs_of(inside: Inside) -> list[Run]:
             continue
         on = numbers.setdefault(thread, len(numbers) + 1)
         over = (number, began, ended, thread) not in going_on
-        found.append(Run(names[number], began, ended, on, groups.get(thing.group_id, ""), thing.node, over))
+        # rclpy runs the execute callback of an action as a task of the executor, whatever the server's group is.
+        group = "outside of all groups" if thing.kind == "execute" else groups.get(thing.group_id, "")
+        found.append(Run(names[number], began, ended, on, group, thing.node, over))
     return found
 
 
