@@ -33,8 +33,8 @@ OUTSIDE = """() => Reveal.getSlides().flatMap((slide, number) => {
   return shown && right <= innerWidth && bottom <= innerHeight
     ? [] : [`slide ${number + 1} "${slide.innerText.slice(0, 40)}" reaches ${right} x ${bottom}, title ${title.top}`];
 })"""
-# Runs in a talk: slides without notes, with much code, with lines of code that wrap, or with words that a last row cannot
-# read. Of a figure the smallest text counts, as large as it is shown.
+# Runs in a talk: slides without notes, with much code, with lines of code that wrap, or with words that a last row
+# cannot read. Of a figure the smallest text counts, as large as it is shown.
 UNFIT = """() => Reveal.getSlides().flatMap((slide, number) => {
   const at = Reveal.getIndices(slide), found = [];
   Reveal.slide(at.h, at.v);
