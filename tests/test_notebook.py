@@ -371,7 +371,7 @@ def write(notebook: Notebook, source: str = TALKER) -> int:
 def test_a_score_reads_as_a_report_in_every_front_end(notebook: Notebook) -> None:
     write(notebook)
     shown = notebook.run(CHECK, "check")
-    assert shown.text.startswith("✓ passed  2 of 2 points\n") and "<div" in shown.html
+    assert shown.result.startswith("✓ passed  2 of 2 points\n") and "<div" in shown.html
     assert shown.types.count("execute_result") == 1
 
 
@@ -422,7 +422,7 @@ def test_an_untouched_answer_earns_nothing_and_is_no_failure(notebook: Notebook)
     blank = "%%node talker\nprint('# YOUR CODE HERE')"
     notebook.save(answer(blank, blank=blank))
     notebook.run(blank, "talker")
-    shown = notebook.run('with launch("talker") as ros:\n    ros.expect_exit("talker")\nros.score(2)').text
+    shown = notebook.run('with launch("talker") as ros:\n    ros.expect_exit("talker")\nros.score(2)').result
     assert shown.startswith("○ not attempted yet  0 of 2 points\n")
     assert "The cell `%%node talker` is still as you received it." in shown
 

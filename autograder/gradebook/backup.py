@@ -28,7 +28,9 @@ def back_up(address: str, reason: str) -> Path | None:
     file = file_of(address)
     if file is None or not file.exists():
         return None
-    moment = f"{time.strftime('%Y-%m-%d_%H-%M-%S')}.{time.time_ns() // 1000 % 1_000_000:06d}"  # never that of another
+    now = time.time_ns()
+    second = time.strftime("%Y-%m-%d_%H-%M-%S", time.localtime(now // 10**9))
+    moment = f"{second}.{now // 1000 % 10**6:06d}"  # never that of another, and later than those before it
     copy = file.parent / BACKUPS / f"{moment}_{reason.replace(' ', '_')}.db"
     copy.parent.mkdir(exist_ok=True)
     beside = copy.with_name(f".{copy.name}.{os.getpid()}")
