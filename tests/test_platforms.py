@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import io
+import sqlite3
 import subprocess
 import sys
 import zipfile
@@ -440,3 +442,20 @@ def test_grade_says_what_was_left_out_by_its_exit_status(tmp_path: Path) -> None
     )  # fmt: skip
     assert done.returncode == 3, done.stderr
     assert "notes.txt" in done.stdout and "doejane" in done.stdout
+
+
+def test_a_gradebook_that_another_program_holds_is_a_sentence(tmp_path: Path) -> None:
+    course = toy.make_course(tmp_path / "course")
+    (course / "gradebook").mkdir()
+    source = toy.hand_in(tmp_path / "class", "ann", toy.CELLS).parent.parent
+    with contextlib.closing(sqlite3.connect(course / "gradebook" / "gradebook.db", isolation_level=None)) as other:
+        # Others may read, or not even that.
+        for lock, arguments in (("IMMEDIATE", ["grade", toy.LAB, str(source)]), ("EXCLUSIVE", ["export", "csv"])):
+            other.execute(f"BEGIN {lock}")
+            done = subprocess.run(
+                [str(Path(sys.executable).with_name("autograder")), *arguments],
+                cwd=course, capture_output=True, text=True, check=False,
+            )  # fmt: skip
+            other.execute("ROLLBACK")
+            assert done.returncode == 2 and "Traceback" not in done.stderr, done.stderr
+            assert "database is locked" in done.stderr and "no other program holds it" in done.stderr

@@ -129,6 +129,7 @@ def _by_hand(grade: Grade) -> str:
 def _time(submissions: int, seconds: dict[str, float]) -> str:
     after = seconds["all"] - seconds["running"]
     return (
-        f"{submissions} submissions in {seconds['all']:.0f} s: {seconds['running']:.0f} s until the last had run, then"
+        f"{submissions} submission{'s' * (submissions != 1)} in {seconds['all']:.0f} s:"
+        f" {seconds['running']:.0f} s until the last had run, then"
         f" {after:.0f} s more until the last was recorded. nbgrader worked for {seconds['recording']:.0f} s of that."
     )

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from autograder.cli import check, machine, package, submit  # noqa: F401  each registers its commands
 from autograder.cli.app import app
-from autograder.core.errors import KitError
+from autograder.core.errors import GRADEBOOK_REFUSED, KitError
 from autograder.setup.refusals import SetUpError, refuse_foreign_ros
 
 if find_spec("autograder.cli.instructors"):  # which a student's kit does without
@@ -52,6 +52,10 @@ def main() -> None:
         )
         sys.exit(2)
     except Exception as error:
+        if type(error).__name__ == "OperationalError":  # of sqlite3, and SQLAlchemy's around it
+            print(f"error: The gradebook cannot be used: {getattr(error, 'orig', error)}.", file=sys.stderr)
+            print(f"  {GRADEBOOK_REFUSED}", file=sys.stderr)
+            sys.exit(2)
         import traceback
 
         last = traceback.extract_tb(error.__traceback__)[-1]

@@ -15,3 +15,10 @@ class KitError(Exception):
     def _render_traceback_(self) -> list[str]:
         """What IPython shows in a notebook: the two sentences, and no traceback."""
         return str(self).splitlines()
+
+
+GRADEBOOK_REFUSED = (
+    "See that no other program holds it, that the disk has room and that you may write there, and run again: what is"
+    " finished is kept."
+)
+"""What to do when the database says no."""

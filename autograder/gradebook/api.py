@@ -35,7 +35,8 @@ def open_api(root: Path, gradebook: bool = True, **directories: Any) -> Any:
         leave_gradebook_alone(config)
     config.NbGraderAPI.log_level = logging.ERROR
     # What nbgrader logs is read from its answers; it must not also go to the terminal.
-    logging.getLogger("traitlets").addHandler(logging.NullHandler())
+    for logger in ("traitlets", "tornado.application"):
+        logging.getLogger(logger).addHandler(logging.NullHandler())
     warnings.filterwarnings("ignore", module=r"nbgrader\.api")
     config.CourseDirectory.merge(directories)
     CoursePaths(root).build.mkdir(exist_ok=True)

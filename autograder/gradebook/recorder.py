@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 from typing import Any
 
-from autograder.core.errors import KitError
+from autograder.core.errors import GRADEBOOK_REFUSED, KitError
 from autograder.core.files import write_beside
 from autograder.course.lab import Lab
 from autograder.course.paths import CoursePaths
@@ -22,7 +22,7 @@ from autograder.submission import exchange_secret
 MARK = ".grades"
 """The file beside a feedback page that says which grades it shows."""
 _NO_ROOM = re.compile(
-    r"(No space left on device|database or disk is full|disk I/O error|Disk quota exceeded"
+    r"(No space left on device|database or disk is full|database is locked|disk I/O error|Disk quota exceeded"
     r"|readonly database|Read-only file system|unable to open database file)"
 )
 """What the machine says, through nbgrader, that will not be otherwise for the next student."""
@@ -77,7 +77,7 @@ class Recorder:
             raise KitError(
                 f"Recording {student} failed, since the machine said: {refused[0]}. The gradebook is"
                 f" {gradebook_place(self._root)}.",
-                "See that the disk has room and that you may write there, and run again: what is finished is kept.",
+                GRADEBOOK_REFUSED,
             )
         self.failures[student] = why
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import tempfile
 from pathlib import Path
 
-from autograder.core.errors import KitError
+from autograder.core.errors import GRADEBOOK_REFUSED, KitError
 from autograder.course.lab import load_lab
 from autograder.gradebook.api import answered, last_error, open_api
 from autograder.gradebook.keeping import bring_up_to_date, make_room, name_course
@@ -24,7 +24,8 @@ def generate(root: Path, lab: str, into: Path, gradebook: bool) -> Path:
     api = open_api(root, gradebook, release_directory=str(into))
     answer = answered(api.generate_assignment(lab, force=True, create=True))
     if not answer["success"]:
-        raise KitError(f"nbgrader could not generate {lab}.", last_error(answer))
+        why = last_error(answer)
+        raise KitError(f"nbgrader could not generate {lab}: {why}.", GRADEBOOK_REFUSED * ("OperationalError" in why))
     return into / lab
 
 
