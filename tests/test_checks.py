@@ -270,6 +270,38 @@ def test_what_rclpy_raises_by_chance_at_a_signal_is_no_mistake_of_the_program(
     assert result.points == points, result
 
 
+def test_who_catches_no_signal_is_not_saved_by_what_rclpy_raises_by_chance(grade: Grade, tmp_path: Path) -> None:
+    # Its first run ends with what rclpy raises once in a while, and its next one with its own mistake.
+    raced = f"""\
+import pathlib
+from rclpy.executors import ExternalShutdownException as Interrupted
+
+ran = pathlib.Path("{tmp_path}/ran")
+first = not ran.exists()
+ran.touch()
+
+
+def _wait_for_ready_callbacks():
+    raise RuntimeError("failed to initialize wait set: the given context is not valid, at rcl")
+
+
+"""
+    spins = "    rclpy.spin(Talker())\n"
+    catches = f"    try:\n    {spins}    except Interrupted:\n        if not first:\n            raise\n"
+    assert spins in TALKER
+    result = grade(
+        """\
+        with launch("talker", parameters={"period": 60.0}) as ros:
+            ros.expect_node("/talker")
+            ros.expect_clean_end("talker", by="SIGTERM")
+        ros.score(2)
+        """,
+        talker__py=raced + TALKER.replace(spins, catches + "        _wait_for_ready_callbacks()\n"),
+    )
+    outcome = failure(result)
+    assert (outcome.code, "ExternalShutdownException" in outcome.because) == ("unclean-end", True), outcome
+
+
 @pytest.mark.parametrize(("shuts_down", "points"), [("try_shutdown()", 2), ("shutdown()", 0)])
 def test_ctrl_c_finds_rclpy_shut_down_each_time(grade: Grade, shuts_down: str, points: int) -> None:
     # In the middle of a callback is where Python and rclpy's own thread would be in a race.
