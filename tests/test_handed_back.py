@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import dataclasses
 import datetime
 import io
 import json
@@ -182,6 +183,11 @@ def test_feedback_goes_back_under_the_names_that_the_platform_gave(graded: Grade
     assert set(canvas) == {str(Path(name).with_suffix(".html")) for name in FILES.values()}
     moodle = graded.export("moodle-feedback").content
     assert unpacked(moodle)["Bob Müller_502_assignsubmission_file/toy.html"] == graded.pages["bob"]
+    file = "Bob Müller_502_assignsubmission_file_my toy.ipynb"  # given out without folders
+    flat = [dataclasses.replace(entry, file=file) for entry in class_entries(graded.root, toy.LAB)][:1]
+    assert set(unpacked(FORMATS["moodle-feedback"](flat, "").content)) == {
+        "Bob Müller_502_assignsubmission_file_/toy.html"
+    }
     # What Moodle reads out of a folder's name is what the intake reads out of it.
     names = {name.replace("toy.html", "toy.ipynb"): "" for name in unpacked(moodle)}
     with zipfile.ZipFile(tmp_path / "moodle.zip", "w") as archive:

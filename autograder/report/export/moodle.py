@@ -6,6 +6,7 @@ Sources: Moodle's documentation of both, and `importgradeslib.php` and `importzi
 from __future__ import annotations
 
 import datetime
+import re
 from collections.abc import Sequence
 
 from autograder.report.export.entry import Entry, Export, scores
@@ -15,6 +16,8 @@ from autograder.report.export.tables import table
 _COLUMNS = (
     "Identifier", "Full name", "Email address", "Grade", "Maximum Grade", "Last modified (grade)", "Feedback comments",
 )  # fmt: skip
+
+_GIVEN = re.compile(r".+_\d+_assignsubmission_[a-z]+_?")
 
 
 def to_moodle(entries: Sequence[Entry], _: str) -> Export:
@@ -45,7 +48,8 @@ def to_moodle_feedback(entries: Sequence[Entry], _: str) -> Export:
 
 def _place(entry: Entry) -> str:
     number = entry.known.get("moodle_id", "")
-    given = next((part for part in entry.file.split("/") if "_assignsubmission_" in part), "")
+    # Where Moodle gave out files without folders, what stands before their own names is the folder's name.
+    given = next(filter(None, map(_GIVEN.match, entry.file.split("/"))), None)
     name = (entry.known.get("name") or entry.student).replace("_", " ").replace("/", " ")
-    folder = given or (f"{name}_{number}_assignsubmission_file" if number else "")
+    folder = given[0] if given else (f"{name}_{number}_assignsubmission_file" if number else "")
     return f"{folder}/{entry.lab}.html" if folder else ""
