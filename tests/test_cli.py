@@ -193,6 +193,7 @@ def test_a_class_is_graded_once_and_only_what_changed_again(root: Path) -> None:
     assert "5/5" in rows["ann"] and "✓ passed" in rows["ann"]
     assert "2/5" in rows["bob"] and "1 to grade" in rows["bob"] and "ZeroDivision" in rows["bob"]
     assert "2/5" in rows["cem"] and "0/5" in rows["dan"] and "not valid JSON" in rows["dan"]
+    assert "dan: What was handed in has no points because it could not be read." in out
     with (root / "build" / "grades.csv").open() as file:
         scores = {row["student"]: (row["score"], row["waiting"]) for row in csv.DictReader(file)}
     assert scores == {"ann": ("5", "1"), "bob": ("2", "1"), "cem": ("2", "1"), "dan": ("0", "0")}

@@ -112,7 +112,7 @@ class CellResult(_Model):
     """Hidden tests were taken out of this copy of the check: what is passed here is not yet earned."""
 
     flags: list[Text] = Field(default_factory=list)
-    """Where what was seen inside a program contradicts what the graph showed. For instructors; it costs no points."""
+    """What an instructor should look at, such as what contradicts itself, or cannot be read; it changes no points."""
     not_attempted: list[str] = Field(default_factory=list)
     """Files of answer cells that are still as students receive them; for this the check did not pass."""
     logs: list[NodeLog] = Field(default_factory=list)

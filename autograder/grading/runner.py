@@ -92,9 +92,12 @@ def run_submission(
 
 
 def without_running(submission: Submission, job: Job) -> SubmissionResult:
-    """Return the result of a submission that cannot be read: no check is passed."""
+    """Return the result of a submission that cannot be read: no check is passed, and a person looks at what is there."""
     problem = submission.problems[-1].model_copy(update={"title": "there is a notebook to check"})
-    return job.result([all_for_one_reason(cell, problem, points=0.0) for cell in job.checks])
+    checks = [all_for_one_reason(cell, problem, points=0.0) for cell in job.checks]
+    if checks and problem.code != "no-notebook":
+        checks[0].flags.append(f"What was handed in has no points because it could not be read. {problem.because}")
+    return job.result(checks)
 
 
 def job_of(submission: Submission, student: str, lab: Lab, settings: Settings) -> Job:

@@ -256,7 +256,7 @@ def undecided_view(results: Sequence[SubmissionResult]) -> RenderableType | None
         head = "The grader could not find out; these wait for manual grading (--force runs them again):"
         found += [Text(head, "bold magenta"), *lines]
     if flagged:
-        found += [Text("These keep their points, and a person should look at them:", "bold magenta"), *flagged]
+        found += [Text("The points of these stand, and a person should look at them:", "bold magenta"), *flagged]
     return Group(*found) if found else None
 
 
