@@ -92,7 +92,7 @@ def run_submission(
 
 
 def without_running(submission: Submission, job: Job) -> SubmissionResult:
-    """Return the result of a submission that cannot be read: no check is passed, and a person looks at what is there."""
+    """Return the result of a submission that cannot be read: no check is passed, and a person is to look at it."""
     problem = submission.problems[-1].model_copy(update={"title": "there is a notebook to check"})
     checks = [all_for_one_reason(cell, problem, points=0.0) for cell in job.checks]
     if checks and problem.code != "no-notebook":
