@@ -184,9 +184,12 @@ def test_time_in_which_a_program_got_no_cpu_does_not_count_against_it(
     observer: Observer, programs: Callable[[str], int]
 ) -> None:
     programs(WORKS_NOW_AND_THEN)
-    began, patience = time.monotonic(), observer.patience
-    assert not observer.wait(lambda: False, within=2.0)
-    assert time.monotonic() - began > 2.2
+    patience, took, deadline = observer.patience, 0.0, time.monotonic() + 60
+    while took <= 2.2 and time.monotonic() < deadline:  # until the strangers kept it from working meanwhile
+        began = time.monotonic()
+        assert not observer.wait(lambda: False, within=2.0)
+        took = time.monotonic() - began
+    assert took > 2.2
     assert observer.patience < patience
     observer.patience = 0.0
     began = time.monotonic()

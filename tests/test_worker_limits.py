@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import os
+import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
+import psutil
 import pytest
 
 from autograder.core.results import Isolation, NodeLog
@@ -176,3 +179,36 @@ def test_a_flooded_topic_takes_at_most_half_of_an_observers_room_and_silences_no
     )
     result = run_in_worker(job(check, files={"flood.py": flood, "talk.py": talk}))
     assert result.checks[0].outcomes[0].title == "True True True {60000}", result
+
+
+@pytest.mark.parametrize(("times", "points"), [(1, 1.0), (2, 0.0)])
+def test_a_check_is_tried_once_more_if_a_program_of_it_is_killed(times: int, points: float) -> None:
+    victim = f"victim-{os.getpid()}"[:15]  # as much as the kernel keeps of a name
+    program = f"""import ctypes, time
+ctypes.CDLL(None).prctl(15, b"{victim}", 0, 0, 0)
+time.sleep({8 if times == 1 else 60})
+"""
+    over, killed = threading.Event(), []
+
+    def kill() -> None:
+        while len(killed) < times and not over.wait(0.02):
+            for process in psutil.process_iter(["name"]):
+                if process.info["name"] == victim and process.pid not in killed:
+                    process.kill()
+                    killed.append(process.pid)
+
+    killer = threading.Thread(target=kill)
+    killer.start()
+    try:
+        result = run_in_worker(
+            job(
+                "from autograder.checks import launch\n"
+                "with launch('victim') as ros:\n    ros.expect_exit('victim', status=0, within=60)\nros.score(1)",
+                files={"victim.py": program},
+            )
+        )
+    finally:
+        over.set()
+        killer.join()
+    assert len(killed) == times
+    assert [check.points for check in result.checks] == [points]

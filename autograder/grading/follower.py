@@ -9,7 +9,7 @@ from pydantic import ValidationError
 
 from autograder.core.results import CheckResult, Outcome
 from autograder.course.lab import Cell
-from autograder.grading.validation import believed
+from autograder.grading.validation import believed, was_killed
 
 
 class Follower(Protocol):
@@ -42,6 +42,7 @@ class Ear:
         self._worker, self._tell = worker, tell
         self._left: list[Cell] = []
         self._line = bytearray()
+        self._killed: set[str] = set()
 
     def begin(self, cells: Sequence[Cell]) -> None:
         """A process begins with these checks."""
@@ -66,7 +67,10 @@ class Ear:
         cell = next((one for one in self._left if one.grade_id == check.grade_id), None)
         if cell is not None:
             self._left.remove(cell)
-            self._tell(believed(cell, check))
+            if was_killed(check) and check.grade_id not in self._killed:
+                self._killed.add(check.grade_id)  # it is tried once more
+            else:
+                self._tell(believed(cell, check))
             self._now()
 
     def _now(self) -> None:

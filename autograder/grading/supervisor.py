@@ -15,7 +15,7 @@ from autograder.course.lab import Cell
 from autograder.grading.builds import with_interfaces
 from autograder.grading.follower import Ear, Follower, Told
 from autograder.grading.job import CELL_SECONDS, STUCK_SECONDS, Job
-from autograder.grading.validation import undecided, validated
+from autograder.grading.validation import undecided, validated, was_killed
 from autograder.sandbox.outer import OuterRun, run_in_sandbox
 
 SECONDS_PER_CHECK = 30.0
@@ -108,13 +108,14 @@ def _run_share(
 ) -> list[CheckResult]:
     """Run some of a job's checks, one after the other.
 
-    At a check at which the worker gets stuck, nobody could find out. One at which it dies is tried once more. Then
-    another worker goes on with the checks that are left.
+    At a check at which the worker gets stuck, nobody could find out. One at which it dies is tried once more, and so is
+    one that fails because a program was killed. Then another worker goes on with the checks that are left.
     """
     decided: list[CheckResult] = []
     left = list(share)
     lost: list[CheckResult] = []
     died_at = ""
+    killed: set[str] = set()
     while left and len(lost) < LOST:
         cells = [cell for cell in job.cells if cell.points is None or cell in left]
         part = job.model_copy(update={"cells": cells})
@@ -129,17 +130,23 @@ def _run_share(
             stop,
             ear.hear if ear is not None else None,
         )
-        decided += _said(run.stdout)
-        known = {check.grade_id for check in decided}
-        left = [cell for cell in left if cell.grade_id not in known]
-        if not left:
-            break
+        said = _said(run.stdout)
+        once_more = {check.grade_id for check in said if was_killed(check)} - killed
+        killed |= once_more
+        known = {check.grade_id for check in decided + said}
+        decided += [check for check in said if check.grade_id not in once_more]
+        open_at = next((cell for cell in left if cell.grade_id not in known), None)
+        left = [cell for cell in left if cell.grade_id not in known - once_more]
+        if open_at is None:
+            continue
         if run.timed_out or _STACKS in b"\n" + run.stdout:
-            lost.append(_stuck(left.pop(0), run, seconds))
-        elif died_at == left[0].grade_id:
-            lost.append(_died(left.pop(0), run))
+            left.remove(open_at)
+            lost.append(_stuck(open_at, run, seconds))
+        elif died_at == open_at.grade_id:
+            left.remove(open_at)
+            lost.append(_died(open_at, run))
         else:
-            died_at = left[0].grade_id
+            died_at = open_at.grade_id
     because = "It was not run: at other checks of this submission the grader got stuck or died."
     return [*decided, *lost, *(undecided(cell, because, code=lost[-1].outcomes[0].code) for cell in left)]
 

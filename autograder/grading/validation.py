@@ -6,6 +6,7 @@ check has.
 
 from __future__ import annotations
 
+import signal
 from collections.abc import Sequence
 
 from autograder.core.results import CheckResult, Outcome, Status, SubmissionResult
@@ -65,3 +66,14 @@ def lacks_a_result(result: SubmissionResult) -> bool:
     bring it about again, and a person has to look.
     """
     return any(outcome.code == NO_RESULT for check in result.checks for outcome in check.outcomes)
+
+
+def was_killed(check: CheckResult) -> bool:
+    """Whether it failed because a program got a signal that no program can help, and that the kit did not send.
+
+    The system sends it when memory runs out, and then takes any process; a program that sends it to itself will do so
+    when it is tried once more.
+    """
+    failure = check.first_failure
+    ends = [log.exit_status for log in check.logs if not log.stopped_by]
+    return failure is not None and failure.code == "crashed" and -signal.SIGKILL in ends

@@ -12,8 +12,11 @@ from autograder.diagnosis.events import Thing
 from autograder.graph.names import UNKNOWN_NODE, full_name
 from autograder.graph.recording import Received
 
-_NAMED_WITHIN = 2.0
-"""Seconds that the word of which node an endpoint belongs to may be under way."""
+_MADE_WITHIN = 2.0
+"""Seconds in which what the programs say they made comes to be on the graph."""
+_NAMED_WITHIN = 10.0
+"""Seconds that the word of which node an endpoint belongs to may be under way; what is lost is sent again after 3."""
+_NAMELESS = "a node whose name is not known"
 
 
 class SourceExpectations(EndExpectations):
@@ -25,24 +28,24 @@ class SourceExpectations(EndExpectations):
         """Fail if the messages may come from another publisher than the one that is meant."""
         if not received:
             return
-        self._observer.wait(lambda: self._knows_publishers(topic, msg_type), _NAMED_WITHIN)
-        ends = self._ends(topic, msg_type, "publisher", "")
-        owners = [full_name(end.node_namespace, end.node_name) for end in ends]
+        self._observer.wait(lambda: not self._unmet(topic, msg_type), _MADE_WITHIN)
+        self._observer.wait(lambda: _NAMELESS not in self._nodes_publishing(topic, msg_type), _NAMED_WITHIN)
+        owners = self._nodes_publishing(topic, msg_type)
         named = ", ".join(f"{many} of {name}" if many > 1 else name for name, many in sorted(Counter(owners).items()))
-        if len(ends) > publishers and not (
+        if len(owners) > publishers and not (
             len(set(owners)) == publishers == 1 and not self._several_used(topic, received)
         ):
             self._fail(
                 title,
                 Diagnosis(
-                    f"`{topic}` has {len(ends)} publishers ({named}): it cannot be told whose messages these are.",
+                    f"`{topic}` has {len(owners)} publishers ({named}): it cannot be told whose messages these are.",
                     "extra-publisher",
                     "Publish on this topic from one place only."
                     + " Make the publisher once, in the constructor, and send each message with it."
                     * (len(set(owners)) == 1),
                 ),
                 expected=f"{publishers} publisher",
-                observed=f"{len(ends)} publishers",
+                observed=f"{len(owners)} publishers",
             )
         if publishers == 1 and _numbers_repeat(received):
             because = f"The messages on `{topic}` come from more than one publisher (their sequence numbers repeat)."
@@ -52,14 +55,18 @@ class SourceExpectations(EndExpectations):
             because = f"The messages on `{topic}` come from {named}, not from `{node}`."
             self._fail(title, Diagnosis(because, "wrong-node"), expected=node, observed=named)
 
-    def _knows_publishers(self, topic: str, msg_type: type) -> bool:
-        """Whether all publishers of a topic that the programs say they made are on the graph, each with its node."""
-        on_graph = Counter(
-            full_name(end.node_namespace, end.node_name) if end.node_name != UNKNOWN_NODE else UNKNOWN_NODE
+    def _nodes_publishing(self, topic: str, msg_type: type) -> list[str]:
+        """The full name of each publisher's node."""
+        return [
+            full_name(end.node_namespace, end.node_name) if end.node_name != UNKNOWN_NODE else _NAMELESS
             for end in self._ends(topic, msg_type, "publisher", "")
+        ]
+
+    def _unmet(self, topic: str, msg_type: type) -> Counter[str]:
+        """Nodes whose publishers, which the programs say they made, are not on the graph yet."""
+        return Counter(thing.node for thing in self._publishers_made(topic)) - Counter(
+            self._nodes_publishing(topic, msg_type)
         )
-        made = Counter(thing.node for thing in self._publishers_made(topic))
-        return UNKNOWN_NODE not in on_graph and made <= on_graph
 
     def _several_used(self, topic: str, received: Sequence[Received]) -> bool:
         """Whether more than one publisher of a topic has sent something."""
