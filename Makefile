@@ -54,8 +54,7 @@ release: setup-dev ## make labs/ from solutions/, and from them build/release: w
 	@$(RUN) autograder kit
 
 lectures: setup-dev ## build the book and the slides into build/lectures
-	@$(RUN) python -m sphinx -q -W --keep-going -b html -d build/lectures/doctrees/book lectures build/lectures/book $(ARGS)
-	@$(RUN) python -m sphinx -q -W --keep-going -b revealjs -c lectures -d build/lectures/doctrees/slides lectures/slides build/lectures/slides $(ARGS)
+	@$(RUN) python lectures/_lib/build.py build/lectures $(ARGS)
 	@echo build/lectures/book/index.html build/lectures/slides/index.html
 
 pdf: lectures ## print the slides as PDF, a page for each, into build/lectures/slides (needs chromium)

@@ -36,10 +36,8 @@ myst_enable_extensions = ["colon_fence", "deflist"]
 myst_heading_anchors = 3
 
 nb_execution_mode = "cache"
-nb_execution_cache_path = str(ROOT / "build" / "lectures" / "cache")
 nb_execution_in_temp = True
 nb_execution_timeout = 300  # seconds for a cell: compiling an interface takes half a minute on a busy machine
-nb_execution_raise_on_error = True
 nb_execution_show_tb = True
 nb_merge_streams = True
 nb_ipywidgets_js: dict[str, dict[str, str]] = {}

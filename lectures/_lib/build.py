@@ -1,0 +1,43 @@
+"""Build book and slides: `python build.py OUTPUT [more options for Sphinx]`, every lecture's cells included.
+
+What a lecture measures is measured once more if it did not hold. On a busy machine a program may come too late for an
+experiment; a statement that is wrong fails the second time, too, and with it the build.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+LECTURES = Path(__file__).resolve().parent.parent
+TARGETS = (("html", "book", LECTURES), ("revealjs", "slides", LECTURES / "slides"))
+DID_NOT_HOLD = "Executing notebook failed"
+"""What MyST-NB says of a lecture of which a cell failed."""
+
+
+def build(output: Path, options: list[str]) -> int:
+    """Build both into a folder, and return Sphinx' exit status.
+
+    Args:
+        output: gets `book`, `slides` and what Sphinx keeps for the next time. Lectures that have run are not run again
+            as long as their cells are the same.
+        options: for Sphinx.
+    """
+    for builder, name, source in TARGETS:
+        command = [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", "-b", builder, "-c", str(LECTURES)]
+        command += ["-d", str(output / "doctrees" / name), "-D", f"nb_execution_cache_path={output / 'cache'}"]
+        command += [*options, str(source), str(output / name)]
+        done = subprocess.run(command, stderr=subprocess.PIPE, text=True)
+        if DID_NOT_HOLD in done.stderr:
+            print(done.stderr, "Not everything held that is measured: what failed is run once more.", file=sys.stderr)
+            # Sphinx takes the pages of before for finished, unless it forgets what it knows of them.
+            done = subprocess.run([*command, "-E"], stderr=subprocess.PIPE, text=True)
+        if done.returncode != 0:
+            print(done.stderr, file=sys.stderr)
+            return done.returncode
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(build(Path(sys.argv[1]).resolve(), sys.argv[2:]))
