@@ -6,6 +6,7 @@ The pages are opened in Debian's chromium. Where there is none the browser tests
 from __future__ import annotations
 
 import re
+import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -81,6 +82,31 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     done = subprocess.run(command, capture_output=True, text=True, timeout=3600)
     assert done.returncode == 0, done.stderr
     return folder
+
+
+@pytest.mark.parametrize(("fails", "status"), [(1, 0), (2, 1)], ids=["once", "twice"])
+def test_a_page_of_which_a_cell_failed_is_run_once_more(tmp_path: Path, fails: int, status: int) -> None:
+    script = tmp_path / "lectures" / "_lib" / "build.py"
+    (tmp_path / "lectures" / "slides").mkdir(parents=True)
+    script.parent.mkdir()
+    shutil.copy(ROOT / "lectures" / "_lib" / "build.py", script)
+    (tmp_path / "lectures" / "conf.py").write_text(
+        "extensions = ['myst_nb', 'sphinx_revealjs']\nexclude_patterns = ['_*', 'slides']\n"
+        "nb_execution_mode = 'cache'\nnb_execution_show_tb = True\n"
+    )
+    measured = (
+        "---\nfile_format: mystnb\nkernelspec:\n  name: python3\n---\n# Measured\n\n```{code-cell} ipython3\n"
+        f"runs = open({str(tmp_path / 'runs')!r}, 'a+')\nruns.write('x')\nruns.seek(0)\n"
+        f"assert len(runs.read()) > {fails}\n```\n"
+    )
+    (tmp_path / "lectures" / "index.md").write_text(measured)
+    (tmp_path / "lectures" / "slides" / "index.md").write_text("# A talk\n")
+    command = [sys.executable, script, tmp_path / "out"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=600)
+    assert done.returncode == status, done.stderr
+    assert "what failed is run once more" in done.stderr
+    assert (tmp_path / "runs").read_text() == "xx"
+    assert (tmp_path / "out" / "slides" / "index.html").is_file() == (status == 0)
 
 
 @pytest.fixture
