@@ -55,6 +55,10 @@ def together(at_once: int = 2, itself: bool = False) -> Ask:
     return lambda scene, name: diagnosis.why_not_together(scene, "", at_once, itself)
 
 
+def alike(scene: Scene, name: str) -> Diagnosis | None:
+    return diagnosis.why_all_alike(scene)
+
+
 def starved(scene: Scene, name: str) -> Diagnosis | None:
     return diagnosis.why_starved(scene)
 
@@ -503,7 +507,26 @@ CASES = {
         never=("waits-for-service",),
     ),
     "awaits": Case(ASKER.format(""), AWAIT, says="await-same-group", because="await self.client"),
-    "awaits_well": Case(ASKER.format(OWN), AWAIT, says="silent", never=("await-same-group", "spinning-ended")),
+    "awaits_well": Case(
+        ASKER.format(OWN), AWAIT, says="silent", never=("await-same-group", "spinning-ended", "never-awaited")
+    ),
+    "awaits_never": Case(
+        "self.create_timer(0.05, lambda: self.ask())\n",
+        "async def ask(self):\n    self.out.publish(String())\n",
+        says="never-awaited",
+        because="It.ask` was called and never awaited",
+    ),
+    "asks_as_another_type": Case(
+        "from rclpy.context import Context\nfrom std_srvs.srv import SetBool\n"
+        "context = Context()\ncontext.init()\n"  # of one context Fast DDS would refuse the client
+        "self.other = rclpy.create_node('other', context=context)\n"
+        "self.other.create_service(Trigger, f'/{self.get_name()}/gate', lambda request, response: response)\n"
+        "self.client = self.create_client(SetBool, '~/gate')\nself.client.call_async(SetBool.Request())\n"
+        "self.create_timer(0.05, lambda: None)\n",
+        says="wrong-type",
+        because="as a std_srvs/srv/SetBool, and the service there is a std_srvs/srv/Trigger",
+        never=("waits-for-service",),
+    ),
     "polls": Case(ASKER.format(OWN), POLL, says="busy-wait", because="no thread is free", never=("stuck-callback",)),
     "polls_well": Case(ASKER.format(OWN), POLL, THREADS.format(2), says="silent", never=("busy-wait",)),
     "spins_inside": Case(
@@ -600,6 +623,11 @@ CASES = {
         says="silent",
         never=("callback-exception", "thread-exception"),
     ),
+    "thread_exits": Case(
+        "import sys\nself.create_timer(0.05, lambda: None)\nthreading.Thread(target=sys.exit).start()\n",
+        says="thread-exception",
+        because="that ends the thread in which it is raised, and no other",
+    ),
     "thread_raises": Case(
         "self.create_timer(0.05, self.tick)\nthreading.Thread(target=self.work).start()\n",
         "def tick(self):\n    pass\n\ndef work(self):\n    raise ValueError('no')\n",
@@ -695,7 +723,58 @@ CASES = {
             "one-group",
             "exclusive-group",
             "no-callback-groups",
+            "group-limit",
         ),
+    ),
+    "two_of_three": Case(
+        "group = Exclusive()\nself.create_timer(0.05, self.slow, callback_group=Exclusive())\n"
+        + TWO.format(", callback_group=group", ", callback_group=group"),
+        SLOW,
+        THREADS.format(4),
+        says="group-limit",
+        because="no more than 2 callbacks run at once, and 3 have to",
+        ask=together(3),
+        never=("one-group",),
+    ),
+    "a_lock_for_both": Case(
+        "self.lock = threading.Lock()\n" + TWO.format(OWN, OWN),
+        "def slow(self):\n    with self.lock:\n        time.sleep(0.1)\n",
+        THREADS.format(4),
+        says="waits-for-lock",
+        because="take the same `self.lock`",
+        ask=together(),
+    ),
+    "a_lock_for_each": Case(
+        "self.one, self.other = threading.Lock(), threading.Lock()\n"
+        "self.create_timer(0.05, self.slow, callback_group=Exclusive())\n"
+        "self.create_timer(0.05, self.slower, callback_group=Exclusive())\n",
+        "def slow(self):\n    with self.one:\n        time.sleep(0.1)\n\n"
+        "def slower(self):\n    with self.other:\n        time.sleep(0.1)\n",
+        THREADS.format(4),
+        ask=together(),
+        never=("waits-for-lock",),
+    ),
+    "two_executors": Case(
+        TWO.format(OWN, OWN),
+        SLOW,
+        "one, other = SingleThreadedExecutor(), SingleThreadedExecutor()\none.add_node(node)\nother.add_node(node)\n"
+        "threading.Thread(target=one.spin, daemon=True).start()\nother.spin()",
+        says="single-threaded-executor",
+        because="a node is in one executor at a time",
+        ask=together(),
+    ),
+    "last_of_the_loop": Case(
+        "for word in ('a', 'b'):\n    self.create_timer(0.05, lambda: self.say(word))\n",
+        "def say(self, word):\n    self.out.publish(String(data=word))\n",
+        says="late-binding",
+        because="looks `word` up when it runs",
+        ask=alike,
+    ),
+    "each_of_the_loop": Case(
+        "for word in ('a', 'b'):\n    self.create_timer(0.05, lambda word=word: self.say(word))\n",
+        "def say(self, word):\n    self.out.publish(String(data=word))\n",
+        ask=alike,
+        never=("late-binding",),
     ),
     "exclusive": Case(
         "self.create_timer(0.05, self.slow)\n",
@@ -749,6 +828,14 @@ CASES = {
         because="ValueError: no",
         ask=trouble,
         never=("syntax-error", "exited", "not-spinning"),
+    ),
+    "done_callback_of_none": Case(
+        "from rclpy.task import Future\nself.future = Future()\nself.future.add_done_callback(print('done'))\n"
+        "self.create_timer(0.05, lambda: self.future.done() or self.future.set_result(1))\n",
+        main="rclpy.spin_until_future_complete(node, node.future)\nNone()",
+        says="crashed",
+        because="handed over without brackets",
+        ask=trouble,
     ),
     "exits": Case(
         main="rclpy.spin_once(node, timeout_sec=0.1)\nprint('bye')",

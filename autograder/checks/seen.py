@@ -23,6 +23,7 @@ BY_TIMELINE = frozenset(
     {
         *("single-threaded-executor", "few-threads", "machine-threads"),
         *("no-callback-groups", "one-group", "exclusive-group", "timer-same-group"),
+        "group-limit",
         *("starved", "paused", "overlap", "no-overlap", "period", "too-few-runs"),
     }
 )

@@ -22,6 +22,7 @@ from autograder.diagnosis.goals import (
     why_waits_for_a_goal,
     why_wrong_feedback,
 )
+from autograder.diagnosis.loops import why_all_alike
 from autograder.diagnosis.matching import why_not_matched
 from autograder.diagnosis.names import why_doubled, why_no_endpoint, why_no_node, why_no_service, why_topic_present
 from autograder.diagnosis.programs import program_trouble, shut_down_inside
@@ -58,6 +59,7 @@ __all__ = [
     "reason_inside",
     "shut_down_inside",
     "waits_for_its_group",
+    "why_all_alike",
     "why_doubled",
     "why_kept_waiting",
     "why_no_action",

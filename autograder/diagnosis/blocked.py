@@ -85,6 +85,23 @@ def asks_nobody(inside: Inside) -> Diagnosis | None:
     return None
 
 
+def asks_another_type(inside: Inside) -> Diagnosis | None:
+    """Must have seen: a request not answered for a while, and the service on the graph with another type only."""
+    for client in inside.things.values():
+        waited = client.runs > client.done and inside.now - client.last > STUCK_AFTER
+        if client.kind == "client" and waited and not client.destroyed:
+            offered = inside.observer.services().get(client.name, [])
+            asked = inside.observer.clients(client.node).get(client.name, [])
+            if offered and asked and not set(asked) & set(offered):
+                return Diagnosis(
+                    f"`{inside.name}` asks `{client.name}` as a {asked[0]}, and the service there is a {offered[0]}: "
+                    "its requests do not arrive.",
+                    "wrong-type",
+                    "Client and server meet only with one name and one type.",
+                )
+    return None
+
+
 def _nobody_offers(client: Thing, services: dict[str, list[str]], said: str, else_do: str = "") -> Diagnosis:
     own = ("rcl_interfaces/", "type_description")  # what each node offers by itself
     close = nearest(client.name, [n for n, types in services.items() if not types[0].startswith(own)])

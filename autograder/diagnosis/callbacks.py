@@ -17,6 +17,8 @@ _AFTER = {
 }
 _CODES = {"service": "service-exception", "lifecycle": "lifecycle-exception", "execute": "execute-exception"}
 
+_NEVER_AWAITED = re.compile(r"RuntimeWarning: coroutine '([\w.<>]{1,100})' was never awaited")
+
 
 def failed(inside: Inside) -> Diagnosis | None:
     """Must have seen: an exception leave a callback, a return value of the wrong type, or a message refused.
@@ -34,12 +36,34 @@ def thread_failed(inside: Inside) -> Diagnosis | None:
     """Must have seen: an exception end a thread of the program's own."""
     for event in inside.all(ThreadError):
         error = f"{event.type}: {event.text}".strip(": ")
+        if event.type == "SystemExit":
+            return Diagnosis(
+                f"A thread of `{inside.name}` ended by `sys.exit` or SystemExit: that ends the thread in which it is "
+                "raised, and no other.",
+                "thread-exception",
+                "Only in the main thread does it end the program.",
+            )
+        at = f" in {event.line}{quoted(event.code, error)}" if event.line else ""
         return Diagnosis(
-            f"A thread of `{inside.name}` ended with an error in {event.line}{quoted(event.code, error)}: {error}",
+            f"A thread of `{inside.name}` ended with an error{at}: {error}",
             "thread-exception",
             "What this thread had to do is not done any more; the rest of the program goes on.",
         )
     return None
+
+
+def never_awaited(inside: Inside) -> Diagnosis | None:
+    """Must have seen: Python's own warning of a coroutine that was made and never awaited."""
+    found = _NEVER_AWAITED.search(inside.program.output())
+    if not found:
+        return None
+    return Diagnosis(
+        f"`{inside.name}`: the coroutine `{found[1]}` was called and never awaited (Python says so in the log), so "
+        "nothing in it has run.",
+        "never-awaited",
+        "To call an `async def` only makes a coroutine. Await it; to rclpy hand the function itself, for rclpy does "
+        "not await what a lambda returns.",
+    )
 
 
 def failed_in_a_callback(scene: Scene) -> DiagnosedProgram | None:

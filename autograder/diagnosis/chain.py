@@ -27,6 +27,7 @@ SEEN: tuple[Link, ...] = (
     blocked.call_in_callback,
     blocked.waits_for_a_service,
     blocked.asks_nobody,
+    blocked.asks_another_type,
     blocked.nested_spin,
     blocked.rate_in_callback,
     blocked.await_same_group,

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from rclpy.qos import DurabilityPolicy, QoSProfile
 
-from autograder.diagnosis import spinning
+from autograder.diagnosis import callbacks, spinning
 from autograder.diagnosis.chain import inside_reason
 from autograder.diagnosis.events import LifecyclePublishOff, Thing
 from autograder.diagnosis.inside import Inside, called, listed
@@ -44,6 +44,7 @@ def why_silent(scene: Scene, topic: str, msg_type: type, profile: QoSProfile) ->
         or too_old(scene, topic, profile)
         or not_due(scene, topic)
         or why_starved(scene)
+        or first((callbacks.never_awaited,), scene.inside_of(node))
         or Diagnosis(account(scene, topic), SILENT)
     )
 
@@ -132,7 +133,7 @@ def paces(scene: Scene, topic: str) -> str:
         timers = [t for t in inside.callbacks if t.kind == "timer" and t.node in nodes and not t.cancelled and t.runs]
         if not inside.attached or not timers:
             continue
-        said.append(f"`{inside.name}` runs {listed(timers[:4])}.")
+        said.append(f"`{inside.name}` runs {listed(timers[:6])}.")
         declared = {parameter.name for parameter in inside.parameters if parameter.declared}
         given = scene.parameters[number] if number < len(scene.parameters) else ()
         lost = [name for name in given if name not in declared]

@@ -143,6 +143,21 @@ class Source:
             found |= {what: number for number, what in self._takes(function).items()}
         return found
 
+    def late_name(self, line: int) -> str:
+        """A loop's own name that a lambda in this line and loop reads when it runs; empty if there is none."""
+        for loop in ast.walk(self._tree):
+            if not isinstance(loop, (ast.For, ast.comprehension)):
+                continue
+            names = {node.id for node in ast.walk(loop.target) if isinstance(node, ast.Name)}
+            for made in ast.walk(self._tree if isinstance(loop, ast.comprehension) else loop):
+                if isinstance(made, ast.Lambda) and made.lineno == line:
+                    given = {each.arg for each in ast.walk(made.args) if isinstance(each, ast.arg)}
+                    read = {node.id for node in ast.walk(made.body) if isinstance(node, ast.Name)}
+                    found = sorted(names & read - given)
+                    if found:
+                        return found[0]
+        return ""
+
     def method_calls(self) -> list[tuple[str, ast.Call]]:
         """Every call in a method of a class, with the method's name."""
         return [

@@ -8,6 +8,7 @@ from autograder.diagnosis.events import ExecutorSeen, Thing
 from autograder.diagnosis.inside import Inside, called, listed
 from autograder.diagnosis.reason import Diagnosis
 from autograder.diagnosis.scene import Scene
+from autograder.diagnosis.turns import one_lock
 
 MOST_OF_THE_TIME = 0.6
 """Share of the time that others must have taken for a callback to count as kept waiting by them."""
@@ -35,7 +36,12 @@ def single_threaded(inside: Inside) -> Diagnosis | None:
     if not used or len(used) > 1 or used[0].threads is not None:
         return None
     unused = [e for e in inside.executors if e.threads is not None and not e.most]
-    if unused:
+    if any(e.spinning and not e.nodes for e in inside.executors):
+        because = (
+            "It spins more than one executor, but a node is in one executor at a time, the one to which it was added "
+            f"last: all callbacks ran on the one thread of a {used[0].type}."
+        )
+    elif unused:
         because = "It makes a MultiThreadedExecutor, but spins the node with another, single-threaded one."
     elif any(thing.group == "ReentrantCallbackGroup" for thing in _active(inside)):
         because = f"It is spun by a {used[0].type}, one callback at a time: a reentrant group changes nothing there."
@@ -90,6 +96,38 @@ def one_group(inside: Inside) -> Diagnosis | None:
     )
 
 
+def groups_allow_fewer(inside: Inside, at_once: int) -> Diagnosis | None:
+    """Must have seen: the groups of all timers and of all callbacks that ran, which let fewer of them run at once.
+
+    A reentrant callback that overlapped itself may stand for any number of them: nothing is said then.
+    """
+    groups = _by_group([thing for thing in inside.callbacks if thing.runs or thing.kind == "timer"])
+    limit = sum(1 if members[0].exclusive else len(members) for members in groups)
+    if not groups or limit >= at_once or any(thing.most > 1 for members in groups for thing in members):
+        return None
+    return Diagnosis(
+        f"`{inside.name}`: its groups let no more than {limit} callbacks run at once, and {at_once} have to: "
+        f"{_kinds(groups)}.",
+        "group-limit",
+        "Of a mutually exclusive group one callback runs at a time: what may overlap the others of it belongs into "
+        "another group.",
+    )
+
+
+def _by_group(things: Sequence[Thing]) -> list[list[Thing]]:
+    groups: dict[int, list[Thing]] = {}
+    for thing in things:
+        groups.setdefault(thing.group_id, []).append(thing)
+    return list(groups.values())
+
+
+def _kinds(groups: Sequence[Sequence[Thing]]) -> str:
+    """What is in these groups, in words."""
+    return "; ".join(
+        f"{'an exclusive' if members[0].exclusive else 'a reentrant'} group has {listed(members)}" for members in groups
+    )
+
+
 def exclusive_itself(inside: Inside) -> Diagnosis | None:
     """Must have seen: callbacks run, and none of them in a reentrant group. (For a callback that overlaps itself.)"""
     active = _active(inside)
@@ -127,6 +165,8 @@ def why_not_together(scene: Scene, topic: str, at_once: int = 2, itself: bool = 
             continue
         found = single_threaded(inside) or few_threads(inside, 2)
         found = found or (exclusive_itself(inside) if itself else one_group(inside)) or few_threads(inside, at_once)
+        if not itself:
+            found = found or groups_allow_fewer(inside, at_once) or one_lock(inside, at_once)
         if found:
             return found
     return None
@@ -218,15 +258,8 @@ def layout(scene: Scene, topic: str) -> str:
         if not inside.attached or not _used(inside):
             continue
         executor = _used(inside)[0]
-        groups: dict[int, list[Thing]] = {}
-        for thing in _active(inside):
-            groups.setdefault(thing.group_id, []).append(thing)
-        kinds = "; ".join(
-            f"{'an exclusive' if members[0].exclusive else 'a reentrant'} group has {listed(members)}"
-            for members in groups.values()
-        )
         said.append(
             f"`{inside.name}` runs on {executor.size} thread{'s' * (executor.size != 1)}, of which at most "
-            f"{executor.most} were busy at once; {kinds}."
+            f"{executor.most} were busy at once; {_kinds(_by_group(_active(inside)))}."
         )
     return " ".join(said)

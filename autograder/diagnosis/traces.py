@@ -41,6 +41,12 @@ KNOWN_ERRORS = (
         "`lambda` of your own.",
     ),
     (
+        "'NoneType' object is not callable",
+        "crashed",
+        "What is called there is None. A callback is handed over without brackets: with brackets it is called at once, "
+        "and what it returns, often None, is handed over.",
+    ),
+    (
         "InvalidHandle",
         "used-after-destroy",
         "It used something that had been destroyed. Under a MultiThreadedExecutor the executor does this itself, now "

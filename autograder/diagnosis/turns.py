@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 from autograder.diagnosis.blocked import ONE_LOCK
 from autograder.diagnosis.events import Thing
 from autograder.diagnosis.inside import Inside, called
@@ -62,5 +64,26 @@ def _lock(inside: Inside, answers: Thing, works: Thing) -> Diagnosis | None:
                 f"while it works (from line {others[lock]} on): the answer waits for it.",
                 "waits-for-lock",
                 ONE_LOCK,
+            )
+    return None
+
+
+def one_lock(inside: Inside, at_once: int) -> Diagnosis | None:
+    """Why callbacks that were on threads at once worked one after another.
+
+    Must have seen: so many callbacks on the threads of an executor at once, and a lock that the source of two takes
+    whose runs take time.
+    """
+    most = max((executor.most for executor in inside.executors), default=0)
+    slow = [thing for thing in inside.callbacks if thing.takes_time] if most >= at_once else []
+    taken = [(thing, inside.source.locks(int(thing.line.rpartition(":")[2] or 0))) for thing in slow]
+    for (one, mine), (other, others) in itertools.combinations(taken, 2):
+        for lock in [lock for lock in mine if lock in others]:
+            lines = f"line {mine[lock]}" if mine[lock] == others[lock] else f"lines {mine[lock]} and {others[lock]}"
+            return Diagnosis(
+                f"`{inside.name}`: up to {most} callbacks were on threads at once, but {called(one)} and "
+                f"{called(other)} take the same `{lock}` ({lines}): one waits while the other holds it.",
+                "waits-for-lock",
+                f"{ONE_LOCK} One that waits keeps its thread.",
             )
     return None

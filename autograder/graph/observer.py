@@ -222,6 +222,17 @@ class Observer:
                 found.update(self.node.get_service_names_and_types_by_node(name, namespace))
         return found
 
+    def clients(self, node: str) -> dict[str, list[str]]:
+        """Services that a node asks, with the types as which it asks them.
+
+        Args:
+            node: its full name.
+        """
+        namespace, _, name = node.rpartition("/")
+        with contextlib.suppress(RuntimeError, ValueError):  # as in `services`
+            return dict(self.node.get_client_names_and_types_by_node(name, namespace or "/"))
+        return {}
+
     def record(self, topic: str, msg_type: type, qos: QoSProfile | None = None) -> Recording:
         """Subscribe to a topic and keep every message; the same topic and profile share one recording.
 

@@ -23,7 +23,7 @@ SECTIONS: dict[tuple[int, str], str] = {
     (2, "What `spin` does"): "not-spinning node-not-added spinning-ended stuck-in-init",
     (2, "First repair: more threads?"): "single-threaded-executor",
     (2, "Second repair: a callback group"): "no-callback-groups one-group exclusive-group",
-    (2, "Groups by design"): "no-overlap overlap paused",
+    (2, "Groups by design"): "no-overlap overlap paused group-limit",
     (2, "How many threads?"): "few-threads machine-threads too-few-runs",
     (2, "A group that has too much to do"): "starved timer-same-group",
     (2, "What callbacks share"): "waits-for-lock lost-update",
@@ -31,7 +31,8 @@ SECTIONS: dict[tuple[int, str], str] = {
         "call-same-group call-in-callback await-same-group nested-spin busy-wait rate-in-callback waits-for-service"
     ),
     (2, "When a program is silent"): (
-        "callback-exception service-exception thread-exception stuck-callback thread-left rate-unspun silent no-answer"
+        "callback-exception service-exception thread-exception stuck-callback thread-left rate-unspun silent no-answer "
+        "never-awaited late-binding"
     ),
     (3, "Relative, private, absolute"): "topic-name no-topic absolute-name wrong-end topic-present",
     (3, "A service has a name, too"): "service-name no-service",

@@ -67,6 +67,9 @@ class ConcurrencyExpectations(Expectations):
 
     def _why_too_few(self, topic: str, counts: Mapping[str, int], runs: int) -> Diagnosis:
         scene = self._scene()
+        alike = diagnosis.why_all_alike(scene) if 0 in counts.values() else None
+        if alike:
+            return alike
         if not any(counts.values()):
             return diagnosis.why_silent(scene, topic, String, quiet_profile())
         trouble = diagnosis.program_trouble(scene) or diagnosis.inside_reason(scene)

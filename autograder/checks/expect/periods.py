@@ -5,6 +5,7 @@ from __future__ import annotations
 import statistics
 from collections.abc import Sequence
 
+from autograder import diagnosis
 from autograder.checks.expect.concurrency import ConcurrencyExpectations, refuse_names
 from autograder.checks.expect.expectations import WITHIN
 from autograder.diagnosis import Diagnosis
@@ -65,7 +66,9 @@ class PeriodExpectations(ConcurrencyExpectations):
         self._expect_that(
             not late,
             title,
-            lambda: Diagnosis(f"From begin to begin it was: {told}.", "period"),
+            lambda: Diagnosis(
+                f"From begin to begin it was: {told}. {diagnosis.paces(self._scene(), topic)}".rstrip(), "period"
+            ),
             expected=f"{period:g} s within {tolerance:.0%}",
             observed=told,
             hint=hint,

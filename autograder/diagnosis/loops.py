@@ -1,0 +1,31 @@
+"""Callbacks that are made in a loop, and all use the loop's last value."""
+
+from __future__ import annotations
+
+from autograder.diagnosis.events import Thing
+from autograder.diagnosis.inside import Inside
+from autograder.diagnosis.reason import Diagnosis
+from autograder.diagnosis.scene import Scene, first
+
+
+def why_all_alike(scene: Scene) -> Diagnosis | None:
+    """Why callbacks that were to differ do the same."""
+    return first((late_binding,), [inside for inside in scene.insides if inside.alive])
+
+
+def late_binding(inside: Inside) -> Diagnosis | None:
+    """Must have seen: several callbacks from one lambda, and in the source that this reads its loop's own name."""
+    made: dict[str, list[Thing]] = {}
+    for thing in inside.callbacks:
+        made.setdefault(thing.line, []).append(thing)
+    for line, things in made.items():
+        number = int(line.rpartition(":")[2] or 0)
+        name = inside.source.late_name(number) if number and len(things) > 1 else ""
+        if name:
+            return Diagnosis(
+                f"`{inside.name}`, line {number} (`{inside.source.line(number)}`): the lambda looks `{name}` up when "
+                f"it runs, and then the loop is over: all {len(things)} callbacks made there use its last value.",
+                "late-binding",
+                f"Give the lambda the value when it is made: `lambda {name}={name}: ...`. Or use `functools.partial`.",
+            )
+    return None
