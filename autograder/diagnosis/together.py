@@ -101,16 +101,17 @@ def groups_allow_fewer(inside: Inside, at_once: int) -> Diagnosis | None:
 
     A reentrant callback that overlapped itself may stand for any number of them: nothing is said then.
     """
-    groups = _by_group([thing for thing in inside.callbacks if thing.runs or thing.kind == "timer"])
+    active = [thing for thing in inside.callbacks if thing.runs or thing.kind == "timer"]
+    groups = _by_group(active)
     limit = sum(1 if members[0].exclusive else len(members) for members in groups)
-    if not groups or limit >= at_once or any(thing.most > 1 for members in groups for thing in members):
+    if len(active) < at_once or limit >= at_once or any(thing.most > 1 for thing in active):
         return None
     return Diagnosis(
         f"`{inside.name}`: its groups let no more than {limit} callbacks run at once, and {at_once} have to: "
         f"{_kinds(groups)}.",
         "group-limit",
-        "Of a mutually exclusive group one callback runs at a time: what may overlap the others of it belongs into "
-        "another group.",
+        "Of a mutually exclusive group one callback runs at a time: what may overlap the others belongs in another "
+        "group.",
     )
 
 

@@ -71,14 +71,14 @@ def _lock(inside: Inside, answers: Thing, works: Thing) -> Diagnosis | None:
 def one_lock(inside: Inside, at_once: int) -> Diagnosis | None:
     """Why callbacks that were on threads at once worked one after another.
 
-    Must have seen: so many callbacks on the threads of an executor at once, and a lock that the source of two takes
-    whose runs take time.
+    Must have seen: so many callbacks on the threads of an executor at once, and a lock that the source of two takes;
+    runs of one of these take time.
     """
     most = max((executor.most for executor in inside.executors), default=0)
-    slow = [thing for thing in inside.callbacks if thing.takes_time] if most >= at_once else []
-    taken = [(thing, inside.source.locks(int(thing.line.rpartition(":")[2] or 0))) for thing in slow]
+    ran = [thing for thing in inside.callbacks if thing.runs] if most >= at_once else []
+    taken = [(thing, inside.source.locks(int(thing.line.rpartition(":")[2] or 0))) for thing in ran]
     for (one, mine), (other, others) in itertools.combinations(taken, 2):
-        for lock in [lock for lock in mine if lock in others]:
+        for lock in [lock for lock in mine if lock in others and (one.takes_time or other.takes_time)]:
             lines = f"line {mine[lock]}" if mine[lock] == others[lock] else f"lines {mine[lock]} and {others[lock]}"
             return Diagnosis(
                 f"`{inside.name}`: up to {most} callbacks were on threads at once, but {called(one)} and "
