@@ -658,6 +658,19 @@ CASES = {
     "logs_later": Case(
         "self.create_timer(500.0, lambda: None)\n", says="timer-period", because="every 500 s)", ask=unlogged
     ),
+    "cancelled": Case(
+        TALK.replace("self.create", "timer = self.create") + "timer.cancel()\nself.create_timer(0.05, lambda: None)\n",
+        says="silent",
+        because="has not fired and is cancelled until `reset()` is called, the timer (line",
+        never=("timer-period",),
+    ),
+    "cancelled_and_reset": Case(
+        "timer = self.create_timer(50.0, lambda: None)\ntimer.cancel()\ntimer.reset()\n"
+        "self.create_timer(0.05, lambda: None)\n",
+        says="silent",
+        because="every 50 s) has not fired, the timer (line",
+        never=("timer-period",),
+    ),
     "two_periods": Case(
         "self.create_timer(500.0, lambda: None)\nself.create_timer(0.05, lambda: None)\n",
         says="silent",
@@ -874,6 +887,13 @@ CASES = {
         says="parameter-type",
         ask=trouble,
         never=("parameter-not-declared", "crashed"),
+    ),
+    "empty_list": Case(
+        main="given = [rclpy.Parameter('names', value=['x'])]\n"
+        "rclpy.create_node('other', parameter_overrides=given).declare_parameter('names', [])",
+        says="parameter-type",
+        because="An empty list as the default",
+        ask=trouble,
     ),
     "declared": Case(
         "self.declare_parameter('rate', 1)\nself.get_parameter('rate')\n" + TALK,

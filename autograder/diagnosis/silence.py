@@ -169,7 +169,8 @@ def account(scene: Scene, topic: str) -> str:
     runs: list[str] = []
     for thing in inside.callbacks:
         if thing.node == publisher.node:
-            runs.append(f"{called(thing)} {_ran(thing.kind, thing.runs)}")
+            stopped = " and is cancelled until `reset()` is called" * thing.cancelled
+            runs.append(f"{called(thing)} {_ran(thing.kind, thing.runs)}{stopped}")
     said += runs[:6]
     sent = {0: "nothing was published", 1: "one message was published"}.get(
         publisher.runs, f"{publisher.runs} messages were published"

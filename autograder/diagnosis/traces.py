@@ -19,9 +19,21 @@ KNOWN_ERRORS = (
         "`handle` is an attribute of rclpy's own `Node`: give yours another name, such as `self.goal_handle`.",
     ),
     (
+        "'method' object does not support the context manager protocol",
+        "crashed",
+        "If the line of rclpy's own is `with self.handle:`, a method of yours is called `handle`. That is an attribute "
+        "of rclpy's own `Node`: give yours another name.",
+    ),
+    (
         "ParameterNotDeclaredException",
         "parameter-not-declared",
         "A parameter exists from `declare_parameter` on: declare it before you read it, even if a value was given.",
+    ),
+    (
+        "expecting type 'BYTE_ARRAY'",
+        "parameter-type",
+        "An empty list as the default is a list of bytes for rclpy. Give the type in its place, as in "
+        '`declare_parameter("names", rclpy.Parameter.Type.STRING_ARRAY)`, or a list that holds something.',
     ),
     (
         "InvalidParameterTypeException",
@@ -49,9 +61,10 @@ KNOWN_ERRORS = (
     (
         "InvalidHandle",
         "used-after-destroy",
-        "It used something that had been destroyed. Under a MultiThreadedExecutor the executor does this itself, now "
-        "and then, while a callback destroys a publisher, subscription or timer (rclpy issue 1355): spin such a node "
-        "with a SingleThreadedExecutor.",
+        "It used something that had been destroyed. What a node made is destroyed by the node, as with "
+        "`self.destroy_publisher(…)`: after a `destroy()` of its own it stays in the node's list, and `spin` uses it. "
+        "Under a MultiThreadedExecutor the executor uses it, now and then, while a callback destroys it (rclpy issue "
+        "1355): spin such a node with a SingleThreadedExecutor.",
     ),
     (
         "timer argument is null",

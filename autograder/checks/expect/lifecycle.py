@@ -62,15 +62,17 @@ class LifecycleExpectations(Meeting):
 
     def _unreachable(self, title: str, node: str, error: Exception, hint: str) -> NoReturn:
         scene = self._scene()
+        expected, observed = node, ", ".join(self._observer.nodes())
         if isinstance(error, NoAnswer):
             reason = diagnosis.why_no_answer(scene, f"{node}/get_state")
+            expected, observed = "an answer", "no answer"
         elif node in self._observer.nodes():
             reason = diagnosis.program_trouble(scene) or Diagnosis(
                 f"`{node}` is not a lifecycle node: it offers no `{node}/get_state`.", "not-lifecycle"
             )
         else:
             reason = diagnosis.why_no_node(scene, node)
-        self._fail(title, reason, expected=node, observed=", ".join(self._observer.nodes()), hint=hint)
+        self._fail(title, reason, expected=expected, observed=observed, hint=hint)
 
     def state(self, node: str, *, within: float = WITHIN) -> str:
         """Label of a node's current state; a node that does not tell it is a failed outcome.
@@ -135,10 +137,11 @@ class LifecycleExpectations(Meeting):
         self._observer.wait(look, WORD_FROM_INSIDE)
         return look()
 
-    def _last_line(self) -> str:
-        """What the only program of the launch printed last, without the time and the name of the logger."""
-        programs = self._running.programs
-        lines = programs[0][1].output().splitlines() if len(programs) == 1 else []
+    def _last_line(self, node: str) -> str:
+        """What the program that has this node printed last, without the time and the name of the logger."""
+        scene = self._scene()
+        programs = [it for it in scene.programs if node in scene.inside(it).nodes] or scene.programs
+        lines = programs[0].output().splitlines() if len(programs) == 1 else []
         last = next((line.strip() for line in reversed(lines) if line.strip()), "")
         return f" The last line of its log is `{_LOGGED.sub('', last)[:200]}`." if last else ""
 
@@ -203,7 +206,7 @@ class LifecycleExpectations(Meeting):
                 self._what_they_say()
                 or Diagnosis(
                     f"The callback of {label} did not return SUCCESS; the node is {done.after} now."
-                    + self._last_line(),
+                    + self._last_line(node),
                     "transition-failed",
                 ),
                 expected="success",

@@ -10,7 +10,7 @@ from std_msgs.msg import String
 class CameraDriver(LifecycleNode):
     def __init__(self):
         super().__init__("camera_driver")
-        self.declare_parameter("device", "/dev/zero")
+        self.device = self.declare_parameter("device", "/dev/zero").value
         self.declare_parameter("fps", 10.0)
         self.camera = None
         self.image_publisher = None
@@ -27,7 +27,7 @@ class CameraDriver(LifecycleNode):
         )
 
     def on_configure(self, state):
-        camera = CameraHardware(self, self.get_parameter("device").value)
+        camera = CameraHardware(self, self.device)
         try:
             camera.open()
         except OSError as error:
