@@ -90,6 +90,9 @@ def test_a_rule_that_rcl_takes_is_not_blamed(rule: str) -> None:
         (["__node:=rear", "/camera_demo/status:=image"], "/image", "private-rule"),
         (["__node:=rear", "camera_demo/status:=image"], "/image", "private-rule"),
         (["__ns:=/x", "/camera/image_color:=image"], "/x/image", "absolute-rule"),
+        (["__ns:=/x", "camera/image_color:=/image"], "/x/image", "absolute-rule"),
+        (["__ns:=/x", "camera/image_color:=x/image"], "/x/image", "topic-name"),
+        (["__ns:=/x", "camera/image_color:=~/image"], "/x/image", "private-rule"),
         (["front/image:=camera/image_color"], "/front/image", "rule-without-match"),
     ],
 )
@@ -268,6 +271,22 @@ def test_words_that_are_no_ros_arguments_are_refused_with_a_reason(table: Path, 
     with pytest.raises(CommandLineError) as caught:
         command_line("rules.yaml", "front").words()
     assert caught.value.code == code
+
+
+@pytest.mark.parametrize("words", ["-r a := b", "-r a:= b", "-r a :=b"])
+def test_a_space_beside_the_sign_of_a_rule_is_named(table: Path, words: str) -> None:
+    table.write_text(f"front: {words}\n")
+    with pytest.raises(CommandLineError) as caught:
+        command_line("rules.yaml", "front").words()
+    assert "no space" in caught.value.hint
+
+
+@pytest.mark.parametrize("name", ["__node", "__name", "__ns"])
+def test_a_name_that_is_given_as_a_parameter_is_sent_to_the_right_option(name: str) -> None:
+    reason = remap_rules.refused_parameter(["--ros-args", "-p", f"{name}:=front"])
+    assert reason is not None
+    assert reason[1] == "rule-kind"
+    assert f"-r {name}:=" in reason[2]
 
 
 def test_a_missing_table_is_told(table: Path) -> None:

@@ -90,7 +90,7 @@ LEFT = (
     "camera_demo/status",
     "a",
 )
-RIGHT = ("a", "b", "/c", "~/d", "e/f")
+RIGHT = ("a", "b", "/c", "c", "x/c", "~/d", "d", "e/f")
 PREFIXES = ("", "", "", "camera_demo:", "rear:", "front:", "rostopic://", "rosservice://")
 RULES = st.lists(
     st.builds("{}{}:={}".format, st.sampled_from(PREFIXES), st.sampled_from(LEFT), st.sampled_from(RIGHT)),
@@ -114,7 +114,7 @@ def resolved(rules: Sequence[str], code: Sequence[str]) -> tuple[str, dict[str, 
 
 def followed(reason: Reason, rules: list[str], code: list[str], node: str) -> tuple[list[str], list[str]]:
     """The rules and the names in the code after what the reason advises."""
-    blamed = next(rule for rule in rules if f"The rule `{rule}` changed" in reason[0])
+    blamed = next(rule for rule in rules if f"The rule `{rule}` " in reason[0])
     rule, number = parse(blamed), rules.index(blamed)
     assert rule is not None
     scheme = {"topic": "rostopic://", "service": "rosservice://", "": ""}[rule.kind]
@@ -135,6 +135,12 @@ def followed(reason: Reason, rules: list[str], code: list[str], node: str) -> tu
             return instead(f"{own}:{scheme}{rule.left}:={rule.right}"), code
         case "rule-kind":
             return instead(f"{rule.left}:={rule.right}"), code
+        case "absolute-rule" if "its right side" in reason[0]:
+            return instead(blamed.replace(":=/", ":=")), code
+        case "private-rule" if "its right side" in reason[0]:
+            return instead(blamed.replace(":=~/", ":=")), code
+        case "topic-name":
+            return instead(blamed.replace(":=", ":=/")), code
         case "absolute-rule":
             return instead(f"{scheme}{rule.left.lstrip('/')}:={rule.right}"), code
         case "private-rule":

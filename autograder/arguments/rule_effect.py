@@ -90,6 +90,41 @@ def without_effect(
             reason = _swapped(_Case(rule, 0, node, read, [n for n, of in users.items() if node in of], nodes, wanted))
             if reason:
                 return reason
+    for rule in read:
+        for node in _own_nodes(rules, nodes):
+            reason = _beside(_Case(rule, 0, node, read, [n for n, of in users.items() if node in of], nodes, wanted))
+            if reason:
+                return reason
+    return None
+
+
+def _beside(case: _Case) -> Reason | None:
+    """The rule made a name, and it is the wanted one but for what the right side begins with."""
+    right, space = case.rule.right, case.node.rsplit("/", 1)[0]
+    made = full_name(right, case.node)
+    if not case.is_for(case.rule) or case.left in case.used or made not in case.used:
+        return None
+    if case.rule.kind == "service" or case.makes(made) != [case.rule]:
+        return None
+    said = f"The rule `{case.rule.text}` makes `{made}`:"
+    if right.startswith("~/") and full_name(right[2:], case.node) == case.wanted:
+        return (
+            f"{said} its right side begins with `~`, so it is below the node's own name.",
+            "private-rule",
+            "Write the right side (in a launch file, `to`) without `~/`: then it is below the namespace.",
+        )
+    if space and right.startswith("/") and full_name(right[1:], case.node) == case.wanted:
+        return (
+            f"{said} its right side begins with a slash, so it does not follow the namespace `{space}`.",
+            "absolute-rule",
+            "Write the right side (in a launch file, `to`) without the leading slash: then it follows the namespace.",
+        )
+    if space and f"/{right}" == case.wanted:
+        return (
+            f"{said} its right side does not begin with a slash, so it is below the namespace `{space}`.",
+            "topic-name",
+            f"Begin it with a slash, `{case.wanted}`, or leave out what the namespace gives already.",
+        )
     return None
 
 

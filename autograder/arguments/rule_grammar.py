@@ -251,4 +251,6 @@ def _of_parameter(name: str) -> Reason:
             "name-characters",
             "Such names have letters from a to z, digits, underscores and dots.",
         )
+    if name in ("__node", "__name", "__ns"):
+        return f"`{name}` is no parameter.", "rule-kind", f"Names are changed with `-r`: `-r {name}:=NEW`."
     return f"`{name}` is not a name.", "name-form", "A parameter rule is `name:=value`."

@@ -114,8 +114,8 @@ GROUPS: dict[str, dict[str, str]] = {
         "rules-do-not-chain": "the left side is a name that another rule made",
         "rule-prefix": "the rule is for a node whose name no node has",
         "rule-kind": "the rule is for names of another kind, or gives a parameter its value",
-        "absolute-rule": "the left side is absolute, and the name lies in a namespace",
-        "private-rule": "the left side is relative, and the name is private to the node",
+        "absolute-rule": "one side of a rule is absolute, and the name lies in a namespace",
+        "private-rule": "one side of a rule is private to the node, and the other name is not",
         "rule-without-match": "no name in the code is the left side",
     },
     "The notebook that was handed in": {

@@ -61,8 +61,8 @@ class CommandLine:
                 raise CommandLineError(
                     f"`{self.entry}` in `{self.file}` is not a list of ROS arguments: `{word}` is not expected there.",
                     "command-line",
-                    "There is no space after `:=`."
-                    if before.endswith(":=")
+                    "There is no space beside `:=`."
+                    if before.endswith(":=") or word.startswith(":=")
                     else "Leave out `ros2 run` and all that stands before the words after `--ros-args`."
                     if "ros2" in words or "--ros-args" in words
                     else f"Every rule has its own `-r`, every parameter its own `-p`: {example}.",

@@ -43,6 +43,7 @@ def why_other(running: Running, node: str, name: str, found: Any, wanted: Any) -
         lambda: _given_as_a_rule(running, name),
         lambda: _given_to_another(running, node, name),
         lambda: _given_by_another_name(running, node, name, found),
+        lambda: _given_twice(running, node, name, found),
         lambda: _no_such_argument(running, found),
     )
     return next((reason for ask in reasons if (reason := ask())), None) or _other_value(found, wanted)
@@ -91,6 +92,16 @@ def _given_by_another_name(running: Running, node: str, name: str, found: Any) -
         "parameter-undeclared",
         "A value for a name that is not declared is passed over without a word.",
     )
+
+
+def _given_twice(running: Running, node: str, name: str, found: Any) -> Diagnosis | None:
+    """Whether `-p` gives the parameter more than one value: unlike with remap rules, the last one counts."""
+    for launched, _ in running.programs:
+        given = [text for text in launched.parameter_rules() if text.partition(":=")[0] == name]
+        if len(given) > 1:
+            because = f"It is {found!r}: `-p` gives `{name}` {len(given)} values, and the last one counts."
+            return Diagnosis(because, "parameter-value", "Give it once.")
+    return None
 
 
 def _given(launched: Program, node: str) -> Iterator[str]:
