@@ -14,8 +14,8 @@ class CameraDemo(Node):
         self.declare_parameter("camera_frame", "camera_frame")
         self.stopped = False
         # Make self.images (Image) and self.status (String), and subscribe self.on_stop (Bool)
-        self.images = self.create_publisher(Image, self.get_namespace() + "/camera/image_color", 10)
-        self.status = self.create_publisher(String, "~/status", 10)
+        self.images = self.create_publisher(Image, "camera/image_color", 10)
+        self.status = self.create_publisher(String, self.get_namespace() + "/" + self.get_name() + "/status", 10)
         self.create_subscription(Bool, "/emergency_stop", self.on_stop, 10)
         self.create_timer(1.0 / self.get_parameter("camera_rate").value, self.shoot)
 

@@ -17,10 +17,14 @@ class TunableCamera(Node):
         self.add_post_set_parameters_callback(self.update)
 
     def validate(self, parameters):
+        result = SetParametersResult()
         for parameter in parameters:
+            result = SetParametersResult(successful=True)
             if parameter.name == "camera_rate" and not 1 <= parameter.value <= 60:
-                return SetParametersResult(successful=False, reason="camera_rate must be from 1 to 60 images per second")
-        return SetParametersResult(successful=True)
+                result = SetParametersResult(
+                    successful=False, reason="camera_rate must be from 1 to 60 images per second"
+                )
+        return result
 
     def update(self, parameters):
         for parameter in parameters:
