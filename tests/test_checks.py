@@ -209,6 +209,8 @@ CAREFUL = TALKER.replace(
     "    rclpy.try_shutdown()\n",
 ).replace("import rclpy\n", "import rclpy\nfrom rclpy.executors import ExternalShutdownException\n", 1)
 
+THREAD_LEFT = "    import threading, time\n    threading.Thread(target=lambda: time.sleep(60)).start()\n    rclpy.try_"
+
 
 @pytest.mark.parametrize("by", ["SIGINT", "SIGTERM"])
 def test_a_program_that_is_told_to_end_may_end_cleanly(grade: Grade, by: str) -> None:
@@ -232,6 +234,7 @@ def test_a_program_that_is_told_to_end_may_end_cleanly(grade: Grade, by: str) ->
         ("try_shutdown()", "shutdown()", "SIGINT", "unclean-end", "already called"),
         ("    rclpy.try_shutdown()", "    raise SystemExit(4)", "SIGTERM", "unclean-end", "with exit status 4."),
         ("        pass", "        import time; time.sleep(60)", "SIGTERM", "signal-ignored", "still runs; it is in"),
+        ("    rclpy.try_", THREAD_LEFT, "SIGTERM", "signal-ignored", "that is no daemon"),
         ('super().__init__("talker")', 'raise ValueError("no")', "SIGINT", "crashed", "ValueError: no"),
     ],
 )  # fmt: skip

@@ -37,6 +37,7 @@ from autograder.diagnosis.silence import (
     why_no_answer,
     why_silent,
 )
+from autograder.diagnosis.spinning import thread_left
 from autograder.diagnosis.together import layout, waits_for_its_group, why_not_together, why_starved
 from autograder.diagnosis.traces import last_traceback
 from autograder.diagnosis.turns import why_kept_waiting
@@ -58,6 +59,7 @@ __all__ = [
     "program_trouble",
     "reason_inside",
     "shut_down_inside",
+    "thread_left",
     "waits_for_its_group",
     "why_all_alike",
     "why_doubled",

@@ -155,10 +155,11 @@ class EndingExpectations(ProgramExpectations):
             program.signal(getattr(signal, by))
             self._observer.wait(lambda: not program.running(), within)
         if program.running():
-            because = f"{within:g} s after {_SAID[by]} it still runs{self._place_of(program)}."
-            self._fail(
-                title, Diagnosis(because, "signal-ignored"), expected="ended", observed="still running", hint=hint
-            )
+            because, advice = f"{within:g} s after {_SAID[by]} it still runs{self._place_of(program)}.", ""
+            if left := self._thread_left(program):
+                because, advice = f"{because} {left.because}", left.hint
+            reason = Diagnosis(because, "signal-ignored", advice)
+            self._fail(title, reason, expected="ended", observed="still running", hint=hint)
         self._running.stopped.append(program)
         status, said = program.exit_status(), program.output()[said_before:]
         error = last_traceback(said, name) if status or "Traceback (most recent call last)" in said else None
@@ -194,6 +195,11 @@ class EndingExpectations(ProgramExpectations):
         """Whether a program is known to have let no executor spin so far."""
         inside = self._scene().inside(program)
         return inside.attached and not any(executor.spins for executor in inside.executors)
+
+    def _thread_left(self, program: RunningProgram) -> Diagnosis | None:
+        """What is known of a thread that keeps a program alive whose `main` is over."""
+        insides = (inside for inside in self._scene().insides if inside.program is program)
+        return next((found for inside in insides if (found := diagnosis.thread_left(inside))), None)
 
     def _place_of(self, program: RunningProgram) -> str:
         """Where the main thread of a program is, as the end of a sentence; empty if that cannot be seen."""

@@ -1,0 +1,30 @@
+%%node talker
+import rclpy
+from rclpy.executors import ExternalShutdownException
+from rclpy.node import Node
+from std_msgs.msg import String
+
+
+class Talker(Node):
+    def __init__(self):
+        super().__init__("talker")
+        self.pub = self.create_publisher(String, "chatter", 10)
+        self.i = 0
+        self.create_timer(0.1, self.talk)
+
+    def talk(self):
+        self.pub.publish(String(data=f"hello {self.i}"))
+        self.i = (self.i + 1) % 10
+
+
+def main():
+    rclpy.init()
+    try:
+        rclpy.spin(Talker())
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    finally:
+        rclpy.try_shutdown()
+
+
+main()
