@@ -49,7 +49,7 @@ class CarManager(Node):
         return state == "active"
 
     def round(self):
-        optional = self.get_parameter("optional").value
+        optional = ["camera"]
         missing = []
         for layer in self.layers:
             missing += [name for name in layer if not self.bring_up(name)]

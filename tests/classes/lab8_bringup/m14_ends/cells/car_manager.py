@@ -50,7 +50,7 @@ class CarManager(Node):
         for layer in self.layers:
             missing += [name for name in layer if not self.bring_up(name)]
             if not set(missing) <= set(optional):
-                return "waiting"
+                return "degraded" if set(missing) & set(optional) else "waiting"
         return "degraded" if missing else "running"
 
 
