@@ -1201,6 +1201,20 @@ def test_programs_of_one_launch_in_two_domains_do_not_see_each_other(grade: Grad
     assert result.points == 2.0, result
 
 
+ASKER = """
+import rclpy
+from std_srvs.srv import Trigger
+
+rclpy.init()
+node = rclpy.create_node("asker")
+client = node.create_client(Trigger, "gone")
+print("waits", flush=True)
+while not client.wait_for_service(timeout_sec=1.0):
+    rclpy.spin_once(node, timeout_sec=0.1)
+"""
+"""It waits for a service that nobody offers, again and again."""
+
+
 @pytest.mark.parametrize(("evident", "code"), [("", "waits-for-service"), (", evident=True", "order")])
 def test_a_check_that_leaves_a_service_out_on_purpose_gives_its_own_reason(
     grade: Grade, evident: str, code: str
@@ -1213,17 +1227,24 @@ def test_a_check_that_leaves_a_service_out_on_purpose_gives_its_own_reason(
             ros.require(False, "The layers come in order", because="They did not.", code="order"{evident})
         ros.score(2)
         """,
-        asker__py="""
-import rclpy
-from std_srvs.srv import Trigger
+        asker__py=ASKER,
+    )
+    assert failure(result).code == code
 
-rclpy.init()
-node = rclpy.create_node("asker")
-client = node.create_client(Trigger, "gone")
-print("waits", flush=True)
-while not client.wait_for_service(timeout_sec=1.0):
-    rclpy.spin_once(node, timeout_sec=0.1)
-""",
+
+@pytest.mark.parametrize(("node", "code"), [("/asker", "waits-for-service"), ("/talker", "order")])
+def test_what_another_program_waits_for_is_no_reason_for_what_a_node_does(grade: Grade, node: str, code: str) -> None:
+    result = grade(
+        f"""\
+        with launch("asker", "talker") as ros:
+            ros.expect_node("/asker")
+            ros.expect_node("/talker")
+            ros.wait(lambda: "waits" in ros.log("asker"))
+            ros.require(False, "The layers come in order", because="They did not.", code="order", node="{node}")
+        ros.score(2)
+        """,
+        asker__py=ASKER,
+        talker__py=TALKER,
     )
     assert failure(result).code == code
 

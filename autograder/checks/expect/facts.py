@@ -24,6 +24,7 @@ class Facts(Expectations):
         hint: str = "",
         code: str = "",
         evident: object = False,
+        node: str = "",
     ) -> None:
         """State a fact: passed if `condition` is true in Python's sense.
 
@@ -40,6 +41,7 @@ class Facts(Expectations):
             code: of that reason.
             evident: anything; if true, the check has seen that this is the reason, and what callbacks wait for is none:
                 in a launch where something is missing on purpose, a right program waits as well.
+            node: full name of a node: what its program waits for is a reason, and what others wait for is none.
 
         Example:
             `ros.require(reply.success, "The order is accepted", because=reply.message)`
@@ -52,7 +54,7 @@ class Facts(Expectations):
             return
         self._running.settle_programs()
         scene = self._scene()
-        found = (diagnosis.program_trouble(scene), None if evident else diagnosis.inside_reason(scene))
+        found = (diagnosis.program_trouble(scene), None if evident else diagnosis.inside_reason(scene, node))
         # Where the check has a reason, these say less: they are what a program looks like that does nothing more.
         vague = ("exited", "not-spinning", "spinning-ended") if because else ()
         trouble = next((one for one in found if one and one.code not in vague), None)
