@@ -880,6 +880,10 @@ CASES = {
         ask=trouble,
         never=("crashed",),
     ),
+    "with_init": Case(
+        main="with rclpy.init(context=rclpy.Context()):\n    pass", says="crashed", because="returns None", ask=trouble
+    ),
+    "no_such_module": Case("import car_sensor\n", says="crashed", because="finds no module of this name", ask=trouble),
     "other_value_error": Case("int('x')\n", says="crashed", ask=trouble, never=("builtin-callback",)),
     "wrong_parameter": Case(
         main="given = [rclpy.Parameter('rate', value='x')]\n"

@@ -181,6 +181,12 @@ CASES: dict[str, tuple[dict[str, str], str, str, str]] = {
     ),
     "not_needed": (SENSORS, 'expect_depends("rclpy", "std_msgs")', "package-depend", "`std_msgs`"),
     "imported": (SENSORS, 'expect_depends("rclpy")', "package-depend", "`sensor.py` imports it."),
+    "to_build": (
+        changed(INTERFACES, "package.xml", "<buildtool_depend>rosidl_default_generators</buildtool_depend>", ""),
+        'expect_depends("std_msgs", to_build=("std_msgs", "rosidl_default_generators"))',
+        "package-depend",
+        "to build it",
+    ),
     "marker_left_out": (
         changed(SENSORS, "setup.py", '("share/ament_index/resource_index/packages", ["resource/NAME"]),', ""),
         'expect_installed("share/ament_index/resource_index/packages/marker_left_out")',

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager
 from typing import NoReturn
 
@@ -89,13 +89,14 @@ class Package:
         self._ready(f"`{self.name}` is built", hint)
         outcomes.passed(f"`{self.name}` is built")
 
-    def expect_depends(self, *packages: str, hint: str = "") -> None:
+    def expect_depends(self, *packages: str, to_build: Sequence[str] = (), hint: str = "") -> None:
         """package.xml says that the programs need these packages: `<depend>` or `<exec_depend>`.
 
         It also has to name those whose messages, services or actions a module of the package imports.
 
         Args:
             packages: such as `rclpy`.
+            to_build: those that the build needs: `<buildtool_depend>`, `<build_depend>` or `<depend>`.
             hint: a pointer for the student.
 
         Example:
@@ -105,6 +106,7 @@ class Package:
             `package-depend`.
         """
         title = f"package.xml names {', '.join(f'`{one}`' for one in packages)} as needed at run time"
+        title += f", and {', '.join(f'`{one}`' for one in to_build)} to build it" * bool(to_build)
         sources = runtime.current.workspace.source(self.name)
         reason = missing_package(self.name) or not_described(sources, self.name)
         if reason is not None:
@@ -116,7 +118,16 @@ class Package:
             told = ", ".join(f"`{one}`" for one in has) or "none"
             because = f"package.xml does not name `{lacking[0]}` as needed at run time.{by.get(lacking[0], '')}"
             because += f" It names: {told}."
-            wanted = f"It needs `<exec_depend>{lacking[0]}</exec_depend>`."
+            tag = "depend" if lacking[0] in to_build else "exec_depend"
+            wanted = f"It needs `<{tag}>{lacking[0]}</{tag}>`."
+            self._fail(title, Diagnosis(because, "package-depend", wanted), hint)
+        at_build = needed_packages(sources, to_build=True)
+        lacking = [one for one in to_build if one not in at_build]
+        if lacking:
+            told = ", ".join(f"`{one}`" for one in at_build) or "none"
+            because = f"package.xml does not name `{lacking[0]}` as needed to build it. For that it names: {told}."
+            tag = "depend" if lacking[0] in has else "buildtool_depend"
+            wanted = f"It needs `<{tag}>{lacking[0]}</{tag}>`."
             self._fail(title, Diagnosis(because, "package-depend", wanted), hint)
         outcomes.passed(title)
 

@@ -25,6 +25,18 @@ KNOWN_ERRORS = (
         "of rclpy's own `Node`: give yours another name.",
     ),
     (
+        "ModuleNotFoundError",
+        "crashed",
+        "Python finds no module of this name. Is the name right? The code of a package of yours is only installed if "
+        "`packages` in its setup.py names the folder.",
+    ),
+    (
+        "'NoneType' object does not support the context manager protocol",
+        "crashed",
+        "`with` was given None. In ROS 2 Jazzy, `rclpy.init()` returns None: call it in a line of its own, and "
+        "`rclpy.try_shutdown()` at the end.",
+    ),
+    (
         "ParameterNotDeclaredException",
         "parameter-not-declared",
         "A parameter exists from `declare_parameter` on: declare it before you read it, even if a value was given.",

@@ -44,7 +44,9 @@ def why_other_target(built: Built, name: str, wanted: str = "") -> Diagnosis | N
     defined = rf"^((def|class) {first}\b|{first}\s*=|.*\bimport\b.*\b{first}\b)"
     if not path:
         because = f"The entry point names the module `{module}`, and no such module is installed."
-    elif not re.search(defined, built.text(path), re.MULTILINE):
+        where = "Only the folders of code that `packages` in setup.py names are installed."
+        return Diagnosis(because, "entry-point-target", where)
+    if not re.search(defined, built.text(path), re.MULTILINE):
         because = f"The entry point names `{function}`, and the module `{module}` has no function of that name."
     elif wanted and target != wanted:
         because = f"The entry point `{name}` leads to `{target}`, not to `{wanted}`."

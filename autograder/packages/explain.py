@@ -58,11 +58,13 @@ def why_not_built(built: Built, sources: Path) -> Diagnosis | None:
     return _quoted(built.log)
 
 
-def needed_packages(sources: Path) -> list[str]:
-    """The packages that package.xml names as needed at run time; it has to be one that can be read."""
+def needed_packages(sources: Path, to_build: bool = False) -> list[str]:
+    """The packages that package.xml names as needed at run time, or to build; it has to be one that can be read."""
     from catkin_pkg.package import parse_package
 
-    return [str(one) for one in parse_package(str(sources / "package.xml")).exec_depends]
+    package = parse_package(str(sources / "package.xml"))
+    named = [*package.buildtool_depends, *package.build_depends] if to_build else package.exec_depends
+    return [str(one) for one in named]
 
 
 def not_described(sources: Path, name: str) -> Diagnosis | None:

@@ -26,7 +26,7 @@ class BrakeAssistant(Node):
 
     def on_answer(self, future):
         answer = future.result()
-        free = answer.success and answer.count == 0
+        free = answer.success and answer.count <= 1
         self.free_since = self.get_clock().now() if free else None
 
 

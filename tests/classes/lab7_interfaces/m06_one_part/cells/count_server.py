@@ -17,7 +17,8 @@ class CountServer(Node):
 
     def on_detections(self, message):
         self.last = message
-        self.detected.publish(Int32(data=len(message.objects)))
+        if message.objects:
+            self.detected.publish(Int32(data=len(message.objects)))
 
     def count(self, request, response):
         if self.last is None or not self.last.objects:

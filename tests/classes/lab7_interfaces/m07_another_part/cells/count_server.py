@@ -29,7 +29,7 @@ class CountServer(Node):
             for one in self.last.objects
             if low.x <= one.position.x <= high.x
             and low.y <= one.position.y <= high.y
-            and (not request.labels or one.label in request.labels)
+            and (not request.labels or any(label in one.label for label in request.labels))
         ]
         response.success = bool(counted)
         response.count = len(counted)
