@@ -78,7 +78,7 @@ def not_described(sources: Path, name: str) -> Diagnosis | None:
         package = parse_package(str(path))
     except InvalidPackage as error:
         words = str(error).replace(str(path), "package.xml").split("\n")
-        lines = [line for line in words if line and not line.startswith("Error(s)")]
+        lines = [line.removeprefix("- ") for line in words if line and not line.startswith("Error(s)")]
         said = "; ".join(lines[:2]).rstrip(".")
         return Diagnosis(f"`src/{name}/package.xml` is not accepted: {said}.", "package-xml")
     except Exception as error:  # what it cannot parse comes as errors of several libraries
