@@ -771,7 +771,8 @@ CASES = {
         TWO.format(OWN, OWN),
         SLOW,
         "one, other = SingleThreadedExecutor(), SingleThreadedExecutor()\none.add_node(node)\nother.add_node(node)\n"
-        "threading.Thread(target=one.spin, daemon=True).start()\nother.spin()",
+        "spins = threading.Event()\none.create_task(spins.set)\n"
+        "threading.Thread(target=one.spin, daemon=True).start()\nspins.wait()\nother.spin()",
         says="single-threaded-executor",
         because="a node is in one executor at a time",
         ask=together(),
