@@ -5,8 +5,9 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 
-from autograder.arguments.rule_effect import node_without_effect, renames_nothing, without_effect
+from autograder.arguments.rule_effect import without_effect
 from autograder.arguments.rule_grammar import Reason, Rule, parse, why_parameter_refused, why_remap_refused
+from autograder.arguments.rule_kind import node_without_effect, renames_nothing
 
 __all__ = [
     "Reason",

@@ -107,6 +107,8 @@ def last_traceback(output: str, program: str) -> Diagnosis | None:
     if error_at is None:
         return None
     error = lines[error_at].strip()
+    if error.endswith(":") and lines[error_at + 1 :]:  # rclpy gives the name that is invalid a line of its own
+        error += f" {lines[error_at + 1].strip()}"
     where, code = _own_line(lines[:error_at], program)
     said = f"{where}{quoted(code, error)}: {error}"
     for exception, word, hint in KNOWN_ERRORS:

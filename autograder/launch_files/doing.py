@@ -216,7 +216,7 @@ def namespace(outer: str | None, inner: str | None, place: Place) -> str | None:
 
 def _invalid(what: str, error: Exception) -> tuple[str, str]:
     """rclpy's reason why a name is invalid, as one sentence."""
-    reason = str(error).splitlines()[0].split(": ", 1)[-1].rstrip(".")
+    reason = str(error).splitlines()[0].split(": ", 1)[-1].rstrip(".:")
     if "${" in what:
         return f"{what}: {reason}.", "The value of an argument is written with round brackets: `$(var NAME)`."
     return f"{what}: {reason}.", "A name has letters, digits and underscores, and no part of it begins with a digit."
