@@ -886,6 +886,18 @@ CASES = {
     ),
     "no_such_module": Case("import car_sensor\n", says="crashed", because="finds no module of this name", ask=trouble),
     "other_value_error": Case("int('x')\n", says="crashed", ask=trouble, never=("builtin-callback",)),
+    "deepcopied_profile": Case(
+        "from copy import deepcopy\nfrom rclpy.qos import qos_profile_sensor_data\ndeepcopy(qos_profile_sensor_data)\n",
+        says="not-copied",
+        ask=trouble,
+        never=("crashed",),
+    ),
+    "deepcopied_lock": Case(
+        "from copy import deepcopy\nimport threading\ndeepcopy(threading.Lock())\n",
+        says="crashed",
+        ask=trouble,
+        never=("not-copied",),
+    ),
     "wrong_parameter": Case(
         main="given = [rclpy.Parameter('rate', value='x')]\n"
         "rclpy.create_node('other', parameter_overrides=given).declare_parameter('rate', 1)",

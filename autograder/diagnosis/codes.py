@@ -14,6 +14,7 @@ CODES = {
     "parameter-not-declared": "the error is a ParameterNotDeclaredException",
     "parameter-type": "the error is an InvalidParameterTypeException",
     "builtin-callback": "rclpy found no signature of a callback that is no Python function",
+    "not-copied": "the error says that an object of rclpy cannot be pickled, which is how deepcopy copies",
     "refused-call": "the error is the system's refusal of a call",
     "used-after-destroy": "the error says that something destroyed was used",
     "shutdown-in-callback": "a callback called shutdown, and the program did not end as it should",

@@ -71,6 +71,12 @@ KNOWN_ERRORS = (
         "and what it returns, often None, is handed over.",
     ),
     (
+        "cannot pickle 'rclpy.",
+        "not-copied",
+        "`deepcopy` cannot copy what rclpy keeps in C++, such as the durations in a QoS profile. `copy.copy(profile)` "
+        "makes a second profile whose policies can be set without a change to the first.",
+    ),
+    (
         "InvalidHandle",
         "used-after-destroy",
         "It used something that had been destroyed. What a node made is destroyed by the node, as with "
