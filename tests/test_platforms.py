@@ -346,6 +346,18 @@ def test_whatever_has_no_notebook_is_named(
         assert any(words in sentence for sentence in collected.refused)
 
 
+@pytest.mark.parametrize("zipped", [False, True], ids=["folder", "zip"])
+@pytest.mark.parametrize(
+    "name", ["jd01/toy.ipynb", "jd01/toy/toy.ipynb", "jd01.ipynb", "doejane_12345_678901_toy.ipynb"]
+)
+def test_an_empty_file_is_no_zero(tmp_path: Path, name: str, zipped: bool) -> None:
+    (tmp_path / "roster.csv").write_text(ROSTER, encoding="utf-8")
+    other = name.replace("jd01", "mm02").replace("doejane_12345", "mullerjurgen_12346")
+    collected = collect(lay_out({name: "", other: "jm"}, tmp_path, zipped), toy.LAB, tmp_path)
+    assert texts(collected) == {"mm02": "jm"}
+    assert len(collected.refused) == 1 and "empty file" in collected.refused[0]
+
+
 AS_EXCEL = ROSTER.replace('"Doe, Jane"', "Jane Doe")
 
 
@@ -376,6 +388,12 @@ def test_an_id_means_its_student_whatever_others_are_called(tmp_path: Path) -> N
     files = {"toy-jo-an/labs/toy/toy.ipynb": "jo", "toy-jo-b/labs/toy/toy.ipynb": "?"}
     collected = collect(lay_out(files, tmp_path / "repositories", True), toy.LAB, tmp_path)
     assert texts(collected) == {"mm-2": "jo"} and len(collected.refused) == 1
+
+
+def test_numbers_that_a_spreadsheet_gave_a_decimal_point_are_the_platforms_numbers(tmp_path: Path) -> None:
+    (tmp_path / "roster.csv").write_text("id,name,canvas_id\njd01,,12345.0\nmm02,,\nno03,,12347.0\n")
+    collected = collect(lay_out({"doejane_12345_678901_toy.ipynb": "jd"}, tmp_path, True), toy.LAB, tmp_path)
+    assert texts(collected) == {"jd01": "jd"}
 
 
 def test_canvas_names_are_found_with_and_without_accents(tmp_path: Path) -> None:

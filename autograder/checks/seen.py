@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from autograder import pictures
 from autograder.diagnosis.events import Ran, Thing
 from autograder.diagnosis.inside import Inside
-from autograder.graph.names import full_name
+from autograder.graph.names import node_of
 from autograder.graph.observer import Observer
 from autograder.graph.qos import describe, mismatch_between
 from autograder.pictures import Endpoint, Picture, Run, Runs, Traffic
@@ -48,7 +48,7 @@ def graph(observer: Observer) -> Graph:
             continue
         for publishes, found in ((True, observer.publishers(topic)), (False, observer.subscriptions(topic))):
             for end in found:
-                node = full_name(end.node_namespace, end.node_name)
+                node = node_of(end)
                 ends.append(Endpoint(node, topic, publishes, describe(end.qos_profile)))
     return Graph(observer.nodes()[:_MOST], ends[:_MOST])
 

@@ -12,7 +12,7 @@ from collections import Counter
 from collections.abc import Sequence
 
 from autograder.diagnosis.events import Event, ExecutorSeen, NodeSeen, ProbeFailed, Thing, read
-from autograder.graph.names import full_name
+from autograder.graph.names import node_of
 from autograder.graph.observer import Observer
 from autograder.sandbox.running_program import RunningProgram
 
@@ -73,8 +73,7 @@ def shows_all(observer: Observer, events: Sequence[Event]) -> bool:
         (thing.kind, thing.name, thing.node) for thing in _things(events) if thing.kind in look and not thing.destroyed
     )
     return all(
-        sum(full_name(end.node_namespace, end.node_name) == node for end in look[kind](topic)) >= many
-        for (kind, topic, node), many in made.items()
+        sum(node_of(end) == node for end in look[kind](topic)) >= many for (kind, topic, node), many in made.items()
     )
 
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from autograder.checks.running import Running
 from autograder.core.output import tidy
-from autograder.graph.names import full_name
+from autograder.graph.names import node_of
 from autograder.sandbox.running_program import RunningProgram
 
 TRIAL = 3.0
@@ -42,7 +42,7 @@ def try_out(running: Running) -> str:
     lines = [f"After {TRIAL:g} s: " + (f"the nodes {', '.join(nodes)}" if nodes else "no node") + "."]
     for verb, ends_of in (("publishes", observer.publishers), ("subscribes to", observer.subscriptions)):
         for topic, types in sorted(observer.topics().items()):
-            owners = sorted({full_name(end.node_namespace, end.node_name) for end in ends_of(topic)})
+            owners = sorted({node_of(end) for end in ends_of(topic)})
             if owners and topic not in _OWN:
                 lines.append(f"  {', '.join(owners)} {verb} {topic} ({', '.join(types)})")
     return "\n".join(lines)

@@ -7,7 +7,7 @@ from rclpy.qos import QoSProfile
 from autograder.diagnosis.reason import Diagnosis
 from autograder.diagnosis.scene import Scene
 from autograder.graph import qos
-from autograder.graph.names import full_name
+from autograder.graph.names import node_of
 
 
 def why_not_matched(scene: Scene, topic: str, profile: QoSProfile, kind: str) -> Diagnosis | None:
@@ -19,7 +19,7 @@ def why_not_matched(scene: Scene, topic: str, profile: QoSProfile, kind: str) ->
         if policy:
             words = policy.split()[0] if policy != "liveliness lease" else "lease"
             gives, wants = qos.describe(offered)[words], qos.describe(requested)[words]
-            owner = full_name(end.node_namespace, end.node_name)
+            owner = node_of(end)
             return Diagnosis(
                 f"Publisher and subscription on `{topic}` do not match over {policy}: offered {qos.in_words(gives)}, "
                 f"requested {qos.in_words(wants)} (the {kind} is that of `{owner}`).",

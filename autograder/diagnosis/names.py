@@ -12,7 +12,7 @@ from autograder.diagnosis.programs import program_trouble
 from autograder.diagnosis.reason import Diagnosis
 from autograder.diagnosis.scene import Scene
 from autograder.diagnosis.unmade import not_made_yet
-from autograder.graph.names import full_name, nearest, type_name
+from autograder.graph.names import nearest, node_of, type_name
 
 _LETTER_BY_LETTER = "Compare the two names letter by letter, namespace included."
 _EVERY_NODES = ("/rosout", "/parameter_events")
@@ -173,7 +173,7 @@ def _not_absolute(thing: Thing, wanted: str) -> str:
 def why_topic_present(scene: Scene, topic: str) -> Diagnosis:
     """Who uses a topic that nobody should use."""
     ends = scene.observer.publishers(topic) + scene.observer.subscriptions(topic)
-    owners = sorted({full_name(end.node_namespace, end.node_name) for end in ends})
+    owners = sorted({node_of(end) for end in ends})
     outside = any(end.node_namespace != "/" and not topic.startswith(end.node_namespace + "/") for end in ends)
     absolute = absolute_name(scene, "publisher", topic) or absolute_name(scene, "subscription", topic)
     if outside and absolute:
@@ -194,7 +194,7 @@ def why_no_endpoint(scene: Scene, topic: str, msg_type: type | None, kind: str, 
     if others and wanted:
         return Diagnosis(f"The {kind} on `{topic}` has the type {others[0]}, not {wanted}.", "wrong-type")
     if ends and node:
-        owners = sorted({full_name(end.node_namespace, end.node_name) for end in ends})
+        owners = sorted({node_of(end) for end in ends})
         return Diagnosis(f"The {kind} on `{topic}` belongs to {', '.join(owners)}, not to `{node}`.", "wrong-node")
     if not observer.nodes():
         return _no_node_at_all(scene)
@@ -206,15 +206,10 @@ def why_no_endpoint(scene: Scene, topic: str, msg_type: type | None, kind: str, 
         name
         for name in used
         for end in reach(name)
-        if end.topic_type == (wanted or end.topic_type)
-        and full_name(end.node_namespace, end.node_name) == (node or full_name(end.node_namespace, end.node_name))
+        if end.topic_type == (wanted or end.topic_type) and node_of(end) == (node or node_of(end))
     }
     twins = _twins(scene, topic)
-    near = [
-        name
-        for name in (meant or used)
-        if not {full_name(end.node_namespace, end.node_name) for end in reach(name)} <= twins
-    ]
+    near = [name for name in (meant or used) if not {node_of(end) for end in reach(name)} <= twins]
     found = _idle_rule(scene, topic, node) or not_made_yet(scene, topic, kind, node)
     found = found or _elsewhere(scene, topic, kind, near)
     if found:
@@ -236,7 +231,7 @@ def _idle_rule(scene: Scene, topic: str, node: str) -> Diagnosis | None:
     """A remap rule, of the program in question, that was meant to make the topic's name and did not."""
     observer = scene.observer
     users = {
-        name: {full_name(end.node_namespace, end.node_name) for end in ends}
+        name: {node_of(end) for end in ends}
         for name in observer.topics()
         for ends in [[*observer.publishers(name), *observer.subscriptions(name)]]
     }

@@ -17,7 +17,7 @@ from autograder.diagnosis.reason import Diagnosis
 from autograder.diagnosis.scene import Scene, first
 from autograder.diagnosis.together import why_starved
 from autograder.graph import qos
-from autograder.graph.names import full_name, type_name
+from autograder.graph.names import node_of, type_name
 
 _EVERY_NODE = ("use_sim_time", "start_type_description_service")
 """Parameters that a node has without declaring them."""
@@ -37,7 +37,7 @@ def why_silent(scene: Scene, topic: str, msg_type: type, profile: QoSProfile) ->
     mismatch = why_not_matched(scene, topic, profile, "publisher")
     if mismatch:
         return mismatch
-    node = full_name(ends[0].node_namespace, ends[0].node_name)
+    node = node_of(ends[0])
     return (
         inside_reason(scene, node)
         or lifecycle_silence(scene, topic)
@@ -76,7 +76,7 @@ def too_old(scene: Scene, topic: str, profile: QoSProfile) -> Diagnosis | None:
     if profile.durability != DurabilityPolicy.TRANSIENT_LOCAL:
         return None
     for end in scene.observer.publishers(topic):
-        node, have = full_name(end.node_namespace, end.node_name), qos.describe(end.qos_profile)
+        node, have = node_of(end), qos.describe(end.qos_profile)
         lifespan = have["lifespan"]
         for inside, publisher in _publishers(scene, topic):
             age = inside.now - publisher.last

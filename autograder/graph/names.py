@@ -4,6 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from difflib import SequenceMatcher
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 UNKNOWN_NODE = "_NODE_NAME_UNKNOWN_"
 """What the middleware calls the node of an endpoint whose node it has not heard of yet."""
@@ -12,6 +16,11 @@ UNKNOWN_NODE = "_NODE_NAME_UNKNOWN_"
 def full_name(namespace: str, name: str) -> str:
     """Join a namespace and a node name: `/` and `talker` give `/talker`."""
     return f"{namespace.rstrip('/')}/{name}"
+
+
+def node_of(end: TopicEndpointInfo) -> str:
+    """The full name of the node to which an endpoint belongs."""
+    return full_name(end.node_namespace, end.node_name)
 
 
 def nearest(wanted: str, names: Iterable[str]) -> str | None:

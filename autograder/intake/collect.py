@@ -149,6 +149,9 @@ def _of_platform(source: Path, lab: str, roster: Roster | None, collected: Colle
                 f"{last.member.name[:100]!r} of {student} cannot be read ({error}); it was left out."
             )
             continue
+        if not content.strip():  # what an upload that failed leaves behind
+            collected.refused.append(f"{last.member.name[:100]!r} of {student} is an empty file; it was left out.")
+            continue
         found[student] = HandedIn(
             content, last.handed_in.encode(), last.secret, "/".join(last.member.path), last.owner, last.late
         )

@@ -69,7 +69,7 @@ def _from_folder(source: Path, lab: str, refused: list[str]) -> dict[str, Handed
             elif student and is_zip(entry.name):
                 found[student] = HandedIn(_notebook_in_zip(_files_of(entry), lab))
             elif student:
-                found[student] = HandedIn(read_plain(source, [entry.name], NOTEBOOK_BYTES + 1))
+                found[student] = HandedIn(_filled(read_plain(source, [entry.name], NOTEBOOK_BYTES + 1), entry.name))
             elif entry.name != ROSTER:
                 refused.append(beside_all(entry.name))
         except OSError as error:  # such as a folder that may not be entered: the class goes on
@@ -107,7 +107,7 @@ def _notebook_in(source: Path, student: str, lab: str) -> bytes:
         if deeper != inner and deeper.is_dir() and not deeper.is_symlink():
             paths += [member.path[1:] for member in in_folder(source, (student, deeper.name))]
     chosen = _choose(paths, lab)
-    return read_plain(source, [student, *chosen], NOTEBOOK_BYTES + 1) if chosen else b""
+    return _filled(read_plain(source, [student, *chosen], NOTEBOOK_BYTES + 1), chosen[-1]) if chosen else b""
 
 
 def _files_of(path: Path) -> list[Member]:
@@ -134,7 +134,7 @@ def _notebook_in_zip(held: Sequence[Member], lab: str) -> bytes:
             break
         files = {parts[1:]: member for parts, member in files.items()}
     chosen = _choose(list(files), lab)
-    return _read(files[chosen]) if chosen else b""
+    return _filled(_read(files[chosen]), chosen[-1]) if chosen else b""
 
 
 def _choose(paths: Sequence[tuple[str, ...]], lab: str) -> tuple[str, ...]:
@@ -214,7 +214,7 @@ def _from_zip(source: Path, lab: str, refused: list[str]) -> dict[str, HandedIn]
                 elif is_zip(packed[student].name):
                     found[student] = HandedIn(_notebook_in_zip(_unpacked(packed[student]), lab))
                 else:
-                    found[student] = HandedIn(_read(packed[student]))
+                    found[student] = HandedIn(_filled(_read(packed[student]), packed[student].name))
             except _NotUnderstood as reason:
                 refused.append(f"{student[:80]!r} {reason}; it was left out.")
     for student in sorted(packed.keys() & students.keys()):
@@ -237,7 +237,7 @@ def _in_folder(files: Mapping[tuple[str, ...], Member], lab: str) -> HandedIn:
         files.get((name,)) or files.get((lab, name)) for name in (timestamp.FILE_NAME, exchange_secret.FILE_NAME)
     )
     return HandedIn(
-        _read(files[chosen]) if chosen else b"",
+        _filled(_read(files[chosen]), chosen[-1]) if chosen else b"",
         _read(stamp)[: timestamp.MOST_BYTES] if stamp is not None else b"",
         exchange_secret.secret(_read(secret)) if secret is not None else "",
     )
@@ -255,3 +255,14 @@ def _read(member: Member) -> bytes:
         return member.read(NOTEBOOK_BYTES + 1)
     except Exception as error:  # each way of packing fails in its own way (zlib.error, LZMAError); the class goes on
         raise _NotUnderstood(f"holds {'/'.join(member.path)[:200]!r}, which cannot be read ({error})") from error
+
+
+def _filled(notebook: bytes, name: str) -> bytes:
+    """Return what a notebook holds; an upload that failed leaves an empty file behind.
+
+    Raises:
+        _NotUnderstood: it holds nothing.
+    """
+    if not notebook.strip():
+        raise _NotUnderstood(f"holds {name[:80]!r}, which is an empty file")
+    return notebook

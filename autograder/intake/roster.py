@@ -9,6 +9,7 @@ from __future__ import annotations
 import codecs
 import csv
 import io
+import re
 import unicodedata
 from collections.abc import Mapping
 from pathlib import Path
@@ -97,7 +98,11 @@ def read_roster(path: Path) -> Roster:
         )
     students: dict[str, dict[str, str]] = {}
     for number, line in lines:
-        known = {(key or "").strip().lower(): value.strip() for key, value in line.items() if isinstance(value, str)}
+        named = {(key or "").strip().lower(): value.strip() for key, value in line.items() if isinstance(value, str)}
+        # Spreadsheets give a column of numbers in which one is missing a decimal point: 4711.0.
+        known = {
+            key: re.sub(r"^(\d+)\.0+$", r"\1", value) if key.endswith("_id") else value for key, value in named.items()
+        }
         if not any(known.values()):  # spreadsheets write lines of nothing but commas
             continue
         student = known.get("id", "")

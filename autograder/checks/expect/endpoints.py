@@ -13,7 +13,7 @@ from autograder.checks import outcomes
 from autograder.checks.expect.expectations import WITHIN
 from autograder.checks.expect.graph import GONE_WITHIN, GraphExpectations
 from autograder.diagnosis import Diagnosis
-from autograder.graph.names import full_name, type_name
+from autograder.graph.names import node_of, type_name
 
 End = Literal["publisher", "subscription"]
 
@@ -26,8 +26,7 @@ class EndExpectations(GraphExpectations):
         return [
             end
             for end in ends
-            if (msg_type is None or end.topic_type == type_name(msg_type))
-            and (not node or full_name(end.node_namespace, end.node_name) == node)
+            if (msg_type is None or end.topic_type == type_name(msg_type)) and (not node or node_of(end) == node)
         ]
 
     def _expect_end(
@@ -105,9 +104,7 @@ class EndExpectations(GraphExpectations):
 
     def _owners(self, topic: str, kind: End, msg_type: type | None = None, node: str = "") -> str:
         """Whose ends of this kind are on the topic, with their number where a node has several."""
-        owners = Counter(
-            full_name(end.node_namespace, end.node_name) for end in self._ends(topic, msg_type, kind, node)
-        )
+        owners = Counter(node_of(end) for end in self._ends(topic, msg_type, kind, node))
         return ", ".join(owner if times == 1 else f"{owner} ({times})" for owner, times in sorted(owners.items()))
 
     def _expect_no_end(self, topic: str, kind: End, within: float, hint: str) -> None:

@@ -19,7 +19,7 @@ from autograder.checks.message_text import in_words, int_in_float, shorten
 from autograder.checks.misuse import Misuse
 from autograder.core.cpu_use import cpu_uses, kept_waiting
 from autograder.diagnosis import Diagnosis
-from autograder.graph.names import full_name
+from autograder.graph.names import node_of
 from autograder.graph.recording import Received, Recording, quiet_profile
 
 _RATE_DECIDED = 4
@@ -268,7 +268,7 @@ class MessageExpectations(SourceExpectations):
         """
         recording = self._observer.record(topic, msg_type)
         self._observer.wait(self._hears_programs, MATCHES_WITHIN)  # nobody hears what was made a moment ago
-        for node in {full_name(end.node_namespace, end.node_name) for end in self._observer.publishers(topic)}:
+        for node in {node_of(end) for end in self._observer.publishers(topic)}:
             self._settle(node)  # by its answer it has taken what was sent to it before, too
         begins = time.time() + _UNDER_WAY
 

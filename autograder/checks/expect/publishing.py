@@ -12,7 +12,7 @@ from autograder import diagnosis
 from autograder.checks.expect.endpoints import EndExpectations
 from autograder.checks.expect.expectations import WITHIN
 from autograder.checks.parts import asked
-from autograder.graph.names import full_name
+from autograder.graph.names import node_of
 from autograder.graph.stream import Stream
 
 RELIABLE_DEEP = 1000
@@ -112,7 +112,7 @@ class Publishing(EndExpectations):
         by answering a question: a program learns of the check's ends in the order in which they were made, and the
         question's own end is the last.
         """
-        for owner in {full_name(end.node_namespace, end.node_name) for end in self._observer.subscriptions(topic)}:
+        for owner in {node_of(end) for end in self._observer.subscriptions(topic)}:
             self._settle(owner)
 
     def stream(self, topic: str, message: Any, *, rate: float, qos: QoSProfile) -> Stream:

@@ -12,7 +12,7 @@ from autograder.checks.expect.expectations import WITHIN
 from autograder.checks.misuse import Misuse
 from autograder.diagnosis import Diagnosis
 from autograder.graph import qos
-from autograder.graph.names import full_name
+from autograder.graph.names import node_of
 
 _WORDS = {
     "reliability": ("reliable", "best_effort"),
@@ -80,7 +80,7 @@ class QosExpectations(EndExpectations):
 
     def _all_there(self, topic: str, kind: End) -> None:
         """Wait until the nodes at this end are built: their constructors may be about to make further ends."""
-        for owner in {full_name(end.node_namespace, end.node_name) for end in self._ends(topic, None, kind, "")}:
+        for owner in {node_of(end) for end in self._ends(topic, None, kind, "")}:
             if owner not in self._met:
                 self._settle(owner)
 
@@ -143,7 +143,7 @@ def _in_words(policies: Policies, values: Policies) -> str:
 
 def _differences(end: TopicEndpointInfo, kind: str, policies: Policies) -> list[tuple[str, str]]:
     """The policies of an end that are not as they should be, each with a sentence."""
-    owner, have = full_name(end.node_namespace, end.node_name), qos.describe(end.qos_profile)
+    owner, have = node_of(end), qos.describe(end.qos_profile)
     return [
         (
             policy,

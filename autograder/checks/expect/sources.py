@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from autograder.checks.expect.endpoints import EndExpectations
 from autograder.diagnosis import Diagnosis
 from autograder.diagnosis.events import Thing
-from autograder.graph.names import UNKNOWN_NODE, full_name
+from autograder.graph.names import UNKNOWN_NODE, node_of
 from autograder.graph.recording import Received
 
 _MADE_WITHIN = 2.0
@@ -58,7 +58,7 @@ class SourceExpectations(EndExpectations):
     def _nodes_publishing(self, topic: str, msg_type: type) -> list[str]:
         """The full name of each publisher's node."""
         return [
-            full_name(end.node_namespace, end.node_name) if end.node_name != UNKNOWN_NODE else _NAMELESS
+            node_of(end) if end.node_name != UNKNOWN_NODE else _NAMELESS
             for end in self._ends(topic, msg_type, "publisher", "")
         ]
 
