@@ -8,10 +8,12 @@ from pathlib import Path
 import pytest
 import toy
 
+from autograder.core.picture import Picture
 from autograder.core.results import Status, SubmissionResult
 from autograder.course.lab import load_lab
 from autograder.grading import runner, supervisor
 from autograder.grading.class_runner import run_class
+from autograder.grading.executors import local
 from autograder.grading.job import Job
 from autograder.grading.runner import Settings, run_submission
 from autograder.grading.store import ResultStore
@@ -41,6 +43,25 @@ def test_a_result_of_another_seed_is_not_taken(tmp_path: Path) -> None:
     second = graded(2)
     assert second.seed == 2
     assert graded(None) == second
+
+
+def test_pictures_are_in_the_file_and_not_in_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    root = toy.make_course(tmp_path / "course")
+    lab = load_lab(root, toy.LAB)
+    notebook = toy.hand_in(tmp_path, "ann", lab.clean_notebook({"talker": "%%node talker\nhello\n"})["cells"])
+
+    def drawn(job: Job, *_: object) -> SubmissionResult:
+        result = toy.judge(job)
+        result.checks[0].outcomes[0].picture = Picture(svg="<svg/>", alt="what was heard")
+        return result
+
+    monkeypatch.setattr(local, "run_in_worker", drawn)
+    shown: list[SubmissionResult] = []
+    for _ in range(2):  # once run, once taken from the file
+        held = run_class({"ann": notebook}, root, lab, Settings(seed=1), shown.append)["ann"]
+        assert held.checks[0].outcomes[0].title and "svg" not in held.model_dump_json()
+    stored = ResultStore(root).last(toy.LAB, "ann")
+    assert shown == [stored, stored] and stored is not None and "svg" in stored.model_dump_json()
 
 
 @pytest.mark.parametrize(("gives_a_result", "runs"), [(True, [1, 1]), (False, [1, 2])])

@@ -84,12 +84,17 @@ def grade(
 
 def _show(run: ClassRun, paths: CoursePaths, lab: str, as_json: bool) -> None:
     from autograder.gradebook.settings import gradebook_place
+    from autograder.grading.store import ResultStore
     from autograder.report.terminal import class_view, console, plain, undecided_view
 
     left_out = [plain(sentence) for sentence in (*run.told, *run.collected.notes, *run.collected.refused)]
     left_out += [f"{plain(name)} is not in the gradebook: {plain(why)}" for name, why in run.unrecorded.items()]
     if as_json:
-        print("[" + ",\n".join(result.model_dump_json() for result in run.results) + "]")
+        store = ResultStore(paths.root)
+        for number, result in enumerate(run.results):  # one after the other: a class of thousands is large
+            whole = store.last(lab, result.student) or result
+            print(",\n" if number else "[", whole.model_dump_json(), sep="", end="")
+        print("]")
         for sentence in left_out:
             print(sentence, file=sys.stderr)
         return

@@ -190,6 +190,16 @@ class SubmissionResult(_Model):
         """Contradictions that a person should look at, of all checks, each once."""
         return list(dict.fromkeys(flag for check in self.checks for flag in check.flags))
 
+    def without_pictures(self) -> SubmissionResult:
+        """The same without what is most of it, for who holds a whole class in memory."""
+        checks = [
+            check.model_copy(
+                update={"outcomes": [outcome.model_copy(update={"picture": None}) for outcome in check.outcomes]}
+            )
+            for check in self.checks
+        ]
+        return self.model_copy(update={"checks": checks})
+
     def save(self, path: Path) -> None:
         """Write the result as JSON, whole or not at all."""
         write_beside(path, self.model_dump_json(indent=1) + "\n")

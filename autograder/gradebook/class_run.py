@@ -31,6 +31,7 @@ class ClassRun:
     """What came of grading a class."""
 
     results: list[SubmissionResult]
+    """Without pictures, which the stored ones have."""
     collected: Collected
     """What was taken in and what was not."""
     unrecorded: dict[str, str]

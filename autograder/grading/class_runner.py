@@ -26,7 +26,7 @@ def run_class(
     on_start: Callable[[str], None] = lambda _: None,
     tried: bool = False,
 ) -> dict[str, SubmissionResult]:
-    """Run a class, several submissions at once, and return the results by student.
+    """Run a class, several submissions at once, and return the results by student, without their pictures.
 
     Each result is kept as soon as it is there, so that an interrupted run loses only what was running. A run that fails
     or hangs fails alone.
@@ -64,13 +64,13 @@ def run_class(
                 continue
             result = without_running(submission, job)
             store.save(result)
-        results[student] = result
+        results[student] = result.without_pictures()
         on_result(result)
     with closing(executor.run(list(jobs.values()), on_start)) as ran:
         for result in ran:
             # It may come from another machine: only what belongs to the job is believed.
             believed = validated(result, jobs[result.student].checks)
             store.save(believed)
-            results[believed.student] = believed
+            results[believed.student] = believed.without_pictures()
             on_result(believed)
     return {student: results[student] for student in submissions}

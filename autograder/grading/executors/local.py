@@ -38,7 +38,7 @@ class Local:
         try:
             futures = {pool.submit(run, job): job for job in jobs}
             for future in as_completed(futures):
-                yield _result_of(future, futures[future])
+                yield _result_of(future, futures.pop(future))  # a kept future keeps its result in memory
         finally:
             stop.set()
             pool.shutdown(cancel_futures=True)
