@@ -142,6 +142,18 @@ CASES: dict[str, tuple[dict[str, str], str, str, str]] = {
         "executable-place",
         "installed in `lib/other`",
     ),
+    "no_dollar": (
+        changed(SENSORS, "setup.cfg", "install_scripts=$base", "install_scripts=base"),
+        RUNS,
+        "executable-place",
+        "another place",
+    ),
+    "no_colon": (
+        changed(SENSORS, "setup.py", "speed_sensor = NAME.sensor:main", "speed_sensor = NAME.sensor.main"),
+        RUNS,
+        "entry-point-target",
+        "no `:`",
+    ),
     "no_packages": (
         changed(SENSORS, "setup.py", '    packages=["NAME"],\n', ""),
         EXPECT,
@@ -245,6 +257,8 @@ CASES: dict[str, tuple[dict[str, str], str, str, str]] = {
 ALIKE = (
     "no_license",
     "no_packages",
+    "no_dollar",
+    "no_colon",
     "no_comma",
     "msg_in_type",
     "other_folder",

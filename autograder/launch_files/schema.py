@@ -49,7 +49,10 @@ def read_file(path: Path) -> list[Action]:
     """
     place = Place(path.name, path.resolve().parent)
     if not path.is_file():
-        raise place.error("there is no such file.", "Its name is the one after `%%file` in the first line of its cell.")
+        hint = "Its name is the one after `%%file` in the first line of its cell."
+        if "share" in path.parts:
+            hint = "It is started from where the package installs it: `data_files` in setup.py has to name it."
+        raise place.error("there is no such file.", hint)
     try:
         content = student_yaml.read(path)
     except student_yaml.StudentFileError as error:

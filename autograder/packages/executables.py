@@ -18,11 +18,12 @@ def why_no_executable(built: Built, name: str) -> Diagnosis | None:
         return None
     places = (path.rpartition("/")[0] for path in sorted(built.files) if path.endswith(f"/{name}"))
     where = next((place for place in places if place.split("/")[0] in ("bin", "lib") and "python" not in place), "")
-    if where:
-        because = f"`{name}` is installed in `{where}`. `ros2 run` looks in `lib/{built.name}` only."
+    points = _entry_points(built)
+    if where or name in points:
+        because = f"`{name}` is installed in {f'`{where}`' if where else 'another place'}."
+        because += f" `ros2 run` looks in `lib/{built.name}` only."
         wanted = f"setup.cfg says where scripts go: `install_scripts=$base/lib/{built.name}`."
         return Diagnosis(because, "executable-place", wanted)
-    points = _entry_points(built)
     near = next(iter(difflib.get_close_matches(name, points, 1, _MISSPELT)), "")
     has = ", ".join(f"`{one}`" for one in sorted(points)) or "none"
     because = f"setup.py has no entry point of the name `{name}`; its console_scripts are: {has}."
@@ -42,11 +43,13 @@ def why_other_target(built: Built, name: str, wanted: str = "") -> Diagnosis | N
     path = next((one for one in built.files if one.endswith(f"/site-packages/{module.replace('.', '/')}.py")), "")
     first = re.escape(function.partition(".")[0])
     defined = rf"^((def|class) {first}\b|{first}\s*=|.*\bimport\b.*\b{first}\b)"
-    if not path:
+    if target and ":" not in target:
+        because = f"The entry point `{name}` leads to `{target}`, which has no `:` between module and function."
+    elif not path:
         because = f"The entry point names the module `{module}`, and no such module is installed."
         where = "Only the folders of code that `packages` in setup.py names are installed."
         return Diagnosis(because, "entry-point-target", where)
-    if not re.search(defined, built.text(path), re.MULTILINE):
+    elif not re.search(defined, built.text(path), re.MULTILINE):
         because = f"The entry point names `{function}`, and the module `{module}` has no function of that name."
     elif wanted and target != wanted:
         because = f"The entry point `{name}` leads to `{target}`, not to `{wanted}`."
