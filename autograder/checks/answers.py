@@ -98,6 +98,9 @@ class Answers:
         """A sentence about a line of the table that is no question but looks like this one; empty if there is none."""
         if question in self._table:
             return ""
+        for above, below in self._table.items():
+            if isinstance(below, dict) and question in below:
+                return f" It stands below `{above[:60]}`: every question begins at the left margin, below nothing."
         line = nearest(question, self._table.keys() - self._questions.keys())
         if line is None or nearest(line, self._questions.keys() - self._table.keys()) != question:
             return ""

@@ -16,6 +16,7 @@ from autograder.diagnosis.chain import inside_reason, reason_inside
 from autograder.diagnosis.goals import (
     why_no_action,
     why_no_feedback,
+    why_no_result,
     why_not_canceled,
     why_not_finished,
     why_rejected,
@@ -69,6 +70,7 @@ __all__ = [
     "why_no_endpoint",
     "why_no_feedback",
     "why_no_node",
+    "why_no_result",
     "why_no_service",
     "why_not_canceled",
     "why_not_finished",

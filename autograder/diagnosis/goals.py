@@ -74,6 +74,11 @@ def why_not_finished(scene: Scene, name: str, status: str = "succeeded") -> Diag
     return None
 
 
+def why_no_result(scene: Scene, name: str) -> Diagnosis | None:
+    """Why a goal that has ended got an empty result. Must have seen: an error leave the execute callback."""
+    return _said(scene, name, "execute")
+
+
 def why_no_feedback(scene: Scene, name: str) -> Diagnosis | None:
     """Why no feedback came. Must have seen: an execute callback that ran, and no call of `publish_feedback`."""
     found = _said(scene, name, "execute")

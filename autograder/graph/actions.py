@@ -145,6 +145,11 @@ class Goal:
         self.result = future.result().result
         self._observer.notify()
 
+    @property
+    def empty_handed(self) -> bool:
+        """Whether its result has come, and nothing in it has been set."""
+        return self.result is not None and bool(self.result == type(self.result)())
+
     def wait_for_feedback(self, count: int, within: float = 10.0) -> bool:
         """Wait until at least `count` feedback messages are there; at most `within` seconds."""
         return self._observer.wait(lambda: len(self.heard) >= count, within, self._give_up)

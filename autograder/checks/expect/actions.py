@@ -126,6 +126,8 @@ class ActionExpectations(Meeting):
             if state_of(goal) in ("succeeded", "canceled", "aborted"):
                 because = f"The goal is `{state_of(goal)}`, but its execute callback has not returned a result."
                 advice = "When its goal has ended, the execute callback has to `return`."
+            elif state_of(goal) == "accepted":
+                advice = "Nothing has called `execute()` of its handle so far: the status would be `executing`."
             elif goal.agreed:
                 advice = "It agreed to cancel: now the execute callback has to look at `is_cancel_requested`."
             reason = (

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from autograder import diagnosis
 from autograder.checks import outcomes
 from autograder.checks.expect.expectations import Expectations
 from autograder.diagnosis import Diagnosis
+
+if TYPE_CHECKING:
+    from autograder.graph.actions import Goal
 
 
 class Facts(Expectations):
@@ -25,6 +28,7 @@ class Facts(Expectations):
         code: str = "",
         evident: object = False,
         node: str = "",
+        goal: Goal | None = None,
     ) -> None:
         """State a fact: passed if `condition` is true in Python's sense.
 
@@ -42,6 +46,7 @@ class Facts(Expectations):
             evident: anything; if true, the check has seen that this is the reason, and what callbacks wait for is none:
                 in a launch where something is missing on purpose, a right program waits as well.
             node: full name of a node: what its program waits for is a reason, and what others wait for is none.
+            goal: a goal that has ended, if this is about its result: an error in the execute callback leaves it empty.
 
         Example:
             `ros.require(reply.success, "The order is accepted", because=reply.message)`
@@ -54,7 +59,11 @@ class Facts(Expectations):
             return
         self._running.settle_programs()
         scene = self._scene()
-        found = (diagnosis.program_trouble(scene), None if evident else diagnosis.inside_reason(scene, node))
+        found = (
+            diagnosis.program_trouble(scene),
+            diagnosis.why_no_result(scene, goal.name) if goal is not None and goal.empty_handed else None,
+            None if evident else diagnosis.inside_reason(scene, node),
+        )
         # Where the check has a reason, these say less: they are what a program looks like that does nothing more.
         vague = ("exited", "not-spinning", "spinning-ended") if because else ()
         trouble = next((one for one in found if one and one.code not in vague), None)

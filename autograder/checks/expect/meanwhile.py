@@ -48,7 +48,8 @@ class MeanwhileExpectations(ConcurrencyExpectations, SourceExpectations, Offerin
         """
         if goal is not None:
             when = {change.status: change.stamp for change in goal.changes}
-            spans = [(when["executing"], max(when.values()))] if "executing" in when and goal.result is not None else []
+            over = goal.result is not None or any(end in when for end in ("succeeded", "canceled", "aborted"))
+            spans = [(when["executing"], max(when.values()))] if "executing" in when and over else []
         elif service:
             spans = self.served(service)
         else:

@@ -15,6 +15,9 @@ from .writing import ledger, quiet
 KINDS = ("execute", "goal", "cancel", "accepted")
 """The callbacks of an action server, in the order of `rclpy_names.action_callbacks`."""
 
+_LOOKED_AT = 30
+"""How many feedback messages of an action server are looked at: often the last one only has a whole number."""
+
 
 def watch_actions(rclpy: Any) -> None:
     """Wrap how action servers are made, and what is done with their goals."""
@@ -59,7 +62,7 @@ def watch_actions(rclpy: Any) -> None:
             raise
         if thing is not None:
             thing.count()
-            if thing.runs == 1:  # a number of the wrong type is sent as another one, without an error
+            if thing.runs <= _LOOKED_AT:  # a number of the wrong type is sent as another one, without an error
                 with quiet():
                     note_misfit("feedback", thing.about["name"], feedback, server.action_type.Feedback)
 

@@ -65,7 +65,10 @@ class Navigator(Node):
             left = target - self.position
             self.position = target if abs(left) <= reach else self.position + (reach if left > 0.0 else -reach)
             remaining = abs(target - self.position)
-            goal_handle.publish_feedback(feedback_of(remaining, round(100.0 * (way - remaining) / way)))
+            if remaining > 0.0:
+                goal_handle.publish_feedback(feedback_of(remaining, 100.0 * (way - remaining) / way))
+            else:
+                goal_handle.publish_feedback(feedback_of(0, 100))
         goal_handle.succeed()
         return result_of(self.position)
 

@@ -42,6 +42,7 @@ class Navigator(Node):
 
     def decide(self, goal):
         target, speed = goal.nested_field.float64_value, goal.nested_field.float32_value
+        self.target = target
         if self.drives or speed <= 0.0 or not 0.0 <= target <= self.road:
             return GoalResponse.REJECT
         self.drives = True
@@ -62,6 +63,7 @@ class Navigator(Node):
             if goal_handle.is_cancel_requested:
                 goal_handle.canceled()
                 return NestedMessage.Result()
+            target = self.target
             left = target - self.position
             self.position = target if abs(left) <= reach else self.position + (reach if left > 0.0 else -reach)
             remaining = abs(target - self.position)
