@@ -87,20 +87,24 @@ class Answers:
             outcomes.failed(title, because=f"`{question}` {answer}.", code="yaml-refused")
         if answer is None or answer == "?":
             expected = one_of(form) if form else ""
-            because = f"`{question}` has no answer yet." + self._misspelt(question)
+            because = self._below(question) or f"`{question}` has no answer yet." + self._misspelt(question)
             outcomes.failed(title, expected=expected, because=because, code="unanswered")
         if form and not allowed(answer, form):
             because = f"`{question}` is `{_spelt(answer)}`{misses(answer, form)}."
             outcomes.failed(title, expected=one_of(form), observed=_spelt(answer), because=because, code="answer-form")
         return answer
 
+    def _below(self, question: str) -> str:
+        """A sentence about a question that stands below another line of the table; empty if it does not."""
+        for above, below in self._table.items():
+            if isinstance(below, dict) and question in below:
+                return f"`{question}` stands below `{above[:60]}`: each question has to begin at the left margin."
+        return ""
+
     def _misspelt(self, question: str) -> str:
         """A sentence about a line of the table that is no question but looks like this one; empty if there is none."""
         if question in self._table:
             return ""
-        for above, below in self._table.items():
-            if isinstance(below, dict) and question in below:
-                return f" It stands below `{above[:60]}`: every question begins at the left margin, below nothing."
         line = nearest(question, self._table.keys() - self._questions.keys())
         if line is None or nearest(line, self._questions.keys() - self._table.keys()) != question:
             return ""

@@ -15,6 +15,10 @@ _AFTER = {
     "lifecycle": "rclpy swallows it without a log line and treats the transition as ERROR.",
     "execute": "rclpy aborts the goal with an empty result; the node goes on.",
 }
+_ENDED_ALREADY = (
+    "The goal had ended already, and it ends only once: `goal_handle.is_active` tells whether it may end. Let `return` "
+    "follow the call that ends it."
+)
 _CODES = {"service": "service-exception", "lifecycle": "lifecycle-exception", "execute": "execute-exception"}
 
 _NEVER_AWAITED = re.compile(r"RuntimeWarning: coroutine '([\w.<>]{1,100})' was never awaited")
@@ -204,7 +208,7 @@ def _of_goal_state(error: str) -> str:
         return ""
     state, event = found.groups()
     if state in ("SUCCEEDED", "CANCELED", "ABORTED"):
-        return "The goal had ended already, and it ends only once: `goal_handle.is_active` tells whether it may end."
+        return _ENDED_ALREADY
     if event == "CANCELED":
         return (
             "Call `canceled()` in the execute callback, and only while `goal_handle.is_cancel_requested` is true: "
@@ -249,6 +253,7 @@ def _error(program: str, event: CallbackError) -> Diagnosis:
     for exception, word, advice in KNOWN_ERRORS:
         if exception in error and word.startswith(("parameter", "crashed")):
             code, hint = code if word == "crashed" else word, advice
-    return Diagnosis(
-        f"{callback} raised {error}{source}. {_AFTER.get(event.kind, 'It ended the spinning.')}".rstrip(), code, hint
-    )
+    after = _AFTER.get(event.kind, "It ended the spinning.")
+    if event.kind == "execute" and hint == _ENDED_ALREADY:
+        after = "The goal keeps the end that it had, with an empty result; the node goes on."
+    return Diagnosis(f"{callback} raised {error}{source}. {after}", code, hint)
