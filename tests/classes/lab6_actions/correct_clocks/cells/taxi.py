@@ -46,11 +46,11 @@ class Taxi(Node):
 
     def execute(self, goal_handle):
         driven = []
-        if not goal_handle.is_active:  # another took its place before it began
-            return Fibonacci.Result(sequence=driven)
         while len(driven) < goal_handle.request.order:
             time.sleep(self.block)
             with self.lock:
+                if not goal_handle.is_active:  # another took its place before it began
+                    return Fibonacci.Result(sequence=driven)
                 if self.next is not None:
                     goal_handle.abort()
                     self.go_on()
