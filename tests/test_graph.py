@@ -6,9 +6,11 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from types import SimpleNamespace
+from typing import Any
 
 import pytest
 import rclpy
@@ -24,6 +26,7 @@ from rclpy.qos import (
     QoSReliabilityPolicy,
     qos_check_compatible,
 )
+from std_msgs.msg import Int64
 
 from autograder.checks import runtime
 from autograder.checks.concurrency import Concurrency
@@ -221,3 +224,52 @@ def test_a_program_that_only_computes_gains_no_time_by_it(programs: Callable[[st
         assert time.monotonic() < deadline, "they got no CPU"
         time.sleep(0.05)
     assert kept_waiting(before, uses()) == 0.0
+
+
+@pytest.fixture
+def talking(observer: Observer) -> Iterator[Observer]:
+    """An observer in whose domain somebody publishes numbers all the time."""
+    context = Context()
+    rclpy.init(context=context, domain_id=observer.domain_id)
+    node = rclpy.create_node("talker", context=context)
+    publisher = node.create_publisher(Int64, "/numbers", 10)
+    over = threading.Event()
+
+    def talk() -> None:
+        while not over.wait(0.01):
+            publisher.publish(Int64(data=1))
+
+    thread = threading.Thread(target=talk)
+    thread.start()
+    yield observer
+    over.set()
+    thread.join()
+    node.destroy_node()
+    rclpy.try_shutdown(context=context)
+
+
+def test_a_message_that_comes_while_a_subscription_is_made_does_not_deafen_the_observer(
+    talking: Observer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    make, came = talking.node.create_subscription, threading.Event()
+
+    def make_slowly(msg_type: type, topic: str, take: Callable[..., None], *rest: Any, **more: Any) -> object:
+        def taken(message: bytes, info: dict[str, int]) -> None:
+            try:
+                take(message, info)
+            finally:
+                came.set()
+
+        made = make(msg_type, topic, taken, *rest, **more)
+        assert came.wait(30)  # the observer's own thread is quicker than this one
+        return made
+
+    monkeypatch.setattr(talking.node, "create_subscription", make_slowly)
+    assert talking.record("/numbers", Int64).wait_for(20, within=30)
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
+def test_an_observer_that_hears_nothing_any_more_says_so(talking: Observer, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(talking.record("/numbers", Int64), "_keep", lambda *_: 1 / 0)
+    with pytest.raises(RuntimeError, match="hears nothing any more: ZeroDivisionError"):
+        talking.wait(lambda: False, 30)

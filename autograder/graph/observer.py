@@ -89,6 +89,8 @@ class Observer:
         self.meanwhile: Callable[[], None] | None = None
         """Called now and then in the thread of whoever waits."""
         self._closing = False
+        self._error: Exception | None = None
+        """Why it hears nothing any more."""
         self._thread = threading.Thread(target=self._spin, name="observer", daemon=True)
         self._thread.start()
 
@@ -107,9 +109,10 @@ class Observer:
             self._executor.spin()
         except ExternalShutdownException:
             pass
-        except Exception:
+        except Exception as error:
             # An executor that is shut down as it begins to wait finds what it waits on gone.
             if not self._closing:
+                self._error = error
                 raise
 
     def close(self) -> None:
@@ -158,6 +161,8 @@ class Observer:
             elif before is not None and now >= deadline:
                 more = min(kept_waiting(before, cpu_uses()), (_STRETCH - 1) * within, self.patience)
                 deadline = began + within + max(0.0, more)
+            if self._error is not None:  # silence would be held against the program
+                raise RuntimeError(f"The observer hears nothing any more: {self._error!r}.") from self._error
             late = now >= deadline or give_up()
             if ready():
                 return True

@@ -75,6 +75,8 @@ class Recording:
         self._kept = 0
         # Every publisher matches the quiet profile, and no lease runs: its events would only be waited for.
         quiet = qos == quiet_profile()
+        # The observer's thread may take a first message before `create_subscription` has returned in this one.
+        self._subscription: Any = None
         self._subscription = observer.node.create_subscription(
             msg_type,
             topic,
@@ -95,7 +97,7 @@ class Recording:
         while it knows already what was sent later on another.
         """
         self._keep(data, info)
-        for _ in range(_AT_ONCE):
+        for _ in range(_AT_ONCE if self._subscription is not None else 0):
             with self._subscription.handle:
                 taken = self._subscription.handle.take_message(self.msg_type, True)
             if taken is None:
@@ -137,7 +139,7 @@ class Recording:
     @property
     def matched(self) -> int:
         """Number of publishers whose QoS this subscription accepted."""
-        return int(self._subscription.get_publisher_count())
+        return int(self._subscription.get_publisher_count()) if self._subscription is not None else 0
 
     def wait_for(self, count: int, within: float = 10.0) -> bool:
         """Wait until at least `count` messages are there; at most `within` seconds."""
