@@ -113,7 +113,6 @@ class Observer:
             # An executor that is shut down as it begins to wait finds what it waits on gone.
             if not self._closing:
                 self._error = error
-                raise
 
     def close(self) -> None:
         """Leave the domain. The thread is joined: a daemon thread that still spins at exit aborts the process."""
@@ -144,6 +143,9 @@ class Observer:
         Time in which the grader or a program wanted to run and got no CPU because of others does not count (up to
         three times `within`, and as long as there is patience): a verdict must not depend on what else the machine
         does. The last look comes after the deadline.
+
+        Raises:
+            KitError: the observer hears nothing any more.
         """
         began = time.monotonic()
         try:
@@ -162,7 +164,7 @@ class Observer:
                 more = min(kept_waiting(before, cpu_uses()), (_STRETCH - 1) * within, self.patience)
                 deadline = began + within + max(0.0, more)
             if self._error is not None:  # silence would be held against the program
-                raise RuntimeError(f"The observer hears nothing any more: {self._error!r}.") from self._error
+                raise KitError(f"The observer hears nothing any more: {self._error!r}.", "Run it again.")
             late = now >= deadline or give_up()
             if ready():
                 return True
