@@ -156,6 +156,7 @@ def course(folder: Path, *, plain: bool) -> Path:
 def tame_students(count: int) -> list[str]:
     """So many of the sample class, evenly chosen, and nobody hostile; 0: all of them."""
     tame = [name for name in sample_class.students(LAB) if name.startswith(("solution", "correct", "blank", "e", "m"))]
+    tame.remove("correct_own_module")  # the cell of the module is the notebook's last: stock nbgrader runs it too late
     count = min(count or len(tame), len(tame))
     return [tame[index * len(tame) // count] for index in range(count)]
 
