@@ -135,6 +135,8 @@ def plot(runs: list[Run], path: Path) -> None:
     matplotlib.rcParams |= {"svg.fonttype": "none", "svg.hashsalt": "scale", "font.size": 9}
     figure = Figure(figsize=(8, 2.8), layout="constrained")
     by_jobs, by_size, where = figure.subplots(1, 3)
+    for axes in (by_size, where):
+        axes.margins(y=0.15)  # for what stands above the bars
     jobs = sorted((run for run in runs if run.kind == "jobs"), key=lambda run: run.jobs)
     sizes = sorted((run for run in runs if run.kind == "size"), key=lambda run: run.size)
     by_jobs.plot([f"{run.jobs}" for run in jobs], [60 * run.size / run.seconds for run in jobs], "o-", color="#0072B2")
