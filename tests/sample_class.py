@@ -1,6 +1,7 @@
 """Builds the sample class of a lab from `tests/classes/<lab>` and says what grading must make of it.
 
-As a script: `python tests/sample_class.py lab2_executors` writes `build/sample/classes/lab2_executors/<student>/…`.
+As a script: `python tests/sample_class.py lab2_executors` writes `build/sample/classes/lab2_executors/<student>/…` for
+as many students as it takes to show every kind of outcome. The tests grade them all.
 """
 
 from __future__ import annotations
@@ -144,13 +145,36 @@ def _notebook(lab: Lab, home: Path, changes: dict[str, Any]) -> dict[str, Any]:
     return notebook
 
 
+def outcomes(lab: Lab, student: str) -> set[str]:
+    """The kinds of outcome that a student shows: reasons, problems of the notebook, flags, and how much was earned."""
+    told = expected(lab, student)
+    kinds = {*told.codes.values(), *(f"problem {code}" for code in told.problems)}
+    if told.flagged:
+        kinds.add("flagged")
+    for cell in lab.checks:
+        points = told.points[cell.grade_id]
+        kinds.add({None: "undecided", 0: "nothing", cell.points: "full"}.get(points, "part"))
+    return kinds
+
+
+def examples(lab: Lab) -> list[str]:
+    """The solution, the blank lab, and students until every kind of outcome of the whole class was seen, sorted."""
+    seen = {student: outcomes(lab, student) for student in students(lab.name)}
+    chosen = [student for student in ("solution", "blank") if student in seen]
+    missing = set().union(*seen.values()).difference(*(seen[student] for student in chosen))
+    while missing:
+        chosen.append(max(seen, key=lambda student: len(seen[student] & missing)))
+        missing -= seen[chosen[-1]]
+    return sorted(chosen)
+
+
 def build_class(lab_name: str) -> Path:
-    """Build a lab's sample class under `build/sample/classes/<lab>` and return that folder."""
+    """Build examples of a lab's sample students under `build/sample/classes/<lab>` and return that folder."""
     lab = load_lab(ROOT, lab_name)
     into = CoursePaths(ROOT).sample_class(lab_name)
     shutil.rmtree(into, ignore_errors=True)
     into.mkdir(parents=True)
-    for student in students(lab_name):
+    for student in examples(lab):
         build_student(lab, student, into)
     return into
 

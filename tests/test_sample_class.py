@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import kill_matrix
 import pytest
 import sample_class
 import toy
@@ -76,3 +77,12 @@ def test_a_slip_in_a_description_is_an_error(lab: Lab, tmp_path: Path) -> None:
     (tmp_path / "describe" / "ann" / "expected.yaml").write_text("about: x\nchecks: {check_talkr: {points: 1}}")
     with pytest.raises(ValueError, match="check_talkr"):
         sample_class.expected(lab, "ann", tmp_path / "describe")
+
+
+@pytest.mark.parametrize("name", kill_matrix.labs())
+def test_the_class_that_is_built_shows_every_kind_of_outcome(name: str) -> None:
+    lab = load_lab(sample_class.ROOT, name)
+    chosen, everybody = sample_class.examples(lab), sample_class.students(name)
+    assert {"solution", "blank"} <= set(chosen) <= set(everybody)
+    shown, known = (set().union(*(sample_class.outcomes(lab, one) for one in group)) for group in (chosen, everybody))
+    assert shown == known
