@@ -260,6 +260,22 @@ def test_what_contradicts_itself_is_shown_to_instructors_only() -> None:
     assert "ann: One thread only." in text_of(undecided_view([flagged]))
 
 
+def test_what_to_repair_first_names_a_reason_once_with_every_task_that_it_costs() -> None:
+    broken = outcome(Status.FAILED, because="The file is not a notebook.", hint="Open it.", code="not-json")
+    other = outcome(Status.FAILED, because="Nothing was published.", code="silent")
+    reasons = {"one": broken, "two": other, "three": broken}
+    told = result(*(check(0, why, grade_id=name) for name, why in reasons.items()))
+    tasks = [Task(f"Task {name}", [name]) for name in reasons]
+    cells = tuple(CellGrade(name, 0.0, 3.0, True, False) for name in reasons)
+    text = feedback_html(
+        Heading("lab", "ann"), tasks, told, Grade("ann", "lab", cells, 0.0), datetime.date(2026, 11, 22)
+    )
+    first = Page(text[text.index("What to repair first") : text.index("<section")]).text
+    assert "Task one; Task three (6 points lost): The file is not a notebook." in first
+    assert first.index("Task three") < first.index("Task two (3 points lost)")
+    assert first.count("is not a notebook") == 1
+
+
 def test_in_a_notebook_hints_open_one_after_the_other_and_lead_to_the_book() -> None:
     failed = Outcome(
         status=Status.FAILED, title="beats", because="The timer waits.", code="one-group",

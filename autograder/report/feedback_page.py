@@ -18,7 +18,7 @@ from autograder.report.html import check_html, render
 from autograder.report.words import Verdict
 
 _FIRST = 3
-"""Checks that are named under "repair this first"."""
+"""Reasons that are named under "repair this first"."""
 
 
 @dataclass
@@ -43,6 +43,24 @@ class Heading:
     name: str = ""
     handed_in: str = ""
     """Date and time; empty if nothing says so."""
+
+
+@dataclass
+class _Repair:
+    """One thing to repair, and what it cost."""
+
+    why: str
+    hint: str
+    lost: float = 0.0
+    tasks: dict[str, str] = field(default_factory=dict)
+    """Titles, by anchor."""
+    checks: set[str] = field(default_factory=set)
+
+    @property
+    def points(self) -> str:
+        """Such as `1 point`."""
+        number = _number(self.lost)
+        return f"{number} {'point' if number == '1' else 'points'}"
 
 
 @dataclass(frozen=True)
@@ -75,7 +93,7 @@ def feedback_html(
     checks = {check.grade_id: check for check in shown.checks} if shown is not None else {}
     cells = {cell.grade_id: cell for cell in grade.cells}
     repairs = _repairs(tasks, cells, checks)
-    first = {repair["check"] for repair in repairs}
+    first = {name for repair in repairs for name in repair.checks}
     sections = []
     for number, task in enumerate(tasks, start=1):
         graded = [
@@ -182,23 +200,19 @@ def _graded(cell: CellGrade, check: CheckResult | None, task: Task, fold: bool) 
     )
 
 
-def _repairs(
-    tasks: Sequence[Task], cells: Mapping[str, CellGrade], checks: Mapping[str, CheckResult]
-) -> list[dict[str, str]]:
-    """What to repair first: the checks that cost the most, with the first reason of each."""
-    lost = []
+def _repairs(tasks: Sequence[Task], cells: Mapping[str, CellGrade], checks: Mapping[str, CheckResult]) -> list[_Repair]:
+    """What to repair first: the reasons that cost the most, each with the tasks that it is the first reason of."""
+    repairs: dict[tuple[str, str], _Repair] = {}
     for number, task in enumerate(tasks, start=1):
         for name in task.graded:
             cell, check = cells.get(name), checks.get(name)
             if cell is None or check is None or cell.points is None or cell.points >= cell.max_points:
                 continue
             failure = check.first_failure
-            why = reason(failure) if failure is not None else ""
-            said = words.not_attempted(check) or why or check.status.value
+            why = words.not_attempted(check) or (reason(failure) if failure is not None else "") or check.status.value
             hint = failure.hint if failure is not None else ""
-            lost.append((cell.max_points - cell.points, task.title, f"task-{number}", said, hint, name))
-    lost.sort(key=lambda one: -one[0])
-    return [
-        {"lost": _number(points), "title": title, "anchor": anchor, "why": why, "hint": hint, "check": name}
-        for points, title, anchor, why, hint, name in lost[:_FIRST]
-    ]
+            repair = repairs.setdefault((why, hint), _Repair(why, hint))
+            repair.lost += cell.max_points - cell.points
+            repair.tasks[f"task-{number}"] = task.title
+            repair.checks.add(name)
+    return sorted(repairs.values(), key=lambda repair: -repair.lost)[:_FIRST]
