@@ -263,7 +263,7 @@ def test_what_contradicts_itself_is_shown_to_instructors_only() -> None:
 def test_what_to_repair_first_names_a_reason_once_with_every_task_that_it_costs() -> None:
     broken = outcome(Status.FAILED, because="The file is not a notebook.", hint="Open it.", code="not-json")
     other = outcome(Status.FAILED, because="Nothing was published.", code="silent")
-    reasons = {"one": broken, "two": other, "three": broken}
+    reasons = {"one": broken, "two": other, "three": broken.model_copy(update={"hint": "Another."})}
     told = result(*(check(0, why, grade_id=name) for name, why in reasons.items()))
     tasks = [Task(f"Task {name}", [name]) for name in reasons]
     cells = tuple(CellGrade(name, 0.0, 3.0, True, False) for name in reasons)

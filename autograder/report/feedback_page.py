@@ -202,7 +202,7 @@ def _graded(cell: CellGrade, check: CheckResult | None, task: Task, fold: bool) 
 
 def _repairs(tasks: Sequence[Task], cells: Mapping[str, CellGrade], checks: Mapping[str, CheckResult]) -> list[_Repair]:
     """What to repair first: the reasons that cost the most, each with the tasks that it is the first reason of."""
-    repairs: dict[tuple[str, str], _Repair] = {}
+    repairs: dict[str, _Repair] = {}
     for number, task in enumerate(tasks, start=1):
         for name in task.graded:
             cell, check = cells.get(name), checks.get(name)
@@ -211,7 +211,7 @@ def _repairs(tasks: Sequence[Task], cells: Mapping[str, CellGrade], checks: Mapp
             failure = check.first_failure
             why = words.not_attempted(check) or (reason(failure) if failure is not None else "") or check.status.value
             hint = failure.hint if failure is not None else ""
-            repair = repairs.setdefault((why, hint), _Repair(why, hint))
+            repair = repairs.setdefault(why, _Repair(why, hint))
             repair.lost += cell.max_points - cell.points
             repair.tasks[f"task-{number}"] = task.title
             repair.checks.add(name)
