@@ -72,10 +72,11 @@ test: setup-dev ## run every test, ruff and mypy among them
 test-all: setup-dev ## the same, with every check run on every sample student, and every lab in a browser
 	@$(RUN) python -m pytest -n 4 --dist loadfile --no-loadscope-reorder --complete $(ARGS)
 
-lint: setup-dev ## ruff, its formatting, and mypy --strict
+lint: setup-dev ## ruff, its formatting, mypy --strict, and the direction of imports
 	@$(RUN) ruff check .
 	@$(RUN) ruff format --check .
 	@$(RUN) mypy autograder
+	@$(RUN) lint-imports --no-cache --no-logo
 
 soak: setup-dev ## grade every sample student N=20 times, half of them under load: nothing may differ
 	@$(RUN) python tests/soak.py --times $(N) $(if $(filter command line,$(origin LAB)),--lab $(LAB)) $(ARGS)

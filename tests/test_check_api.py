@@ -27,7 +27,7 @@ SENDING = """
 """
 LOOKING = """
     account available_transitions changes concurrency descriptions get_parameters kept_waiting list_parameters
-    listen log messages_during nodes program programs publishers requests seen_at_once seen_runs served
+    listen log messages_during nodes program programs publishers requests seen_runs served
     state subscriptions topics watch_transitions
 """
 PICTURES = "arrivals graph lifecycle qos runs timeline"

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import ast
 import json
 import re
+import statistics
 import subprocess
 import sys
 from pathlib import Path
@@ -156,3 +158,22 @@ def test_the_code_is_clean(command: tuple[str, ...]) -> None:
         [sys.executable, "-m", *command], cwd=ROOT, capture_output=True, text=True, timeout=300, check=False
     )
     assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_imports_go_downwards_and_in_no_circle() -> None:
+    """The contracts stand in pyproject.toml."""
+    lint = Path(sys.executable).with_name("lint-imports")
+    done = subprocess.run([lint, "--no-cache"], cwd=ROOT, capture_output=True, text=True, timeout=300, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_modules_and_functions_are_small() -> None:
+    lines, long = [], []
+    for path in sorted((ROOT / "autograder").rglob("*.py")):
+        text = path.read_text(encoding="utf-8")
+        lines.append(len(text.splitlines()))
+        functions = [node for node in ast.walk(ast.parse(text)) if isinstance(node, ast.FunctionDef)]
+        long += [f"{name(path)}: {f.name}" for f in functions if (f.end_lineno or 0) - f.lineno >= 60]
+        long += [name(path)] * (lines[-1] > 300)
+    assert long == []
+    assert statistics.median(lines) < 110

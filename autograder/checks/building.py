@@ -111,24 +111,16 @@ class Package:
         reason = missing_package(self.name) or not_described(sources, self.name)
         if reason is not None:
             self._fail(title, reason, hint)
-        has = needed_packages(sources)
+        at_run, at_build = needed_packages(sources), needed_packages(sources, to_build=True)
         by = {one: f" `{module}` imports it." for one, module in imported_interfaces(sources).items()}
-        lacking = [one for one in (*packages, *by) if one not in (*has, self.name)]
+        lacking = next((one for one in (*packages, *by) if one not in (*at_run, self.name)), "")
         if lacking:
-            told = ", ".join(f"`{one}`" for one in has) or "none"
-            because = f"package.xml does not name `{lacking[0]}` as needed at run time.{by.get(lacking[0], '')}"
-            because += f" It names: {told}."
-            tag = "depend" if lacking[0] in to_build else "exec_depend"
-            wanted = f"It needs `<{tag}>{lacking[0]}</{tag}>`."
-            self._fail(title, Diagnosis(because, "package-depend", wanted), hint)
-        at_build = needed_packages(sources, to_build=True)
-        lacking = [one for one in to_build if one not in at_build]
+            tag = "depend" if lacking in to_build else "exec_depend"
+            self._fail(title, _not_named(lacking, f"at run time.{by.get(lacking, '')}", at_run, tag), hint)
+        lacking = next((one for one in to_build if one not in at_build), "")
         if lacking:
-            told = ", ".join(f"`{one}`" for one in at_build) or "none"
-            because = f"package.xml does not name `{lacking[0]}` as needed to build it. For that it names: {told}."
-            tag = "depend" if lacking[0] in has else "buildtool_depend"
-            wanted = f"It needs `<{tag}>{lacking[0]}</{tag}>`."
-            self._fail(title, Diagnosis(because, "package-depend", wanted), hint)
+            tag = "depend" if lacking in at_run else "buildtool_depend"
+            self._fail(title, _not_named(lacking, "to build it.", at_build, tag), hint)
         outcomes.passed(title)
 
     def expect_executable(self, name: str, target: str = "", hint: str = "") -> None:
@@ -231,6 +223,13 @@ class Package:
 
     def _fail(self, title: str, reason: Diagnosis, hint: str) -> NoReturn:
         outcomes.failed(title, because=reason.because, hint=hint or reason.hint, code=reason.code)
+
+
+def _not_named(package: str, when: str, named: Sequence[str], tag: str) -> Diagnosis:
+    """A package that package.xml lacks: when it is needed, what is named for that, and the tag that names it."""
+    because = f"package.xml does not name `{package}` as needed {when} For that it names: "
+    because += f"{', '.join(f'`{one}`' for one in named) or 'none'}."
+    return Diagnosis(because, "package-depend", f"It needs `<{tag}>{package}</{tag}>`.")
 
 
 def missing_package(name: str) -> Diagnosis | None:

@@ -15,11 +15,10 @@ _AFTER = {
     "lifecycle": "rclpy swallows it without a log line and treats the transition as ERROR.",
     "execute": "rclpy aborts the goal with an empty result; the node goes on.",
 }
-_ENDED_ALREADY = (
-    "The goal had ended already, and it ends only once: `goal_handle.is_active` tells whether it may end. Let `return` "
-    "follow the call that ends it."
-)
 _CODES = {"service": "service-exception", "lifecycle": "lifecycle-exception", "execute": "execute-exception"}
+
+_GOAL_STATE = re.compile(r"invalid transition from state (\w+) with event (\w+)")
+"""What rclpy says where a goal cannot end so, in the state that it is in."""
 
 _NEVER_AWAITED = re.compile(r"RuntimeWarning: coroutine '([\w.<>]{1,100})' was never awaited")
 
@@ -201,15 +200,23 @@ def _bad_return(program: str, event: BadReturn) -> Diagnosis:
     )
 
 
+def _ended_already(error: str) -> bool:
+    """Whether a goal was to end that has ended before."""
+    found = _GOAL_STATE.search(error)
+    return found is not None and found[1] in ("SUCCEEDED", "CANCELED", "ABORTED")
+
+
 def _of_goal_state(error: str) -> str:
     """What to do when a goal cannot end so, in the state that it is in; empty for another error."""
-    found = re.search(r"invalid transition from state (\w+) with event (\w+)", error)
+    found = _GOAL_STATE.search(error)
     if not found:
         return ""
-    state, event = found.groups()
-    if state in ("SUCCEEDED", "CANCELED", "ABORTED"):
-        return _ENDED_ALREADY
-    if event == "CANCELED":
+    if _ended_already(error):
+        return (
+            "The goal had ended already, and it ends only once: `goal_handle.is_active` tells whether it may end. Let "
+            "`return` follow the call that ends it."
+        )
+    if found[2] == "CANCELED":
         return (
             "Call `canceled()` in the execute callback, and only while `goal_handle.is_cancel_requested` is true: "
             "without a request to cancel this goal rclpy does not allow it. To give a goal up by yourself, call "
@@ -254,6 +261,6 @@ def _error(program: str, event: CallbackError) -> Diagnosis:
         if exception in error and word.startswith(("parameter", "crashed")):
             code, hint = code if word == "crashed" else word, advice
     after = _AFTER.get(event.kind, "It ended the spinning.")
-    if event.kind == "execute" and hint == _ENDED_ALREADY:
+    if event.kind == "execute" and _ended_already(error):
         after = "The goal keeps the end that it had, with an empty result; the node goes on."
     return Diagnosis(f"{callback} raised {error}{source}. {after}", code, hint)

@@ -178,11 +178,6 @@ class LifecycleClient:
     def _wait_for_more(self, heard: int, within: float, give_up: GiveUp) -> bool:
         return self._observer.wait(lambda: self._events.count > heard, within, give_up)
 
-    @property
-    def listening(self) -> bool:
-        """Whether the node's event publisher is matched, so that no later change is missed."""
-        return self._events.matched > 0
-
     def _offered(self, within: float, give_up: GiveUp) -> list[Any]:
         reply = self._ask(GetAvailableTransitions, GetAvailableTransitions.Request(), within, give_up)
         return list(reply.available_transitions)

@@ -213,10 +213,7 @@ def exchange(
             for key, _ in selector.select(min(left, _STOP_POLL)):
                 name, stream = key.data
                 if name == "stdin":
-                    try:
-                        waiting = waiting[os.write(stream.fileno(), waiting[: 1 << 16]) :]
-                    except BrokenPipeError:
-                        waiting = waiting[:0]
+                    waiting = _fed(stream.fileno(), waiting)
                     if not waiting:
                         selector.unregister(stream)
                         stream.close()
@@ -234,3 +231,11 @@ def exchange(
         process.kill()
         status, timed_out = process.wait(), True
     return OuterRun(bytes(taken["stdout"]), taken["stderr"].decode("utf-8", "replace"), status, timed_out)
+
+
+def _fed(pipe: int, waiting: memoryview) -> memoryview:
+    """Write as much as a pipe takes, and return the rest: nothing if nobody reads it any more."""
+    try:
+        return waiting[os.write(pipe, waiting[: 1 << 16]) :]
+    except BrokenPipeError:
+        return waiting[:0]

@@ -97,26 +97,6 @@ class Looking(Expectations):
         things = [t for inside in self._scene().insides if inside.name == program for t in inside.callbacks]
         return next((thing.runs for thing in things if (thing.kind, thing.name) == (kind, name)), None)
 
-    def seen_at_once(self, program: str, kind: str, name: str = "") -> int | None:
-        """How many runs of a program's callbacks of one kind were seen at once inside it: evidence for reasons only.
-
-        Args:
-            program: its name.
-            kind: `timer`, `subscription` or `service`: the highest number of runs of one of them.
-            name: full name of its topic or service, if several are of that kind.
-
-        Returns:
-            None where the inside of the program cannot be seen.
-
-        Example:
-            `most = ros.seen_at_once("worker", "timer")`
-        """
-        for inside in self._scene().insides:
-            things = [t for t in inside.callbacks if t.kind == kind and (not name or t.name == name)]
-            if inside.name == program and inside.attached and things:
-                return max(thing.most for thing in things)
-        return None
-
     def account(self, topic: str) -> str:
         """What was seen of a topic's publisher, of the callbacks of its node and of its messages: for reasons only.
 

@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Sequence
 
 from autograder.checks.expect.endpoints import EndExpectations
+from autograder.checks.settling import shows_all
 from autograder.diagnosis import Diagnosis
 from autograder.diagnosis.events import Thing
 from autograder.graph.names import UNKNOWN_NODE, node_of
@@ -28,7 +29,7 @@ class SourceExpectations(EndExpectations):
         """Fail if the messages may come from another publisher than the one that is meant."""
         if not received:
             return
-        self._observer.wait(lambda: not self._unmet(topic, msg_type), _MADE_WITHIN)
+        self._observer.wait(lambda: shows_all(self._observer, self._publishers_made(topic)), _MADE_WITHIN)
         self._observer.wait(lambda: _NAMELESS not in self._nodes_publishing(topic, msg_type), _NAMED_WITHIN)
         owners = self._nodes_publishing(topic, msg_type)
         named = ", ".join(f"{many} of {name}" if many > 1 else name for name, many in sorted(Counter(owners).items()))
@@ -61,12 +62,6 @@ class SourceExpectations(EndExpectations):
             node_of(end) if end.node_name != UNKNOWN_NODE else _NAMELESS
             for end in self._ends(topic, msg_type, "publisher", "")
         ]
-
-    def _unmet(self, topic: str, msg_type: type) -> Counter[str]:
-        """Nodes whose publishers, which the programs say they made, are not on the graph yet."""
-        return Counter(thing.node for thing in self._publishers_made(topic)) - Counter(
-            self._nodes_publishing(topic, msg_type)
-        )
 
     def _several_used(self, topic: str, received: Sequence[Received]) -> bool:
         """Whether more than one publisher of a topic has sent something."""
