@@ -249,6 +249,29 @@ def test_arguments_about_logs_and_enclaves_are_ros_arguments(table: Path) -> Non
 
 
 @pytest.mark.parametrize(
+    ("text", "read"),
+    [
+        ("/**:\n  ros__parameters:\n    p:\t5\n", True),
+        ("/**:\n  ros__parameters:\n    p: 5\t# five\n", True),
+        ("/**:\t\n  ros__parameters:\t# here\n    p: [5,\t6]\t\n", True),
+        ("---\n/**:\n  ros__parameters:\n    p: 5\n---\n/**:\n  ros__parameters:\n    p: 6\n", True),
+        ("/**:\n\tros__parameters:\n\t\tp: 5\n", False),
+        ("/**:\n  ros__parameters:\n    p: a: b\n", False),
+    ],
+)
+def test_only_a_parameter_file_that_rcl_does_not_read_either_is_called_unreadable(
+    tmp_path: Path, text: str, read: bool
+) -> None:
+    (tmp_path / "p.yaml").write_text(text)
+    words = ["--params-file", str(tmp_path / "p.yaml")]
+    assert (params_file.unreadable(words, tmp_path) is None) is read
+    context = rclpy.Context()
+    with contextlib.nullcontext() if read else pytest.raises(Exception, match="parse params file"):
+        rclpy.init(context=context, args=["x", "--ros-args", *words])
+    rclpy.try_shutdown(context=context)
+
+
+@pytest.mark.parametrize(
     ("text", "code"),
     [
         ("other: x\n", "unanswered"),

@@ -43,7 +43,7 @@ def unreadable(words: Sequence[str], folder: Path) -> StudentFileError | None:
             try:
                 read(folder / file)
             except StudentFileError as error:
-                if error.code == "not-yaml":
+                if error.code == "not-yaml" and not error.elsewhere:
                     return error
     return None
 

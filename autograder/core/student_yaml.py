@@ -54,14 +54,16 @@ _PROBLEMS = {
 class StudentFileError(Exception):
     """A student's file cannot be used; the message is a sentence for the student, with the line where it is known."""
 
-    def __init__(self, because: str, code: str = "not-yaml", line: int | None = None, hint: str = "") -> None:
+    def __init__(
+        self, because: str, code: str = "not-yaml", line: int | None = None, hint: str = "", elsewhere: bool = False
+    ) -> None:
         """Keep the sentence, a short code, the line as the notebook counts it in the cell, and what to do.
 
-        The codes: `not-yaml`, which no other program reads either; `yaml-refused`, which others may read;
-        `file-missing` and `file-too-large`.
+        The codes: `not-yaml`; `yaml-refused`, which is YAML; `file-missing` and `file-too-large`. `elsewhere` is
+        whether another reader may take it for YAML, as the one of ROS 2 takes a tab between words.
         """
         super().__init__(because)
-        self.because, self.code, self.line, self.hint = because, code, line, hint
+        self.because, self.code, self.line, self.hint, self.elsewhere = because, code, line, hint, elsewhere
 
 
 @dataclass(frozen=True)
@@ -107,7 +109,9 @@ def load(text: str, name: str = "the file", table: bool = False) -> Any:
         # Of what is never closed, and of a key without its colon, the beginning helps: the end is noticed lines later.
         begun = "end of stream" in problem or "could not find expected ':'" in problem
         mark = (error.context_mark if begun else None) or error.problem_mark or error.context_mark
-        raise _error(text, name, mark.index if mark else None, f" is not YAML: {_in_plain_words(problem)}") from None
+        refused = _error(text, name, mark.index if mark else None, f" is not YAML: {_in_plain_words(problem)}")
+        refused.elsewhere = mark is not None and _taken_elsewhere(text, mark.index, problem)
+        raise refused from None
     except yaml.reader.ReaderError as error:
         raise _error(text, name, error.position, f" is not YAML: {_in_plain_words(error.reason)}") from None
     except Exception:  # PyYAML lets through whatever int(), float() and its own slips raise
@@ -138,6 +142,13 @@ def _error(text: str, name: str, index: int | None, what: str, code: str = "not-
     line = None if index is None else cell_line(index, text)
     where = name if line is None else f"{name}, line {line} of the cell"
     return StudentFileError(f"{where}{what}.", code, line)
+
+
+def _taken_elsewhere(text: str, index: int, problem: str) -> bool:
+    """Whether libyaml, with which ROS 2 reads parameter files, may take what PyYAML does not: a tab that is no
+    indentation, a second document."""
+    begin = text.rfind("\n", 0, index) + 1
+    return "found another document" in problem or ("'\\t'" in problem and bool(text[begin:index].strip()))
 
 
 def _in_plain_words(problem: str) -> str:

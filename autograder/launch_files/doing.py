@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +10,7 @@ from rclpy.exceptions import InvalidNamespaceException, InvalidNodeNameException
 from rclpy.validate_namespace import validate_namespace
 from rclpy.validate_node_name import validate_node_name
 
+from autograder.core import student_yaml
 from autograder.core.student_yaml import FILE_BYTES
 from autograder.graph.names import nearest
 from autograder.launch_files import substitutions, values
@@ -51,9 +53,18 @@ class Doing:
             raise self.place.at("name").error(*_invalid(f"`{name}` cannot name a node", error)) from None
         return name
 
-    def words(self, key: str) -> list[str]:
+    def command_line(self, key: str) -> list[str]:
         """The words of a command line; none if the key is not there."""
-        return [self.perform(word, self.place.at(key)) for word in self.given.get(key, [])]
+        words = [self.perform(word, self.place.at(key)) for word in self.given.get(key, [])]
+        own = words.index("--ros-args") if "--ros-args" in words else len(words)
+        for option, file in itertools.pairwise(words if key == "ros_args" else words[own:]):
+            if option == "--params-file" and not file.startswith("/"):
+                raise self.place.at(key).error(
+                    f"`--params-file {file}`: the program looks for it in the folder that `ros2 launch` is called "
+                    "from, which is not covered here.",
+                    f"Write `--params-file $(dirname)/{file}`.",
+                )
+        return words
 
     def rules(self) -> list[tuple[str, str]]:
         """The node's own remap rules."""
@@ -150,6 +161,11 @@ class Doing:
             text = parse(_text_of(path))
             substitutions.check(text)
             done = substitutions.perform(text, self.context, self.place.folder)
+            try:
+                student_yaml.load(done, f"`{path.name}` with its substitutions done")
+            except student_yaml.StudentFileError as error:
+                if error.code == "not-yaml":  # `launch` looks; what it lets pass is the program's to read
+                    raise ValueRefused(error.because, "A value that holds a colon stands in quotes.") from None
             return ParamsText(text=done)
 
         found: ParamsText = refusing(place.at("from"), read)

@@ -101,13 +101,19 @@ class LaunchedNode(BaseModel):
                 return ["--params-file", self._written(parameter.text)]
         if self._only_inline() and _ON_A_COMMAND_LINE.fullmatch(parameter.name):
             return ["-p", f"{parameter.name}:={_on_a_command_line(parameter.value)}"]
-        key = f"{self.namespace.rstrip('/')}/{self.name}" if self.namespace and self.name else "/**"
+        key = f"{self.namespace.rstrip('/')}/{self.name}" if self._named() else "/**"
         content = {key: {"ros__parameters": {parameter.name: parameter.value}}}
         return ["--params-file", self._written(yaml.safe_dump(content, default_flow_style=False))]
 
+    def _named(self) -> bool:
+        """Whether the launch file gives a full name: then its parameters are for this name only."""
+        return bool(self.namespace and self.name)
+
     def _only_inline(self) -> bool:
         files = any(isinstance(parameter, (ParamsFile, ParamsText)) for parameter in self.parameters)
-        return not files and "--params-file" not in (*self.ros_words, *self.arguments)
+        words = (*self.ros_words, *self.arguments)
+        renamed = self._named() and any("__n" in word for word in words)  # `__node:=` or `__ns:=`, before its own
+        return not files and not renamed and "--params-file" not in words
 
     def _written(self, text: str) -> str:
         name = WRITTEN.replace("*", hashlib.sha256(text.encode()).hexdigest()[:16])

@@ -183,8 +183,8 @@ class _Reader:
             name=do.name(),
             remappings=[*configurations.get(RULES, []), *do.rules()],
             parameters=list(configurations.get(PARAMETERS, [])),
-            arguments=do.words("args"),
-            ros_words=do.words("ros_args"),
+            arguments=do.command_line("args"),
+            ros_words=do.command_line("ros_args"),
             environment={key: value for key, value in do.environment().items() if value is not None},
             folder=do.place.folder,
         )

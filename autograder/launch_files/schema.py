@@ -62,10 +62,9 @@ def read_file(path: Path) -> list[Action]:
         hint = "Look at the indentation and the `-` there." if "not YAML" in because else ""
         raise LaunchFileError(path.name, where, because, hint) from None
     if not isinstance(content, dict) or list(content) != ["launch"]:
-        raise place.error(
-            "a launch file has one key at the top, `launch:`, with a list below it.",
-            "Begin with `launch:` and `- node:`.",
-        )
+        xml = "XML is not covered here; in YAML " if str(content).startswith("<") else ""
+        because = f"{xml}a launch file has one key at the top, `launch:`, with a list below it."
+        raise place.error(because, "Begin with `launch:` and `- node:`.")
     body = content["launch"]
     if isinstance(body, dict) and set(body) <= {"children", "deprecated"} and "children" in body:
         if not isinstance(body.get("deprecated", ""), str):

@@ -27,7 +27,7 @@ class Value:
 
     content: Text | bool | float | str | list[Any]
     kind: type | None
-    is_list: bool
+    """Of the value or of a list's items; None if YAML decides."""
 
 
 def read(value: Any, kind: Any) -> Value:
@@ -46,19 +46,21 @@ def read(value: Any, kind: Any) -> Value:
     if isinstance(value, list):
         if kind not in (None, "yaml") and not is_list:
             raise ValueRefused(f"a list cannot be of the type `{kind}`.", f"Write `type: list_of_{kind}`.")
-        return Value(_list(value, wanted), wanted, True)
+        return Value(_list(value, wanted), wanted)
     if not isinstance(value, _SIMPLE):
         raise ValueRefused(
             f"a parameter is a bool, a number, a text or a list of such, not {_shown(value)}.",
             "A text stands in quotes.",
         )
+    if is_list:  # `launch` takes no text there, not even one that would become a list
+        raise ValueRefused(f"{_shown(value)} is not of the type `{kind}`.", "Write a list, such as `[1, 2]`.")
     content = _text(value) if isinstance(value, str) else value
-    if not isinstance(content, tuple) and (is_list or (wanted is not None and not isinstance(content, wanted))):
+    if not isinstance(content, tuple) and wanted is not None and not isinstance(content, wanted):
         raise ValueRefused(
             f"{_shown(value)} is not of the type `{kind}`: a value without `$(…)` is not converted.",
             "Write the value as YAML has it, without `type`.",
         )
-    return Value(content, wanted, is_list)
+    return Value(content, wanted)
 
 
 def _text(value: str) -> Text | str:
@@ -89,10 +91,10 @@ def settle(value: Value, perform: Callable[[Text], str]) -> Any:
     """
     content = value.content
     if isinstance(content, tuple):
-        return _converted(perform(content), value.kind, value.is_list)
+        return _converted(perform(content), value.kind)
     if not isinstance(content, list):
         return content
-    items = [_converted(perform(item), value.kind, False) if isinstance(item, tuple) else item for item in content]
+    items = [_converted(perform(item), value.kind) if isinstance(item, tuple) else item for item in content]
     return _uniform(items)
 
 
@@ -123,14 +125,13 @@ def _uniform(items: list[Any]) -> list[Any]:
     return items
 
 
-def _converted(text: str, kind: type | None, is_list: bool) -> Any:
+def _converted(text: str, kind: type | None) -> Any:
     if kind is None:
         return read_as_yaml(text)
-    if is_list or kind is bool:
+    if kind is bool:
         value = read_as_yaml(text)
-        items = value if is_list else [value]
-        if not isinstance(items, list) or not all(isinstance(item, kind) for item in items):
-            raise ValueRefused(f"`{text[:60]}` is not {'a list' if is_list else 'a value'} of `{kind.__name__}`.")
+        if not isinstance(value, bool):
+            raise ValueRefused(f"`{text[:60]}` is not of the type `bool`.")
         return value
     try:
         return kind(text)
