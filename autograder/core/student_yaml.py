@@ -109,9 +109,9 @@ def load(text: str, name: str = "the file", table: bool = False) -> Any:
         # Of what is never closed, and of a key without its colon, the beginning helps: the end is noticed lines later.
         begun = "end of stream" in problem or "could not find expected ':'" in problem
         mark = (error.context_mark if begun else None) or error.problem_mark or error.context_mark
-        refused = _error(text, name, mark.index if mark else None, f" is not YAML: {_in_plain_words(problem)}")
-        refused.elsewhere = mark is not None and _taken_elsewhere(text, mark.index, problem)
-        raise refused from None
+        wrong = _error(text, name, mark.index if mark else None, f" is not YAML: {_in_plain_words(problem)}")
+        wrong.elsewhere = mark is not None and _taken_elsewhere(text, mark.index, problem)
+        raise wrong from None
     except yaml.reader.ReaderError as error:
         raise _error(text, name, error.position, f" is not YAML: {_in_plain_words(error.reason)}") from None
     except Exception:  # PyYAML lets through whatever int(), float() and its own slips raise
