@@ -8,6 +8,7 @@ from typing import Any
 import drawings_actions
 import drawings_bringup
 import drawings_lifecycle
+import drawings_names
 import drawings_nodes
 import drawings_packages
 import drawings_qos
@@ -103,6 +104,7 @@ DRAWINGS: dict[str, Callable[[], Picture]] = {
     "groups-and-threads": groups_and_threads,
     "waiting-for-itself": waiting_for_itself,
     **drawings_lifecycle.DRAWINGS,
+    **drawings_names.DRAWINGS,
     **drawings_nodes.DRAWINGS,
     **drawings_qos.DRAWINGS,
     **drawings_packages.DRAWINGS,
