@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import subprocess
@@ -18,10 +19,12 @@ from jupyter_client.manager import KernelManager
 
 import autograder.checks
 from autograder.core import front_end
+from autograder.course.cell_file import parse
 from autograder.course.lab import blank_mark
 from autograder.notebook import hints
 from autograder.notebook.kernel import Kernel
 from autograder.notebook.program_folder import MANIFEST
+from autograder.notebook.saved_notebook import SavedNotebook
 
 START = 180
 """Far beyond what a kernel, or a cell, takes on a busy machine, in seconds."""
@@ -83,6 +86,23 @@ def test_a_node_cell_becomes_a_program(shell: InteractiveShell, capsys: pytest.C
     # The lines have the numbers that they have in the cell.
     assert (folder() / "talker.py").read_text() == "\n# %%node talker\nprint('hello')\n"
     assert "talker" not in shell.user_ns
+
+
+@pytest.mark.parametrize(
+    ("cell", "text"),
+    [
+        ("    %%node talker\n    if 1:\n        print(1)\n", "# %%node talker\nif 1:\n    print(1)\n"),
+        ("%%time\n%%node talker\nprint(1)\n", "\n# %%node talker\nprint(1)\n"),
+    ],
+)
+def test_a_program_has_the_lines_of_its_cell_whatever_the_magic_stands_in(
+    shell: InteractiveShell, capsys: pytest.CaptureFixture[str], cell: str, text: str
+) -> None:
+    assert "node program talker written" in say(shell, cell, capsys)
+    assert (folder() / "talker.py").read_text() == text
+    # What the notebook takes indented, grading takes; a cell that begins with another magic it does not.
+    graded = parse(cell)
+    assert graded is None if "time" in cell else graded is not None and graded.text == text
 
 
 def test_a_file_cell_becomes_a_file(shell: InteractiveShell, capsys: pytest.CaptureFixture[str]) -> None:
@@ -206,6 +226,16 @@ def test_a_file_that_was_changed_by_hand_is_kept_and_does_not_count(shell: Inter
     assert found.folder.kept == [
         "nodes/lab/talker.py was not what a cell had written: your file is kept as nodes/lab/talker.py.mine"
     ]
+
+
+def test_what_a_cell_wrote_is_kept_once_no_cell_has_it(shell: InteractiveShell) -> None:
+    cells = [{"cell_type": "code", "id": "a", "source": "%%node talker\n1\n", "metadata": {}, "outputs": []}]
+    Path("lab.ipynb").write_text(json.dumps({"cells": cells, "metadata": {}, "nbformat": 4, "nbformat_minor": 5}))
+    for name in ("talker", "listener"):  # the cell of the second has been deleted, or was never saved
+        shell.run_cell(f"%%node {name}\n1\n", store_history=True)
+    kept = Kernel(shell).folder.kept
+    assert [path.name for path in folder().glob("*er.py*")] == ["listener.py.mine"]
+    assert len(kept) == 1 and "listener.py has no cell in the saved notebook" in kept[0]
 
 
 def test_a_students_own_file_is_never_overwritten(shell: InteractiveShell, capsys: pytest.CaptureFixture[str]) -> None:
@@ -416,6 +446,60 @@ def test_a_program_from_a_cell_that_grading_ignores_is_named(notebook: Notebook)
     notebook.run(TALKER, "a-new-cell")
     shown = notebook.run(CHECK).text
     assert "comes from a cell of your own" in shown and "Grading ignores that cell" in shown
+
+
+def later(notebook: Notebook) -> None:
+    """The notebook was saved after all that has been run; the clock of files may be some milliseconds behind."""
+    os.utime(notebook.path, (time.time() + 60, time.time() + 60))
+
+
+def test_a_program_that_grading_does_not_find_is_named(notebook: Notebook) -> None:
+    cell = f"%%time\n{TALKER}"
+    notebook.run(cell, "talker")
+    notebook.save(answer(cell))
+    later(notebook)
+    assert "No cell of the saved notebook begins with `%%node talker`" in notebook.run(CHECK).text
+
+
+def test_a_file_that_no_cell_wrote_and_a_program_reads_is_named(notebook: Notebook) -> None:
+    write(notebook, TALKER.replace("rclpy.init()", "print(open('words.csv').read())\nrclpy.init()"))
+    words = notebook.path.parent / "nodes/lab/words.csv"
+    words.write_text("a,b\n")
+    shown = notebook.run(CHECK).text
+    words.unlink()
+    assert "words.csv was written by no cell: grading does not have it." in shown
+
+
+def test_a_file_that_was_removed_is_said_to_be_gone(notebook: Notebook) -> None:
+    write(notebook)
+    (notebook.path.parent / "nodes/lab/talker.py").unlink()
+    shown = notebook.run(CHECK).text
+    assert "talker.py is gone" in shown and "has not been run" not in shown
+
+
+def test_of_a_renamed_notebook_nothing_is_said_that_nobody_can_know(notebook: Notebook) -> None:
+    write(notebook)
+    notebook.path.rename(notebook.path.with_name("renamed.ipynb"))
+    shown = notebook.run(CHECK).text
+    notebook.path.with_name("renamed.ipynb").rename(notebook.path)
+    assert "lab.ipynb is not there any more" in shown and "not saved" not in shown
+
+
+def test_a_cell_of_the_labs_own_that_was_changed_is_named(notebook: Notebook) -> None:
+    for changed in (False, True):
+        text = TALKER + "# mine\n" * changed
+        identity, source, metadata = answer(text)
+        metadata["nbgrader"] |= {"solution": False, "locked": True}
+        checksum = hashlib.md5(f"{TALKER}codeFalseFalseTruetalker".encode()).hexdigest()  # as nbgrader makes it
+        notebook.save((identity, source, {"nbgrader": metadata["nbgrader"] | {"checksum": checksum}}))
+        notebook.run(text, "talker")
+        assert ("is the lab's own and has been changed" in notebook.run(CHECK).text) is changed
+
+
+def test_no_given_cell_of_a_released_lab_counts_as_changed() -> None:
+    labs = sorted((Path(__file__).parents[1] / "labs").glob("*/*.ipynb"))
+    assert labs
+    assert [cell.file_name for lab in labs for cell in SavedNotebook(lab).cells if cell.altered] == []
 
 
 def test_an_untouched_answer_earns_nothing_and_is_no_failure(notebook: Notebook) -> None:

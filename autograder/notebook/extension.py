@@ -119,7 +119,7 @@ def _write(here: Kernel, magic: str, name: str, cell: str) -> list[str]:
     whole = here.cell.replace("\r\n", "\n")
     file = _parsed(whole)
     if file is None or (file.magic, file.name) != (magic, name):  # called from other code, not by its own cell
-        whole = f"%%{magic} {name}\n{cell}"
+        whole = "\n" * _lines_above(whole, cell) + f"%%{magic} {name}\n{cell}"
         file = parse(whole) or CellFile(magic, name, cell)
     check_free(file)
     if len(whole.encode("utf-8", "replace")) > CELL_BYTES:
@@ -129,6 +129,13 @@ def _write(here: Kernel, magic: str, name: str, cell: str) -> list[str]:
     where = f" ({shown(here.folder.path / file.file_name)})" if here.folder.notebook else ""
     defect = _defect(file)
     return [*told, f"{kind} {name} written{where}" + (f", but {defect}" if defect else "")]
+
+
+def _lines_above(whole: str, cell: str) -> int:
+    """How many lines stand above the magic, such as `%%time`: the file's lines have the numbers of the whole cell."""
+    body = cell.rstrip("\n")
+    above = whole.rstrip("\n").removesuffix(body) if body else whole
+    return max(above.count("\n") - 1, 0) if len(above) < len(whole) else 0
 
 
 def _parsed(source: str) -> CellFile | None:
@@ -145,9 +152,8 @@ def _defect(file: CellFile) -> str:
             compile(file.text, file.file_name, "exec", dont_inherit=True)
         except SyntaxError as error:
             text = (error.text or "").strip()
-            return f"line {error.lineno or 0} of the cell is not Python: {error.msg}" + (
-                f"\n    {text}" if text else ""
-            )
+            where = f"line {error.lineno} of the cell" if error.lineno else "the cell"
+            return f"{where} is not Python: {error.msg}" + (f"\n    {text}" if text else "")
         except (ValueError, RecursionError, MemoryError) as error:
             return f"it is not Python: {error}"
     elif file.name.endswith((".yaml", ".yml")):

@@ -131,7 +131,10 @@ class Kernel:
         first = f"%%{magic} {name}"
         saved = self.saved()
         file_name = f"{name}.py" if magic == "node" else name
-        if saved is not None and not saved.has(file_name):
+        if file_name in self.folder.written:
+            because = f"{shown(self.folder.path / file_name)} is gone: it was removed after its cell was run."
+            return because, f"Run the cell `{first}` again, then this one."
+        if saved is not None and saved.readable and not saved.has(file_name):
             return (
                 f"There is no `{name}`: no cell of the saved notebook begins with `{first}`.",
                 "Compare the name with the first line of its cell. If the cell is new, run it first.",
@@ -173,15 +176,20 @@ class Kernel:
         """Say where what was run differs from what would be graded."""
         saved = self.saved()
         used = self.used(file_names)
+        if saved is not None and not saved.path.is_file():
+            return [
+                f"{shown(saved.path)} is not there any more, so nobody can say whether this is what would be graded. If"
+                " the notebook has another name now, shut its kernel down and open it again."
+            ]
         told = [remark for written in used if saved and (remark := saved.remark(written))]
         for written in used:
             if self.folder.changed_by_hand(written.file.file_name):
                 path = shown(self.folder.path / written.file.file_name)
                 told.append(f"{path} is no longer what its cell wrote. Grading takes the cell: run it again.")
         for name in self.folder.foreign():
-            if any(_imports(written, name) for written in used):
+            if any(_imports(written, name) or _names(written, name) for written in used):
                 path = shown(self.folder.path / name)
-                first = f"%%node {name.removesuffix('.py')}"
+                first = f"%%node {name.removesuffix('.py')}" if name.endswith(".py") else f"%%file {name}"
                 told.append(f"{path} was written by no cell: grading does not have it. Put it into a cell `{first}`.")
         return told
 
@@ -191,6 +199,11 @@ def _imports(written: Written, file_name: str) -> bool:
         return False
     module = re.escape(file_name.removesuffix(".py"))
     return bool(re.search(rf"^\s*(?:from|import)\b.*\b{module}\b", written.file.text, re.MULTILINE))
+
+
+def _names(written: Written, file_name: str) -> bool:
+    """Whether a text has the name of a file in it, in quotes or at the end of a path."""
+    return bool(re.search(rf"""["'/]{re.escape(file_name)}["']""", written.file.text))
 
 
 def _findings() -> Any:

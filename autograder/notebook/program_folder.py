@@ -12,6 +12,7 @@ import json
 import os
 import re
 import time
+from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -94,16 +95,28 @@ class ProgramFolder:
     def _forget_earlier(self) -> None:
         """Programs of an earlier kernel do not count: a cell may have been renamed or deleted since."""
         files = _manifest(self.path).get("files", {})
+        gone = self._without_cell(files)
         for name, entry in files.items():
             path = self.path / name
             if not path.is_file():
                 continue
-            if _digest(path) == entry.get("sha256"):
-                path.unlink()
-            else:
+            if _digest(path) != entry.get("sha256"):
                 self.kept.append(self._move_aside(path))
+            elif name in gone:
+                self.kept.append(self._move_aside(path, "has no cell in the saved notebook"))
+            else:
+                path.unlink()
         if files:
             self._note()
+
+    def _without_cell(self, files: Collection[str]) -> set[str]:
+        """Those of the files that the saved notebook has no cell for: nothing else may hold their texts."""
+        if not files or self.notebook is None:
+            return set()
+        from autograder.notebook.saved_notebook import SavedNotebook
+
+        saved = SavedNotebook(self.notebook)
+        return {name for name in files if saved.readable and not saved.has(name)}
 
     def write(self, written: Written) -> list[str]:
         """Write a cell's file, whole or not at all; gives what to tell the student about a file that was in the way.
@@ -131,21 +144,21 @@ class ProgramFolder:
         return path.is_file() and _digest(path) != hashlib.sha256(text).hexdigest()
 
     def foreign(self) -> list[str]:
-        """Python files in the folder that no cell wrote: programs can import them here, but not when graded."""
-        return sorted(path.name for path in self.path.glob("*.py") if path.name not in self.written)
+        """Files in the folder that no cell wrote: programs can import and open them here, but not when graded."""
+        return sorted(path.name for path in self.path.glob("[!.]*.*") if path.name not in self.written)
 
     def close(self) -> None:
         """At the kernel's end: a folder that no notebook gives a name to would never be found again."""
         if self.notebook is None and self.written:
             _clear(self.path)
 
-    def _move_aside(self, path: Path) -> str:
+    def _move_aside(self, path: Path, why: str = "was not what a cell had written") -> str:
         """Move a student's own file out of the way, and say so."""
         number = 1
         while (kept := path.with_name(f"{path.name}.mine{number if number > 1 else ''}")).exists():
             number += 1
         path.rename(kept)
-        return f"{shown(path)} was not what a cell had written: your file is kept as {shown(kept)}"
+        return f"{shown(path)} {why}: your file is kept as {shown(kept)}"
 
     def _note(self) -> None:
         files = {

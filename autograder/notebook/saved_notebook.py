@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -19,6 +20,8 @@ class _Cell:
     grade_id: str
     blank: str
     file_name: str
+    altered: bool
+    """Whether it is the lab's own, and no longer as students receive it."""
 
 
 class SavedNotebook:
@@ -26,13 +29,16 @@ class SavedNotebook:
 
     def __init__(self, path: Path) -> None:
         """Read it; a notebook that cannot be read has no cells, and so there is nothing to say."""
+        self.path = path
         self.cells: list[_Cell] = []
         self.saved_at = 0.0
+        self.readable = False
         try:
             self.saved_at = path.stat().st_mtime
             raw = cells_of(path)
         except (OSError, UnreadableError):
             return
+        self.readable = True
         for cell in raw:
             self._take(cell)
 
@@ -47,7 +53,10 @@ class SavedNotebook:
         if file is None:
             return
         grade_id = grade_id_of(cell) if nbgrader_of(cell).get("solution") or nbgrader_of(cell).get("locked") else ""
-        self.cells.append(_Cell(source, str(cell.get("id", "")), grade_id, blank_mark_of(cell), file.file_name))
+        altered = _altered(source, cell)
+        self.cells.append(
+            _Cell(source, str(cell.get("id", "")), grade_id, blank_mark_of(cell), file.file_name, altered)
+        )
 
     def has(self, file_name: str) -> bool:
         """Whether a cell names this file."""
@@ -71,9 +80,17 @@ class SavedNotebook:
     def remark(self, written: Written) -> str:
         """Say why what was run is not what would be graded; empty if it is, or will be once it is saved."""
         graded = self._graded(written.file.file_name)
-        if graded is None or _same(graded.source, written.source):
-            return ""
         first = f"%%{written.file.magic} {written.file.name}"
+        if graded is None and self.readable and self.saved_at > written.at:
+            return (
+                f"No cell of the saved notebook begins with `{first}`, so grading has no `{written.file.name}`. That"
+                " line has to be the first one of its cell."
+            )
+        if graded is None:
+            return ""
+        if _same(graded.source, written.source):
+            theirs = f"The cell `{first}` is the lab's own and has been changed. Grading takes it as you received it."
+            return theirs if graded.altered else ""
         known = written.cell_id and graded.cell_id
         if known and graded.cell_id != written.cell_id and graded.grade_id:
             return (
@@ -91,7 +108,16 @@ class SavedNotebook:
         """Whether what was run is not in the saved notebook, because nothing has been saved since."""
         name = written.file.file_name
         saved = any(cell.file_name == name and _same(cell.source, written.source) for cell in self.cells)
-        return not saved and self.saved_at <= written.at
+        return not saved and self.readable and self.saved_at <= written.at
+
+
+def _altered(source: str, cell: dict[str, Any]) -> bool:
+    """Whether a locked cell's text is another one than nbgrader's checksum in its metadata was made of."""
+    marks = nbgrader_of(cell)
+    if not marks.get("locked") or marks.get("solution") or marks.get("grade") or not marks.get("checksum"):
+        return False
+    made = f"{source}codeFalseFalseTrue{grade_id_of(cell)}".encode()
+    return hashlib.md5(made, usedforsecurity=False).hexdigest() != str(marks["checksum"])
 
 
 def _same(one: str, other: str) -> bool:
