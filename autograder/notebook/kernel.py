@@ -41,7 +41,7 @@ class Kernel:
         """Find the notebook's folder, and load in the background what a first launch needs."""
         self.shell = shell
         notebook = notebook_of(shell.user_ns, dict(os.environ))
-        self.folder = ProgramFolder(notebook, notebook.parent if notebook else Path.cwd())
+        self.folder = ProgramFolder(notebook, notebook.parent if notebook else Path.cwd(), _cells_of(notebook))
         self.cell, self.cell_id = "", ""
         self._began = 0
         self.reports: dict[str, Report] = {}
@@ -204,6 +204,18 @@ def _imports(written: Written, file_name: str) -> bool:
 def _names(written: Written, file_name: str) -> bool:
     """Whether a text has the name of a file in it, in quotes or at the end of a path."""
     return bool(re.search(rf"""["'/]{re.escape(file_name)}["']""", written.file.text))
+
+
+def _cells_of(notebook: Path | None) -> Callable[[str], bool]:
+    """Whether the saved notebook has a cell for a file; true where nobody knows."""
+
+    def has(file_name: str) -> bool:
+        from autograder.notebook.saved_notebook import SavedNotebook
+
+        saved = SavedNotebook(notebook) if notebook else None
+        return saved is None or not saved.readable or saved.has(file_name)
+
+    return has
 
 
 def _findings() -> Any:

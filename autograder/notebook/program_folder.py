@@ -12,7 +12,7 @@ import json
 import os
 import re
 import time
-from collections.abc import Collection
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -71,9 +71,10 @@ class ProgramFolder:
     Args:
         notebook: the notebook, or None where the front end does not say which it is.
         place: the folder beside it.
+        has_cell: whether the saved notebook has a cell for a file: if not, nothing else may hold its text.
     """
 
-    def __init__(self, notebook: Path | None, place: Path) -> None:
+    def __init__(self, notebook: Path | None, place: Path, has_cell: Callable[[str], bool] = lambda _: True) -> None:
         """Take the folder of this notebook, or one beside it if another kernel that still lives has that."""
         self.notebook = notebook
         self.written: dict[str, Written] = {}
@@ -90,33 +91,23 @@ class ProgramFolder:
         while _owner(_manifest(self.path)) not in (None, os.getpid()):
             number += 1
             self.path = nodes / f"{name}-{number}"
-        self._forget_earlier()
+        self._forget_earlier(has_cell)
 
-    def _forget_earlier(self) -> None:
+    def _forget_earlier(self, has_cell: Callable[[str], bool]) -> None:
         """Programs of an earlier kernel do not count: a cell may have been renamed or deleted since."""
         files = _manifest(self.path).get("files", {})
-        gone = self._without_cell(files)
         for name, entry in files.items():
             path = self.path / name
             if not path.is_file():
                 continue
             if _digest(path) != entry.get("sha256"):
                 self.kept.append(self._move_aside(path))
-            elif name in gone:
+            elif not has_cell(name):
                 self.kept.append(self._move_aside(path, "has no cell in the saved notebook"))
             else:
                 path.unlink()
         if files:
             self._note()
-
-    def _without_cell(self, files: Collection[str]) -> set[str]:
-        """Those of the files that the saved notebook has no cell for: nothing else may hold their texts."""
-        if not files or self.notebook is None:
-            return set()
-        from autograder.notebook.saved_notebook import SavedNotebook
-
-        saved = SavedNotebook(self.notebook)
-        return {name for name in files if saved.readable and not saved.has(name)}
 
     def write(self, written: Written) -> list[str]:
         """Write a cell's file, whole or not at all; gives what to tell the student about a file that was in the way.
