@@ -13,7 +13,11 @@ from pathlib import Path
 import pytest
 from linked import link_tree
 
+from autograder.authoring.new import new_course
+from autograder.core.errors import KitError
 from autograder.core.version import VERSION
+from autograder.course.paths import CoursePaths
+from autograder.gradebook.settings import gradebook_address
 
 KIT = Path(__file__).resolve().parent.parent
 LAB = "lab2_talkers"
@@ -70,7 +74,8 @@ def environment(tmp_path_factory: pytest.TempPathFactory) -> Environment:
 def course(environment: Environment, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A course with two labs, released."""
     root = tmp_path_factory.mktemp("own") / "my course"
-    environment.run(root.parent, "autograder", "new", "course", root)
+    next_ = environment.run(root.parent, "autograder", "new", "course", root)
+    assert f"  cd '{root}'\n" in next_
     environment.run(root, "autograder", "new", "lab", LAB)
     told = environment.run(root, "autograder", "release")
     assert f"{LAB} → {root}/labs/{LAB}" in told
@@ -144,6 +149,37 @@ def test_nbgraders_own_settings_of_a_course_hold_everywhere(environment: Environ
     assert f"gradebook  {tmp_path}/elsewhere.db" in told
     assert (tmp_path / "elsewhere.db").is_file() and not (root / "gradebook" / "gradebook.db").exists()
     assert f"ann,{LAB},5,5,0" in (root / "build" / "grades.csv").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("address", "told"),
+    [
+        ("gradebook.db", "no address of a gradebook"),
+        ("mysql+nodriver://h/db", "no address"),
+        ("mysql://h/db", "driver"),
+    ],
+)
+def test_an_address_that_no_gradebook_can_have_is_said_to_be_one(address: str, told: str, tmp_path: Path) -> None:
+    (tmp_path / "nbgrader_config.py").write_text(
+        f"get_config().CourseDirectory.db_url = {address!r}\n", encoding="utf-8"
+    )
+    with pytest.raises(KitError) as refused:
+        gradebook_address(tmp_path)
+    assert told in refused.value.what and "nbgrader_config.py" in refused.value.what and refused.value.do
+
+
+def test_a_course_is_begun_in_no_folder_that_holds_something_and_keeps_grades_out_of_git(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    with pytest.raises(KitError, match="file is a file"):
+        new_course(tmp_path / "file")
+    with pytest.raises(KitError, match="is not empty"):
+        new_course(tmp_path)
+    course = tmp_path / "a course"
+    new_course(course)
+    subprocess.run(["git", "init", "--quiet", course], check=True)
+    paths = CoursePaths(course)
+    for path in (paths.gradebook, paths.results, course / "handed_in" / "lab1_greeter_ann.ipynb"):
+        assert subprocess.run(["git", "-C", course, "check-ignore", "--quiet", path]).returncode == 0, path
 
 
 def test_the_doctor_speaks_of_the_course_and_of_no_checkout(environment: Environment, course: Path) -> None:

@@ -20,6 +20,15 @@ title = "The labs"
 # The labs in the course's order; those that are not listed follow by their names.
 labs = ["{lab}"]
 """
+_IGNORED = """\
+# What is made again, and what is known of students.
+/build/
+/gradebook/
+/handed_in/
+/labs/*/nodes/
+/solutions/*/nodes/
+.ipynb_checkpoints/
+"""
 
 
 def new_course(root: Path) -> list[Path]:
@@ -29,11 +38,12 @@ def new_course(root: Path) -> list[Path]:
         KitError: there is something in the folder.
     """
     if root.exists() and (not root.is_dir() or any(root.iterdir())):
-        raise KitError(f"{root} is not empty, and stays as it is.", "Name a folder that does not exist yet.")
+        what = "is not empty" if root.is_dir() else "is a file"
+        raise KitError(f"{root} {what}, and stays as it is.", "Name a folder that does not exist yet.")
     files = {
         SETTINGS_FILE: _SETTINGS.format(lab=FIRST_LAB),
         CONFIG_FILE: TEMPLATE.read_text(encoding="utf-8"),
-        ".gitignore": "build/\n",
+        ".gitignore": _IGNORED,
     }
     for name, text in files.items():
         write_beside(root / name, text)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 from typing import Annotated
 
@@ -24,7 +25,7 @@ def new_course(
 
     for path in write(folder):
         print(path)
-    print(f"\nNext:\n  cd {folder}\n  autograder lint {FIRST_LAB}\n  autograder release")
+    print(f"\nNext:\n  cd {shlex.quote(str(folder))}\n  autograder lint {FIRST_LAB}\n  autograder release")
 
 
 @new.command("lab")

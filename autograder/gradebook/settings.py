@@ -46,11 +46,36 @@ def settings_of(root: Path) -> Any:
 
 
 def gradebook_address(root: Path) -> str:
-    """Return the address of a course's gradebook, as SQLAlchemy wants it."""
+    """Return the address of a course's gradebook, as SQLAlchemy wants it.
+
+    Raises:
+        KitError: the course names none, or one that this environment cannot reach.
+    """
     # Loading nbgrader takes a second; where the course says nothing of its own, the address is known without.
     if not _says_more(root):
         return CoursePaths(root).gradebook_url
-    return str(settings_of(root).CourseDirectory.db_url)
+    return _usable(str(settings_of(root).CourseDirectory.db_url), root / CONFIG_FILE)
+
+
+@cache
+def _usable(address: str, config: Path) -> str:
+    """Return an address for which there is a driver."""
+    from sqlalchemy.engine import make_url
+    from sqlalchemy.exc import SQLAlchemyError
+
+    try:
+        make_url(address).get_dialect().import_dbapi()
+    except SQLAlchemyError as error:
+        raise KitError(
+            f"{config} sets `CourseDirectory.db_url` to what is no address of a gradebook: {error}",
+            "Such addresses are sqlite:////home/me/gradebook.db and postgresql+psycopg://grader@dbhost/gradebook.",
+        ) from error
+    except ImportError as error:
+        raise KitError(
+            f"{config} sets `CourseDirectory.db_url` to a database whose driver is not installed: {error}.",
+            'Install it; for postgresql+psycopg://… that is: pip install "psycopg[binary]"',
+        ) from error
+    return address
 
 
 def gradebook_file(root: Path) -> Path | None:
