@@ -724,6 +724,11 @@ def test_names_keep_their_capitals_and_an_end_that_is_not_there_has_its_nearest_
         ('ros.expect_log("x", level="WARNING")', "none of DEBUG"),
         ('with launch("talker") as second: pass', "inside another one"),
         ("with ros: pass", "inside another one"),
+        ('launch("talker", ros_arguments="-r a:=b")', "ros_arguments='-r a:=b' is one text"),
+        ('launch("talker", lifecycle="/talker")', "lifecycle='/talker' is one text"),
+        ("ros.require(ros.nodes, 'There is a node')", "call it"),
+        ('ros.expect_publisher("/chatter", "std_msgs/String")', "is no message class"),
+        ('ros.open_publisher("/chatter", "std_msgs/String")', "line 2"),  # raised far inside of rclpy
     ],
 )
 def test_what_a_lab_author_gets_wrong_is_refused_with_its_line_and_is_no_students_failure(

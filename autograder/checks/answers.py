@@ -9,7 +9,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from autograder.checks import findings, outcomes, runtime
-from autograder.checks.forms import NAME_OR_NONE, allowed, begins_with_slash, misses, one_of, same, seal
+from autograder.checks.forms import NAME_OR_NONE, allowed, begins_with_slash, is_seal, misses, one_of, same, seal
+from autograder.checks.misuse import Misuse
 from autograder.checks.parts import part
 from autograder.checks.scoring import Score, score
 from autograder.core import student_yaml
@@ -128,6 +129,8 @@ class Answers:
         So a fact that students have measured is checked in their own notebook, without being given away there.
         """
         for question, sealed in answers.items():
+            if not is_seal(sealed):
+                raise Misuse(f"expect_sealed: {sealed!r} is no seal; make one with forms.seal({question!r}, ANSWER).")
             if not self._lost(question):
                 with part(question):
                     answer = self._answer(question)

@@ -101,3 +101,8 @@ def _or(words: Sequence[str]) -> str:
 def seal(question: str, answer: Any) -> str:
     """Return a word by which a visible check knows the right answer to a question without showing it."""
     return hashlib.sha256(json.dumps([question, plain(answer)]).encode()).hexdigest()[:12]
+
+
+def is_seal(word: object) -> bool:
+    """Whether it looks like what `seal` returns."""
+    return isinstance(word, str) and re.fullmatch(r"[0-9a-f]{12}", word) is not None

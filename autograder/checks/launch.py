@@ -24,7 +24,7 @@ from autograder.checks.expect.publishing import Publishing
 from autograder.checks.expect.qos import QosExpectations
 from autograder.checks.expect.services import ServiceExpectations
 from autograder.checks.launched_file import LaunchedFile
-from autograder.checks.misuse import Misuse
+from autograder.checks.misuse import Misuse, refuse_text
 from autograder.checks.parts import part
 from autograder.checks.program import Program
 from autograder.checks.robot import LIMITS, Robot, make_room
@@ -70,6 +70,7 @@ class Launch(
     ) -> None:
         """Use `launch` or `launch_file`."""
         super().__init__()
+        refuse_text("launch", listen=listen, serve=serve, lifecycle=lifecycle)
         self._packages = [*packages, *(file.packages() if file else ())]
         self._running.described = list(nodes)
         self._file = file

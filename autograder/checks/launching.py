@@ -12,6 +12,7 @@ from typing import Any
 from autograder.checks.command_line import CommandLine
 from autograder.checks.launch import Launch
 from autograder.checks.launched_file import LaunchedFile
+from autograder.checks.misuse import refuse_text
 from autograder.checks.program import Program
 
 
@@ -48,6 +49,7 @@ def launch(
         lifecycle: full names of lifecycle nodes whose transition events are recorded from before the start.
         packages: packages of the student's that the programs import from; each is built first.
     """
+    refuse_text("launch", packages=packages, remappings=remappings)
     given = dict(parameters or {})
     if use_sim_time:
         given["use_sim_time"] = True

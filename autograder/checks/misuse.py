@@ -29,6 +29,21 @@ def place_of(error: BaseException, is_cells: Callable[[str], bool]) -> str:
     return f"line {frames[-1].lineno}: {line}" if line else f"line {frames[-1].lineno}"
 
 
+def refuse_text(of: str, **lists: object) -> None:
+    """Look for a text where a list belongs: its letters would be taken one by one.
+
+    Args:
+        of: what is called.
+        lists: its arguments, by their names.
+
+    Raises:
+        Misuse: there is one.
+    """
+    for name, value in lists.items():
+        if isinstance(value, str):
+            raise Misuse(f"{of}: {name}={value!r} is one text; write a list, [...].")
+
+
 def refuse_times(method: Callable[..., Any]) -> Callable[[tuple[Any, ...], Mapping[str, Any]], None]:
     """Return what looks through the arguments of a call to `method` for times that are none.
 

@@ -23,8 +23,8 @@ from autograder.graph.observer import ForgedGraph
 _PACKAGE = str(Path(__file__).resolve().parent.parent)
 
 
-_NOT_CELLS = (_PACKAGE, sys.base_prefix, "<frozen")
-"""How the names of files begin that are the kit's or the standard library's."""
+_NOT_CELLS = (_PACKAGE, sys.prefix, sys.base_prefix, "<frozen", "<string>")
+"""How the names of files begin that are the kit's, an installed package's, the standard library's or generated."""
 
 _FORGED = "A program has announced a node or a topic whose name is no text, below ROS, which allows no such name."
 

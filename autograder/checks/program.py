@@ -9,6 +9,7 @@ from typing import Any
 
 from autograder.arguments import remap_rules
 from autograder.checks.command_line import CommandLine
+from autograder.checks.misuse import refuse_text
 
 
 @dataclass(frozen=True)
@@ -34,6 +35,15 @@ class Program:
     """Variables beside those that every program has. `ROS_DOMAIN_ID` puts it into another domain than the launch's."""
     warnings: Sequence[str] = ()
     """What a launch file names and does not have; the program starts without it."""
+
+    def __post_init__(self) -> None:
+        """Refuse what would become another command line than is meant."""
+        refuse_text(
+            "Program",
+            remappings=self.remappings,
+            ros_arguments=self.ros_arguments,
+            arguments_of_its_own=self.arguments_of_its_own,
+        )
 
     def arguments(self) -> list[str]:
         """The program's command line."""

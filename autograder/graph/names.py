@@ -36,6 +36,12 @@ def nearest(wanted: str, names: Iterable[str]) -> str | None:
 
 
 def type_name(interface: type) -> str:
-    """`std_msgs/msg/String` for the class `std_msgs.msg.String`."""
+    """`std_msgs/msg/String` for the class `std_msgs.msg.String`.
+
+    Raises:
+        TypeError: it is no class.
+    """
+    if not isinstance(interface, type):
+        raise TypeError(f"{interface!r:.80} is no message class; import one, such as std_msgs.msg.String")
     package, kind = interface.__module__.split(".")[:2]
     return f"{package}/{kind}/{interface.__name__}"

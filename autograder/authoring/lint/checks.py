@@ -6,7 +6,7 @@ import ast
 import builtins
 import difflib
 import inspect
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 from autograder.authoring.lint.finding import Finding
 from autograder.checks.answers import Answers
@@ -17,6 +17,16 @@ from autograder.course.lab import Cell, Lab
 
 _BLOCKS = {"launch": Launch, "launch_file": Launch, "answers": Answers, "build": Package}
 """What `with launch(…) as ros` gives, by the function."""
+_FULL_NAMES = {"topic", "node", "publisher", "service"}
+"""Arguments of expectations and the like that are full names."""
+_NAMES = {"expect_node", "expect_no_node", "expect_service", "call", "call_many", "send_goal", "serve", "requests"}
+"""What takes a full name as `name`."""
+_NO_FULL_NAMES = {"start", "expect_log"}
+"""What takes something else as `node`."""
+_WORDS = {
+    ("expect_state", "state"): ("unconfigured", "inactive", "active", "finalized"),
+    ("transition", "label"): ("configure", "activate", "deactivate", "cleanup", "shutdown"),
+}
 _OF_THE_NOTEBOOK = {"get_ipython", "display", "__name__", "__file__"}
 
 
@@ -88,12 +98,28 @@ def _unknown_expectations(tree: ast.AST) -> Iterator[str]:
             yield f"line {node.lineno}: there is no `{name}`{_nearest(name, offered)}."
             continue
         parameters = inspect.signature(getattr(owner, name)).parameters
+        yield from _wrong_words(node, name, parameters)
         if any(one.kind is one.VAR_KEYWORD for one in parameters.values()):
             continue
         for keyword in node.keywords:
             if keyword.arg is not None and keyword.arg not in parameters:
                 near = _nearest(keyword.arg, set(parameters))
                 yield f"line {keyword.value.lineno}: `{name}` has no argument `{keyword.arg}`{near}."
+
+
+def _wrong_words(call: ast.Call, name: str, parameters: Iterable[str]) -> Iterator[str]:
+    """Names without their slash, and states and transitions that there are not, as far as they stand there as texts."""
+    given = dict(zip(list(parameters)[1:], call.args, strict=False))
+    given |= {keyword.arg: keyword.value for keyword in call.keywords if keyword.arg is not None}
+    for argument, value in given.items():
+        if not isinstance(value, ast.Constant) or not isinstance(value.value, str) or not value.value:
+            continue
+        full = (argument in _FULL_NAMES and name not in _NO_FULL_NAMES) or (argument == "name" and name in _NAMES)
+        if full and not value.value.startswith("/"):
+            yield f"line {value.lineno}: `{name}` takes full names, and `{value.value}` has no slash before it."
+        known = _WORDS.get((name, argument), (value.value,))
+        if value.value not in known:
+            yield f"line {value.lineno}: `{name}` knows no `{value.value}`; it knows {', '.join(known)}."
 
 
 def _nearest(name: str, known: set[str]) -> str:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import inspect
 from typing import TYPE_CHECKING, Any
 
 from autograder import diagnosis
 from autograder.checks import outcomes
 from autograder.checks.expect.expectations import Expectations
+from autograder.checks.misuse import Misuse
 from autograder.diagnosis import Diagnosis
 
 if TYPE_CHECKING:
@@ -54,6 +56,8 @@ class Facts(Expectations):
         Codes:
             `code`, by default `required` with a reason and `failed` without.
         """
+        if inspect.isroutine(condition):
+            raise Misuse("require: its condition is a function, and a function is always true; call it.")
         if condition:
             outcomes.passed(title, expected=expected, observed=observed)
             return
