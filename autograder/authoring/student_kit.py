@@ -44,6 +44,8 @@ _PLACES = {
 }
 """Where each template goes."""
 _BOOK_ROW = "| `lectures` | the lectures: open `lectures/index.html` in a browser |\n"
+_SLIDES = re.compile(r'\s*<a href="\.\./slides/[^"]*">Slides</a>')
+"""A page's link to its talk: the slides and what is said to them stay with those who teach."""
 _NOT_OURS = shutil.ignore_patterns(".*", "__pycache__", "*.pyc", "nodes", "*.new")
 _EPOCH = (1980, 1, 1, 0, 0, 0)
 """The time of every file in the zip: equal sources give equal zips."""
@@ -75,6 +77,8 @@ def write_kit(root: Path, book: Path | None, into: Path) -> Path:
     shutil.copy(paths.labs / "README.md", folder / "labs")
     if book is not None:
         shutil.copytree(book, folder / "lectures", ignore=_NOT_OURS)
+        for page in (folder / "lectures").glob("*.html"):
+            page.write_text(_SLIDES.sub("", page.read_text(encoding="utf-8")), encoding="utf-8")
     title = read_settings(root).title
     listed = ", ".join(f'"{name}"' for name in names)
     quoted = title.replace("\\", "\\\\").replace('"', '\\"')
