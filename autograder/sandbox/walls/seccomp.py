@@ -28,7 +28,9 @@ _CALLS = {  # x86-64, the only architecture that the ROS wheels exist for
     "settimeofday": 164, "clock_settime": 227, "adjtimex": 159, "clock_adjtime": 305, "syslog": 103,
     "iopl": 172, "ioperm": 173, "personality": 135, "uselib": 134, "lookup_dcookie": 212, "vhangup": 153,
     "fanotify_init": 300, "modify_ldt": 154, "mbind": 237, "set_mempolicy": 238,
-    "migrate_pages": 256, "move_pages": 279, "vmsplice": 278, "tee": 276,
+    "migrate_pages": 256, "move_pages": 279, "vmsplice": 278, "tee": 276, "open_tree_attr": 467,
+    # Each rule of Landlock is memory that no limit counts, and what io_setup takes is the whole machine's.
+    "landlock_create_ruleset": 444, "landlock_add_rule": 445, "landlock_restrict_self": 446, "io_setup": 206,
 }  # fmt: skip
 _WITH_ARGUMENT = [  # (call, argument, value)
     # On the first process: slowed down or limited, it would make failing look like our defect.
@@ -43,6 +45,7 @@ _THREAD_FLAG, _SHARED_FILES_FLAG = 0x10000, 0x400
 _UNIX, _IPV4, _IPV6, _NETLINK = 1, 2, 10, 16
 _DATAGRAM, _ROUTE = 2, 0
 _SETSOCKOPT, _SOL_SOCKET, _BUFFER_SIZES = 54, 1, (7, 8, 32, 33)  # SO_SNDBUF, SO_RCVBUF, and by force
+_SOL_IPV6, _FLOW_LABELS = 41, 32
 
 _LOAD, _AND, _EQUAL, _SET, _AT_LEAST, _RETURN = 0x20, 0x54, 0x15, 0x45, 0x35, 0x06
 _NUMBER, _ARGUMENTS = 0, 16
@@ -72,6 +75,9 @@ def filter_program() -> bytes:
     for number, argument, value in _WITH_ARGUMENT:
         program += [_step(_EQUAL, number, 0, 4), _step(_LOAD, _ARGUMENTS + 8 * argument), _step(_EQUAL, value, 0, 1)]
         program += [_REFUSE, _step(_LOAD, _NUMBER)]
+    # A flow label outlives its socket, and so its launch: a program could count the launches.
+    program += [_step(_EQUAL, _SETSOCKOPT, 0, 6), _step(_LOAD, _ARGUMENTS + 8), _step(_EQUAL, _SOL_IPV6, 0, 3)]
+    program += [_step(_LOAD, _ARGUMENTS + 16), _step(_EQUAL, _FLOW_LABELS, 0, 1), _REFUSE, _step(_LOAD, _NUMBER)]
     # Sockets keep the buffers they are born with, and are told otherwise: what lies in them is in no limit.
     sizes = [_step(_EQUAL, option, len(_BUFFER_SIZES) - place, 0) for place, option in enumerate(_BUFFER_SIZES)]
     checks = [
