@@ -102,9 +102,16 @@ def _value(node: ast.expr) -> Any:
 def _bounded(value: Any) -> Any:
     if isinstance(value, int) and not isinstance(value, bool) and abs(value) > _LARGEST:
         raise ValueRefused("a number in it is too large.")
-    if isinstance(value, (str, tuple, list)) and len(value) > TEXT_LENGTH:
-        raise ValueRefused("a text in it is too long.")
+    if _size(value) > TEXT_LENGTH:
+        raise ValueRefused("a text or a list in it is too long.")
     return value
+
+
+def _size(value: Any) -> int:
+    """How many characters and items a value has, those of the lists in it counted each time."""
+    if isinstance(value, (tuple, list)):
+        return sum(1 + _size(item) for item in value)
+    return len(value) if isinstance(value, str) else 1
 
 
 def _name(node: ast.Name) -> Any:
@@ -126,8 +133,8 @@ def _binary(node: ast.BinOp) -> Any:
         raise ValueRefused("an exponent in it is too large.")
     if isinstance(node.op, ast.Mult):
         for one, times in ((left, right), (right, left)):
-            if isinstance(one, (str, list, tuple)) and isinstance(times, int) and len(one) * times > TEXT_LENGTH:
-                raise ValueRefused("a text in it is too long.")
+            if isinstance(one, (str, list, tuple)) and isinstance(times, int) and _size(one) * times > TEXT_LENGTH:
+                raise ValueRefused("a text or a list in it is too long.")
     return _BINARY[type(node.op)](left, right)
 
 
@@ -169,6 +176,8 @@ def _call(node: ast.Call) -> Any:
     function = _value(node.func)
     if not callable(function):
         raise ValueRefused(f"`{ast.unparse(node.func)[:60]}` is not a function.")
+    if function is round and any(isinstance(digits, int) and abs(digits) > 300 for digits in values[1:]):
+        raise ValueRefused("a number of digits in it is too large.")
     return function(*values)
 
 
