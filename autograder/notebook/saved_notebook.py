@@ -116,6 +116,8 @@ def _altered(source: str, cell: dict[str, Any]) -> bool:
     marks = nbgrader_of(cell)
     if not marks.get("locked") or marks.get("solution") or marks.get("grade") or not marks.get("checksum"):
         return False
+    # As nbgrader computes it for a cell that is locked and nothing else. Importing nbgrader takes a second, for which
+    # nobody should wait after a check; a test holds this against every released lab.
     made = f"{source}codeFalseFalseTrue{grade_id_of(cell)}".encode()
     return hashlib.md5(made, usedforsecurity=False).hexdigest() != str(marks["checksum"])
 
