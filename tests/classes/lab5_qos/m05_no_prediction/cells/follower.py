@@ -16,8 +16,8 @@ class Follower(Node):
         self.create_subscription(Header, "frames", self.follow, 1)
 
     def follow(self, frame):
-        age = self.get_clock().now() - Time(seconds=frame.stamp.sec, clock_type=self.get_clock().clock_type)
-        self.publisher.publish(Float64(data=age.nanoseconds / 1e9))
+        now = self.get_clock().now().to_msg()
+        self.publisher.publish(Float64(data=float(now.sec - frame.stamp.sec)))
         time.sleep(self.work)
 
 
