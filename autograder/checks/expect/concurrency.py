@@ -147,7 +147,8 @@ class ConcurrencyExpectations(Expectations):
 
         def decided() -> bool:
             found = self.concurrency(topic)
-            enough = all(found.runs(name) >= DECISIVE_RUNS for name in everybody)
+            # Of runs of one callback the short ones are complete while a long one is still under way beside them.
+            enough = not itself and all(found.runs(name) >= DECISIVE_RUNS for name in everybody)
             return holds() or enough or self._starves(topic, everybody, 1)
 
         self.wait(decided, within)
@@ -200,7 +201,8 @@ class ConcurrencyExpectations(Expectations):
             lambda: Diagnosis(
                 f"Up to {most} of them ran at once: they are not all in one mutually exclusive group.",
                 "overlap",
-                "Callbacks exclude each other only within the same MutuallyExclusiveCallbackGroup object.",
+                "Callbacks exclude each other only within the same MutuallyExclusiveCallbackGroup object. "
+                "A lock does it, too, if it is taken before `begin` is published and kept until after `end`.",
             ),
             expected="one at a time",
             observed=f"{most} at once",
