@@ -209,6 +209,7 @@ CAREFUL = TALKER.replace(
     "    rclpy.try_shutdown()\n",
 ).replace("import rclpy\n", "import rclpy\nfrom rclpy.executors import ExternalShutdownException\n", 1)
 
+SIGNALS_NOT_TAKEN = "from rclpy.signals import SignalHandlerOptions as Take; rclpy.init(signal_handler_options=Take.NO)"
 THREAD_LEFT = "    import threading, time\n    threading.Thread(target=lambda: time.sleep(60)).start()\n    rclpy.try_"
 
 
@@ -234,6 +235,7 @@ def test_a_program_that_is_told_to_end_may_end_cleanly(grade: Grade, by: str) ->
         ("try_shutdown()", "shutdown()", "SIGINT", "unclean-end", "already called"),
         ("    rclpy.try_shutdown()", "    raise SystemExit(4)", "SIGTERM", "unclean-end", "with exit status 4."),
         ("        pass", "        import time; time.sleep(60)", "SIGTERM", "signal-ignored", "still runs; it is in"),
+        ("rclpy.init()", SIGNALS_NOT_TAKEN, "SIGTERM", "unclean-end", "Nothing in the program took the signal"),
         ("    rclpy.try_", THREAD_LEFT, "SIGTERM", "signal-ignored", "that is no daemon"),
         ('super().__init__("talker")', 'raise ValueError("no")', "SIGINT", "crashed", "ValueError: no"),
     ],
@@ -252,7 +254,7 @@ def test_a_program_that_does_not_end_cleanly_is_told_what_it_did(
         talker__py=CAREFUL.replace(old, new),
     )
     outcome = failure(result)
-    assert (outcome.code, because in outcome.because) == (code, True), outcome
+    assert (outcome.code, because in outcome.because + outcome.hint) == (code, True), outcome
 
 
 @pytest.mark.parametrize(

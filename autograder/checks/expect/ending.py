@@ -23,6 +23,8 @@ _STAMP = re.compile(r" \[\d+\.\d+\]")
 
 _ENDED = "`main` has to catch what spinning raises then: `KeyboardInterrupt` and `ExternalShutdownException`. "
 _ENDED += "After that `rclpy.try_shutdown()` is right, which does nothing where the signal has shut rclpy down already."
+_UNTAKEN = "Nothing in the program took the signal, so the signal ended it at once. `rclpy.init()` takes both signals, "
+_UNTAKEN += "but not for a context of your own and not with `SignalHandlerOptions.NO`."
 
 _SPINS_WITHIN = 3.0
 """Seconds for which a program is let alone until it spins: before that it has not reached what catches the signal."""
@@ -168,10 +170,11 @@ class EndingExpectations(ProgramExpectations):
         because = f"Told to end by {_SAID[by]}, it ended with exit status {status}."
         if error is not None:
             because = f"{error.because}. That was at {_SAID[by]}; the exit status is {status}."
+        advice = _ENDED if error is not None else _UNTAKEN if status == -getattr(signal, by) else ""
         self._expect_that(
             status == 0 and error is None,
             title,
-            lambda: Diagnosis(because, "unclean-end", _ENDED if error is not None else ""),
+            lambda: Diagnosis(because, "unclean-end", advice),
             expected="exit status 0 and no error",
             observed=f"exit status {status}" + (" and an error" if error is not None else ""),
             hint=hint,
