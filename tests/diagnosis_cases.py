@@ -991,6 +991,13 @@ CASES = {
         says="bad-return",
         because="None instead of",
     ),
+    "parameter_compares_all": Case(
+        "self.declare_parameter('x', 'text')\nself.add_on_set_parameters_callback(self.check)\n"
+        "self.set_parameters([rclpy.Parameter('x', value='other')])\n",
+        "def check(self, new):\n    return all(one.value > 1 for one in new)",
+        says="callback-exception",
+        because="look at its `name`",
+    ),
     "parameter_returns": Case(
         "from rcl_interfaces.msg import SetParametersResult\nself.declare_parameter('x', 1)\n"
         "self.add_on_set_parameters_callback(lambda new: SetParametersResult(successful=True))\n"

@@ -136,6 +136,12 @@ CASES: dict[str, tuple[dict[str, str], str, str, str]] = {
         "VERSION",
     ),
     "no_setup_cfg": (without(SENSORS, "setup.cfg"), RUNS, "executable-place", "`bin`"),
+    "other_section": (
+        changed(SENSORS, "setup.cfg", "[install]", "[installation]"),
+        RUNS,
+        "executable-place",
+        "below `[install]`",
+    ),
     "other_folder": (
         changed(SENSORS, "setup.cfg", "install_scripts=$base/lib/NAME", "install_scripts=$base/lib/other"),
         RUNS,
@@ -159,6 +165,12 @@ CASES: dict[str, tuple[dict[str, str], str, str, str]] = {
         EXPECT,
         "setup-py",
         "does not name the Python package",
+    ),
+    "pattern": (
+        changed(SENSORS, "setup.py", '["launch/car.launch.yaml"]', '["launch/*.yaml"]'),
+        EXPECT,
+        "package-file",
+        "from glob import glob",
     ),
     "no_comma": (
         changed(SENSORS, "setup.py", ":main", ":main lamp = NAME.sensor:main"),
@@ -211,6 +223,12 @@ CASES: dict[str, tuple[dict[str, str], str, str, str]] = {
         EXPECT,
         "interface-line",
         "is not accepted: 'std_msgs/msg/Header'.",
+    ),
+    "blank_first": (
+        changed(INTERFACES, "msg/Thing.msg", "float32", "  float32"),
+        EXPECT,
+        "interface-line",
+        "begins with a blank",
     ),
     "capital": (changed(INTERFACES, "msg/Thing.msg", "label", "Label"), EXPECT, "interface-line", "string Label"),
     "one_part": (changed(INTERFACES, "srv/Count.srv", "---\n", ""), EXPECT, "interface-parts", "---"),
@@ -405,7 +423,7 @@ def test_a_package_that_is_not_as_it_should_be_is_told_why(found: dict[str, Chec
     first = next(one for one in found[name].outcomes if one.because)
     assert found[name].points == 0
     assert first.code == code, first
-    assert words in first.because, first
+    assert words in f"{first.because} {first.hint}", first
 
 
 def test_a_package_is_built_and_run_and_launched_from_where_it_is_installed(found: dict[str, CheckResult]) -> None:

@@ -154,6 +154,8 @@ def test_a_right_node_earns_the_points_under_names_and_values_that_vary(grade: G
         ("", "", 'ros.expect_messages("/chatter", String, rate=5)', "rate", "instead of 5 Hz"),
         ("", "", 'ros.expect_parameter("/talker", "wrd", 1)', "parameter-undeclared", "; it has period, word."),
         ("", "", 'ros.expect_parameter("/talker", "period", 1.0)', "parameter-value", "0.05"),
+        ('"period", 0.05)', '"period", 0.05)\n        self.declare_parameter("unset", rclpy.Parameter.Type.DOUBLE)',
+         'ros.expect_parameter("/talker", "unset", 1.0)', "parameter-value", "without a default"),
         ("", "", 'ros.publish("/topic", String())', "no-topic", ""),
         ("", "", 'ros.expect_exit("talker", within=4)', "still-running", "still runs"),
         ("    rclpy.spin(Talker())",

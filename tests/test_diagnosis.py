@@ -133,3 +133,25 @@ def test_where_a_program_runs_twice_the_node_of_one_is_not_the_misplaced_node_of
     runtime.current.close()
     assert late.code == "no-node" and "runs, but" in late.because
     assert astray.code == "namespace" and "namespace: `/twin`." in astray.because
+
+
+SIDES = """\
+import sys
+import rclpy
+rclpy.init()
+rclpy.spin(rclpy.create_node(sys.argv[1]))
+"""
+
+
+def test_a_node_that_lies_a_namespace_too_deep_is_found_beside_another_run_of_its_program(tmp_path: Path) -> None:
+    (tmp_path / "camera.py").write_text(SIDES)
+    runtime.current.configure(tmp_path, Isolation.NONE, 7)
+    right = Program("camera", namespace="/car", arguments_of_its_own=("right",))
+    left = Program("camera", namespace="/car/car", arguments_of_its_own=("left",))  # two `push_ros_namespace`
+    with launch(right, left) as ros:
+        ros.wait(lambda: {"/car/right", "/car/car/left"} <= set(ros.nodes()), 30.0)
+        ros.wait(lambda: all(inside.nodes for inside in ros._running.scene().insides), 30.0)
+        found = autograder.diagnosis.why_no_node(ros._running.scene(), "/car/left")
+    runtime.current.close()
+    assert found.code == "namespace" and "another namespace: `/car/car/left`." in found.because
+    assert "adds a level" in found.hint

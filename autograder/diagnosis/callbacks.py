@@ -252,6 +252,8 @@ def _error(program: str, event: CallbackError) -> Diagnosis:
             "A value that cannot be used is refused: what `add_on_set_parameters_callback` was given returns "
             "SetParametersResult(successful=False, reason=…). An exception ends the node."
         )
+        if event.type == "TypeError":
+            hint = f"Every parameter that is set comes here: look at its `name` before its `value`. {hint}"
     hint = _of_goal_state(error) or hint
     if not event.line and "positional argument" in error:
         hint = "It could not be called: the function takes another number of arguments than it is given here."

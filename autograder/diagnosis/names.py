@@ -98,13 +98,15 @@ def why_no_node(scene: Scene, wanted: str) -> Diagnosis:
     if idle:
         return Diagnosis(*idle)
     base = wanted.rsplit("/", 1)[-1]
-    there = [name for name in own if name.rsplit("/", 1)[-1] == base]
+    of_that_name = [[name for name in nodes if name.rsplit("/", 1)[-1] == base] for nodes in (own, names)]
+    there = of_that_name[0] or of_that_name[1]  # a twin, where no other is of this name
     if there:
         return Diagnosis(
             f"The node `{base}` exists, but in another namespace: {', '.join(f'`{name}`' for name in there)}.",
             "namespace",
             "A namespace is given at the start (`-r __ns:=/name`, in a launch file `namespace` or "
-            "`push_ros_namespace` above it in the same group), and reaches every node that does not fix its own.",
+            "`push_ros_namespace` above it in the same group, and each of these adds a level), and reaches every node "
+            "that does not fix its own.",
         )
     space = wanted.rpartition("/")[0]
     if space in own:

@@ -22,7 +22,7 @@ def why_no_executable(built: Built, name: str) -> Diagnosis | None:
     if where or name in points:
         because = f"`{name}` is installed in {f'`{where}`' if where else 'another place'}."
         because += f" `ros2 run` looks in `lib/{built.name}` only."
-        wanted = f"setup.cfg says where scripts go: `install_scripts=$base/lib/{built.name}`."
+        wanted = f"setup.cfg says where scripts go, below `[install]`: `install_scripts=$base/lib/{built.name}`."
         return Diagnosis(because, "executable-place", wanted)
     near = next(iter(difflib.get_close_matches(name, points, 1, _MISSPELT)), "")
     has = ", ".join(f"`{one}`" for one in sorted(points)) or "none"

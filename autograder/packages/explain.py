@@ -99,6 +99,9 @@ def not_described(sources: Path, name: str) -> Diagnosis | None:
 def _interface_line(match: re.Match[str]) -> Diagnosis:
     line, name, said = match.groups()
     said = said.strip() + "'" * (said.count("'") % 2)  # the pattern leaves the last one out
+    if line.startswith(" "):
+        because = f"The line `{line.strip()}` of the interface `{name}` begins with a blank, so no type is read there."
+        return Diagnosis(because, "interface-line", "Each line begins with the type, at the very left.")
     because = f"The line `{line}` of the interface `{name}` is not accepted: {said}."
     full = re.search(r"\b(\w+)/msg/(\w+)", line)
     if full:
@@ -119,7 +122,11 @@ def _unknown_type(match: re.Match[str]) -> Diagnosis:
 _REASONS: list[tuple[str, _Reason]] = [
     (
         r"error: can't copy '([^']+)': doesn't exist",
-        lambda m: Diagnosis(f"setup.py installs `{m[1]}`, and the package has no such file.", "package-file"),
+        lambda m: Diagnosis(
+            f"setup.py installs `{m[1]}`, and the package has no such file.",
+            "package-file",
+            f'A pattern has to be looked up: `glob("{m[1]}")`, with `from glob import glob`.' if "*" in m[1] else "",
+        ),
     ),
     (
         r"error: package directory '([^']+)' does not exist",

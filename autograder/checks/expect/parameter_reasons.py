@@ -27,8 +27,11 @@ def own(declared: Collection[str]) -> list[str]:
 
 
 def undeclared(node: str, name: str, declared: Collection[str]) -> Diagnosis:
-    """That a node has not declared a parameter; what it has."""
+    """That a node has not declared a parameter, and what it has; or that it declared it without a value."""
     has = own(declared)
+    if name in has:
+        because = f"`{node}` has declared `{name}` without a default, and nothing gave it a value."
+        return Diagnosis(because, "parameter-value", "The second argument of `declare_parameter` is the default.")
     return Diagnosis(
         f"`{node}` has not declared a parameter `{name}`" + (f"; it has {', '.join(has)}." if has else "."),
         "parameter-undeclared",
