@@ -97,7 +97,7 @@ def parse(source: str) -> CellFile | None:
     lines = source.replace("\r\n", "\n").split("\n")
     above = next((number for number, line in enumerate(lines) if line.strip()), len(lines))
     if above < len(lines):  # IPython takes off what the first line is indented by
-        indent = re.match(r"[ \t]*", lines[above])[0]  # type: ignore[index]
+        indent = lines[above].removesuffix(lines[above].lstrip(" \t"))
         lines = [line.removeprefix(indent) for line in lines]
     match = re.fullmatch(r"%%(node|file)(\s.*)?", lines[above]) if above < len(lines) else None
     if match is None:
