@@ -71,6 +71,11 @@ def _nothing_of(silent: Sequence[Inside]) -> Diagnosis:
     return reason_inside(silent) or Diagnosis(f"`{silent[0].name}` runs, but {saw}.", "no-node")
 
 
+def _ending_in(base: str, names: Sequence[str]) -> list[str]:
+    """The nodes of this name in whatever namespace."""
+    return [name for name in names if name.rsplit("/", 1)[-1] == base]
+
+
 def why_no_node(scene: Scene, wanted: str) -> Diagnosis:
     """Why the node `wanted` is not on the graph.
 
@@ -98,8 +103,7 @@ def why_no_node(scene: Scene, wanted: str) -> Diagnosis:
     if idle:
         return Diagnosis(*idle)
     base = wanted.rsplit("/", 1)[-1]
-    of_that_name = [[name for name in nodes if name.rsplit("/", 1)[-1] == base] for nodes in (own, names)]
-    there = of_that_name[0] or of_that_name[1]  # a twin, where no other is of this name
+    there = _ending_in(base, own) or _ending_in(base, names)  # a twin, where no other is of this name
     if there:
         return Diagnosis(
             f"The node `{base}` exists, but in another namespace: {', '.join(f'`{name}`' for name in there)}.",
