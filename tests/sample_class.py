@@ -149,11 +149,9 @@ def outcomes(lab: Lab, student: str) -> set[str]:
     """The kinds of outcome that a student shows: reasons, problems of the notebook, flags, and how much was earned."""
     told = expected(lab, student)
     kinds = {*told.codes.values(), *(f"problem {code}" for code in told.problems)}
-    if told.flagged:
-        kinds.add("flagged")
     for cell in lab.checks:
-        points = told.points[cell.grade_id]
-        kinds.add({None: "undecided", 0: "nothing", cell.points: "full"}.get(points, "part"))
+        earned = {None: "undecided", 0: "nothing", cell.points: "full"}.get(told.points[cell.grade_id], "part")
+        kinds |= {earned, f"{earned}, flagged"} if cell.grade_id in told.flagged else {earned}
     return kinds
 
 
