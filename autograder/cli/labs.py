@@ -51,14 +51,17 @@ def lint(
 ) -> None:
     """Say what is wrong with a lab: cells, checks, what students would receive, and what running it shows."""
     from autograder.authoring.lint.runs import run_findings
-    from autograder.authoring.lint.static import read_findings, release_findings
+    from autograder.authoring.lint.static import course_findings, read_findings, release_findings
     from autograder.course.folder import course_root
     from autograder.course.lab import lab_names, load_lab
     from autograder.gradebook.release import released_files
     from autograder.sandbox.isolation import choose
 
     root = course_root(course)
-    errors = 0
+    course_errors = [] if lab else course_findings(root)
+    for one in course_errors:
+        print(one)
+    errors = len(course_errors)
     for name in [lab] if lab else lab_names(root):
         found = read_findings(root, name)
         if not any(not one.warning for one in found):

@@ -11,9 +11,16 @@ from autograder.authoring.lint.checks import check_findings
 from autograder.authoring.lint.finding import Finding
 from autograder.authoring.lint.metadata import metadata_findings
 from autograder.core.errors import KitError
-from autograder.course.lab import Lab, load_lab
+from autograder.course.lab import Lab, lab_names, load_lab
 from autograder.course.markers import MARK
 from autograder.course.paths import CoursePaths
+from autograder.course.settings import SETTINGS_FILE, read_settings
+
+
+def course_findings(root: Path) -> list[Finding]:
+    """Say what is wrong with the course's own settings: labs that they list and that are not there."""
+    missing = [name for name in read_settings(root).labs if name not in lab_names(root)]
+    return [Finding("", f"{SETTINGS_FILE} lists a lab that there is not, `{name}`.") for name in missing]
 
 
 def read_findings(root: Path, name: str) -> list[Finding]:
