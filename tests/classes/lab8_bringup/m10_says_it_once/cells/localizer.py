@@ -1,0 +1,28 @@
+%%node localizer
+import rclpy
+from rclpy.executors import ExternalShutdownException
+from rclpy.node import Node
+from rclpy.qos import qos_profile_best_available
+from std_msgs.msg import Float64, Int32
+
+
+class Localizer(Node):
+    def __init__(self):
+        super().__init__("localizer")
+        self.pose = self.create_publisher(Float64, "pose", 10)
+        self.create_subscription(Int32, "odometry", self.on_odometry, qos_profile_best_available)
+
+    def on_odometry(self, msg):
+        self.pose.publish(Float64(data=0.05 * msg.data))
+
+
+def main():
+    rclpy.init()
+    try:
+        rclpy.spin(Localizer())
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    rclpy.try_shutdown()
+
+
+main()
