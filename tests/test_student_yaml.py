@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import re
 from pathlib import Path
 
 import pytest
@@ -77,6 +78,37 @@ def test_what_is_wrong_is_a_sentence_with_the_line_of_the_cell(text: str, line: 
     assert error.line == line and f"line {line} of the cell" in str(error) and words in str(error)
 
 
+@pytest.mark.parametrize(
+    "text",
+    [
+        "a: &x [1, 2]\nb: *x",
+        "a: &x {c: 1, d: [2]}\nb: {<<: *x, c: 3}\ne: {<<: [*x, {f: 4}]}",
+        "a: &x 1\nb: &y [*x]\nc: [*y, *y]",
+    ],
+)
+def test_a_launch_files_anchors_are_read_as_pyyaml_reads_them(text: str) -> None:
+    assert load(text, aliases=True) == yaml.safe_load(text)
+    with pytest.raises(StudentFileError, match="anchors"):
+        load(text)
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "words"),
+    [
+        ("a: 1\nb: &x [*x]", 3, "`*x` stands inside what it is to repeat"),
+        ("a: 1\nb: *x", 3, "no anchor of this name"),
+        ("a: &x 1\nb: &x 2", 3, "two anchors have this name"),
+        ("a: 1\nb: {<<: 3}", 3, "`<<` takes a mapping"),
+        ("a: &x [" + "1, " * (VALUES // 2) + "]\nb: *x", 3, "more than"),
+        ("a: &x " + "[" * (DEPTH - 2) + "]" * (DEPTH - 2) + "\nb: [[[*x]]]", 3, "inside one another"),
+    ],
+)
+def test_what_an_alias_stands_for_counts_as_if_it_were_written_out(text: str, line: int, words: str) -> None:
+    with pytest.raises(StudentFileError, match=re.escape(words)) as caught:
+        load(text, aliases=True)
+    assert caught.value.line == line
+
+
 def test_other_characters_that_end_a_line_do_not_shift_the_number() -> None:
     assert refused("a: 'x\u2028y\u2029z\x85'\nb: @").line == 3
 
@@ -97,8 +129,9 @@ def test_other_characters_that_end_a_line_do_not_shift_the_number() -> None:
 )  # fmt: skip
 def test_nothing_of_64_kib_takes_long_or_gets_out_as_something_else(text: str) -> None:
     # A hundredth of a second each; whatever grew with the square of the length would keep this test for minutes.
-    with contextlib.suppress(StudentFileError):
-        load(text)
+    for aliases in (False, True):
+        with contextlib.suppress(StudentFileError):
+            load(text, aliases=aliases)
 
 
 pieces = st.sampled_from(
@@ -114,12 +147,13 @@ pieces = st.sampled_from(
 @settings(max_examples=400)
 @given(st.lists(pieces, max_size=40).map("".join) | st.text(max_size=60))
 def test_any_text_is_either_what_pyyaml_makes_of_it_or_a_sentence(text: str) -> None:
-    try:
-        found = load(text)
-    except StudentFileError as error:
-        assert error.line is None or 2 <= error.line <= text.count("\n") + 2
-    else:
-        assert repr(found) == repr(yaml.safe_load(text))
+    for aliases in (False, True):
+        try:
+            found = load(text, aliases=aliases)
+        except StudentFileError as error:
+            assert error.line is None or 2 <= error.line <= text.count("\n") + 2
+        else:
+            assert repr(found) == repr(yaml.safe_load(text))
 
 
 def test_a_file_is_read_or_named(tmp_path: Path) -> None:

@@ -4,6 +4,7 @@ What it accepts is what `yaml.safe_load` makes of plain YAML. Everything that le
 (anchors, aliases, merge keys), every tag beyond the plain types, and everything too large or too deep is refused; and
 whatever is wrong with a text becomes one `StudentFileError`, a sentence with the line as the notebook shows it. In a
 table of answers a single value may have an anchor, and a line that stands twice is no reason to refuse the others.
+A launch file may have anchors, as in `ros2 launch`: what an alias stands for counts as if it were written out.
 """
 
 from __future__ import annotations
@@ -47,6 +48,9 @@ _PROBLEMS = {
     "found another document": "a second document begins there. Leave out the line `---`",
     "expected '<document start>'": "the lines above are a whole value already, to which this does not belong",
     "found unexpected document separator": "`---` stands inside a value",
+    "second occurrence": "two anchors have this name. Give this one another",
+    "undefined alias": "no anchor of this name stands above it",
+    "for merging": "`<<` takes a mapping, such as `*name`",
     "special characters are not allowed": "a character that cannot be printed is not allowed",
 }
 
@@ -83,13 +87,14 @@ def cell_line(index: int, text: str) -> int:
     return text.count("\n", 0, index) + 2
 
 
-def load(text: str, name: str = "the file", table: bool = False) -> Any:
+def load(text: str, name: str = "the file", table: bool = False, aliases: bool = False) -> Any:
     """Read a YAML text.
 
     Args:
         text: what stands below the cell's first line.
         name: what the sentence of an error calls it.
         table: whether it is a table of answers, in which the value of a key that stands there twice is a `Twice`.
+        aliases: whether anchors, aliases and merge keys are read, too.
 
     Raises:
         StudentFileError: it is not YAML, or not plain enough. Nothing else is ever raised.
@@ -97,7 +102,7 @@ def load(text: str, name: str = "the file", table: bool = False) -> Any:
     if len(text) > FILE_BYTES or len(text.encode("utf-8", "replace")) > FILE_BYTES:
         raise StudentFileError(f"{name} is larger than {FILE_BYTES // 1024} KiB.", "file-too-large")
     try:
-        loader = _Loader(text, table)
+        loader = _Loader(text, table, aliases)
         try:
             return loader.get_single_data()
         finally:
@@ -118,8 +123,8 @@ def load(text: str, name: str = "the file", table: bool = False) -> Any:
         raise _error(text, name, None, " is not YAML: it cannot be read") from None
 
 
-def read(path: Path, table: bool = False) -> Any:
-    """Read a student's YAML file; for `table` see `load`.
+def read(path: Path, table: bool = False, aliases: bool = False) -> Any:
+    """Read a student's YAML file; for `table` and `aliases` see `load`.
 
     Raises:
         StudentFileError: it is missing, is no text, or `load` refuses it.
@@ -133,7 +138,8 @@ def read(path: Path, table: bool = False) -> Any:
         hint = "Check the first line of the cell; it must stand there unchanged."
         raise StudentFileError(because, "file-missing", hint=hint) from None
     try:
-        return load(content.decode("utf-8", "strict" if len(content) <= FILE_BYTES else "replace"), name, table)
+        text = content.decode("utf-8", "strict" if len(content) <= FILE_BYTES else "replace")
+        return load(text, name, table, aliases)
     except UnicodeDecodeError:
         raise StudentFileError(f"{name} is not text in UTF-8.") from None
 
@@ -169,31 +175,56 @@ class _RefusedError(Exception):
 class _Loader(yaml.SafeLoader):
     """PyYAML's safe loader for plain YAML; it refuses while it reads, before anything can grow."""
 
-    def __init__(self, text: str, table: bool) -> None:
+    def __init__(self, text: str, table: bool, aliases: bool) -> None:
         super().__init__(text)
-        self._text, self._table = text, table
+        self._text, self._table, self._aliases = text, table, aliases
         self._depth = self._values = 0
+        self._open: set[str] = set()  # anchors whose value is still being read
 
     def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
         event: Any = self.peek_event()  # type: ignore[no-untyped-call]
+        if not self._aliases:
+            self._refuse_names(event)
+        if isinstance(event, yaml.AliasEvent) and self._aliases:
+            if event.anchor in self._open:
+                raise _RefusedError(event.start_mark, f"`*{event.anchor[:40]}` stands inside what it is to repeat")
+            return self._written_out(super().compose_node(parent, index), event.start_mark, self._depth)
+        if getattr(event, "tag", None) not in (None, "!", *_PLAIN_TAGS):
+            tag = event.tag.replace(_PREFIX, "!!")[:40]
+            raise _RefusedError(event.start_mark, f"the type `{tag}` is not allowed; leave it out")
+        self._count(event.start_mark, self._depth)
+        self._depth += 1
+        self._open |= {event.anchor} - {None}
+        node = super().compose_node(parent, index)
+        self._open -= {event.anchor}
+        self._depth -= 1
+        return node
+
+    def _count(self, mark: Any, depth: int) -> None:
+        self._values += 1
+        if self._values > VALUES:
+            raise _RefusedError(mark, f"the file has more than {VALUES} values")
+        if depth >= DEPTH:
+            raise _RefusedError(mark, f"more than {DEPTH} lists and mappings stand inside one another")
+
+    def _written_out(self, node: yaml.Node | None, mark: Any, depth: int) -> yaml.Node | None:
+        """A copy of what an alias stands for, all of whose values count: a short text stays as small as it looks."""
+        self._count(mark, depth)
+        if isinstance(node, yaml.SequenceNode):
+            items: list[Any] = [self._written_out(item, mark, depth + 1) for item in node.value]
+        elif isinstance(node, yaml.MappingNode):
+            items = [tuple(self._written_out(end, mark, depth + 1) for end in pair) for pair in node.value]
+        else:
+            return node
+        return type(node)(node.tag, items, node.start_mark, node.end_mark, node.flow_style)
+
+    def _refuse_names(self, event: Any) -> None:
         if isinstance(event, yaml.AliasEvent) and not self._table:
             raise _RefusedError(
                 event.start_mark, f"aliases (`*{str(event.anchor)[:40]}`) are not allowed; write it out"
             )
         if event.anchor is not None and not (self._table and isinstance(event, yaml.ScalarEvent | yaml.AliasEvent)):
             raise _RefusedError(event.start_mark, f"anchors (`&{event.anchor[:40]}`) are not allowed; leave it out")
-        if getattr(event, "tag", None) not in (None, "!", *_PLAIN_TAGS):
-            tag = event.tag.replace(_PREFIX, "!!")[:40]
-            raise _RefusedError(event.start_mark, f"the type `{tag}` is not allowed; leave it out")
-        self._values += 1
-        if self._values > VALUES:
-            raise _RefusedError(event.start_mark, f"the file has more than {VALUES} values")
-        if self._depth >= DEPTH:
-            raise _RefusedError(event.start_mark, f"more than {DEPTH} lists and mappings stand inside one another")
-        self._depth += 1
-        node = super().compose_node(parent, index)
-        self._depth -= 1
-        return node
 
     def construct_object(self, node: yaml.Node, deep: bool = False) -> Any:
         if not isinstance(node, yaml.ScalarNode):
@@ -218,6 +249,8 @@ class _Loader(yaml.SafeLoader):
         for key_node, _ in node.value:
             if not isinstance(key_node, yaml.ScalarNode):
                 raise _RefusedError(key_node.start_mark, "a key is a plain word, not a list or a mapping")
+            if key_node.tag == _PREFIX + "merge" and self._aliases:
+                continue
             if key_node.tag == _PREFIX + "merge":
                 raise _RefusedError(key_node.start_mark, "merge keys (`<<`) are not allowed; write the lines out")
             key = self.construct_object(key_node)
