@@ -9,10 +9,11 @@ import typing
 from typing import Any
 
 import pytest
+from rcl_interfaces.msg import Parameter, ParameterEvent, ParameterValue
 
 from autograder.cli import doctor
 from autograder.diagnosis import events
-from autograder.sandbox.inside.probe import forms
+from autograder.sandbox.inside.probe import forms, watch_messages
 
 READ_ELSEWHERE = {"memory_error"}
 """An event that the keeper of the program reads, and no diagnosis."""
@@ -57,6 +58,27 @@ def test_the_installed_rclpy_has_all_that_the_probe_relies_on() -> None:
 )
 def test_a_name_that_an_update_of_rclpy_moves_is_named_in_a_sentence(change: str, said: str) -> None:
     assert any(said in sentence and sentence.endswith(".") for sentence in missed(change))
+
+
+@pytest.mark.parametrize(
+    ("message", "field"),
+    [
+        (ParameterEvent(new_parameters=[Parameter()]), ""),
+        (ParameterEvent(new_parameters=[Parameter(name=5)]), "new_parameters"),
+        (ParameterEvent(new_parameters=[ParameterValue()]), "new_parameters"),
+        (ParameterEvent(node=5), "node"),
+        (Parameter(name="rate", value=ParameterValue(integer_value=2.5)), "value.integer_value"),
+        (Parameter(value=Parameter()), "value"),
+    ],
+)
+def test_what_cannot_be_sent_is_a_misfit_only_if_a_field_is(
+    message: object, field: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # `publish` also raises when the node is just going down: then no field is to be blamed.
+    written: list[forms.BadMessage] = []
+    monkeypatch.setattr(watch_messages, "emit_once", written.append)
+    watch_messages.note_misfit("message", "/events", message, type(message))
+    assert [event["field"] for event in written] == ([field] if field else [])
 
 
 def test_the_doctor_says_when_the_probe_cannot_attach(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -80,13 +80,18 @@ def _misfit(message: Any, path: str) -> tuple[str, str, Any] | None:
     """The first field whose value is not of its type: its path, the type, the value."""
     for name, kind in message.get_fields_and_field_types().items():
         value = getattr(message, name)
-        if hasattr(value, "get_fields_and_field_types"):
+        if _is_a(value, kind):
             found = _misfit(value, f"{path}{name}.")
             if found is not None:
                 return found
         elif not _fits(value, kind):
             return f"{path}{name}", kind, value
     return None
+
+
+def _is_a(value: Any, kind: str) -> bool:
+    """Whether it is a message of the type that a field wants, such as `geometry_msgs/Point`."""
+    return hasattr(value, "get_fields_and_field_types") and type(value).__name__ == kind.rpartition("/")[2]
 
 
 _RANGES = {f"{sign}int{bits}": (bits, sign == "") for sign in ("", "u") for bits in (8, 16, 32, 64)}
@@ -109,4 +114,4 @@ def _fits(value: Any, kind: str) -> bool:
         return isinstance(value, bool)
     if kind == "octet":
         return isinstance(value, bytes)
-    return "/" not in kind
+    return "/" not in kind or (_is_a(value, kind) and _misfit(value, "") is None)
