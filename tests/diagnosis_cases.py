@@ -884,6 +884,34 @@ CASES = {
     "with_init": Case(
         main="with rclpy.init(context=rclpy.Context()):\n    pass", says="crashed", because="returns None", ask=trouble
     ),
+    "two_spins": Case(
+        main="other = rclpy.create_node('other')\n"
+        "threading.Thread(target=rclpy.spin, args=(node,), daemon=True).start()\n"
+        "threading.Event().wait(0.5)\nrclpy.spin(other)",
+        says="crashed",
+        because="two threads spin one executor",
+        ask=trouble,
+    ),
+    "time_for_an_executor": Case(
+        main="rclpy.spin_until_future_complete(node, rclpy.Future(), 0.5)",
+        says="crashed",
+        because="`timeout_sec=…`",
+        ask=trouble,
+    ),
+    "stop_iteration": Case(
+        "self.create_timer(0.05, self.tick)\n",
+        "def tick(self):\n    next(iter(()))\n",
+        says="crashed",
+        because="let a StopIteration out",
+        ask=trouble,
+    ),
+    "one_place_two_levels": Case(
+        "self.create_timer(0.05, self.tick)\n",
+        "hot = False\n\ndef tick(self):\n    self.hot = not self.hot\n"
+        "    log = self.get_logger().warning if self.hot else self.get_logger().info\n    log('x')\n",
+        says="callback-exception",
+        because="a call of its own",
+    ),
     "no_such_module": Case("import car_sensor\n", says="crashed", because="finds no module of this name", ask=trouble),
     "other_value_error": Case("int('x')\n", says="crashed", ask=trouble, never=("builtin-callback",)),
     "deepcopied_profile": Case(

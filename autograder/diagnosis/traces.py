@@ -37,6 +37,32 @@ KNOWN_ERRORS = (
         "`rclpy.try_shutdown()` at the end.",
     ),
     (
+        "Logger severity cannot be changed between calls",
+        "crashed",
+        "rclpy remembers for each place in the code at which level it logs, and allows no other one there: give `info` "
+        "a call of its own and `warning` one of its own, with `if` and `else`.",
+    ),
+    (
+        "generator already executing",
+        "crashed",
+        "If a `spin` raised it: two threads spin one executor. Every `rclpy.spin(node)` uses the same one of the "
+        "process. Add all nodes to one executor and spin that, or make an executor for each thread.",
+    ),
+    (
+        "coroutine raised StopIteration",
+        "crashed",
+        "A callback let a StopIteration out, its own or that of a `next()` that found nothing more. rclpy runs "
+        "callbacks in a coroutine, where Python makes a RuntimeError of it: raise another error, or end without one.",
+    ),
+    *(
+        (
+            f"'{kind}' object has no attribute 'add_node'",
+            "crashed",
+            "In this place rclpy expects an executor. A time is given by its name: `timeout_sec=…`.",
+        )
+        for kind in ("float", "int")
+    ),
+    (
         "ParameterNotDeclaredException",
         "parameter-not-declared",
         "A parameter exists from `declare_parameter` on: declare it before you read it, even if a value was given.",

@@ -20,6 +20,8 @@ from autograder.graph.clock import ClockDriver
 from autograder.graph.recording import Recording
 from autograder.sandbox.running_program import RunningProgram
 
+_LOGGER = re.compile(r"\[\w+\] \[[\d.]+\] \[([^\]]*)\]: ")
+"""What a line of a program's output begins with that a logger has written; the group is the logger's name."""
 _LEVELS = {"DEBUG": 10, "INFO": 20, "WARN": 30, "ERROR": 40, "FATAL": 50}
 """Numbers of rcl_interfaces/msg/Log."""
 
@@ -212,9 +214,16 @@ class ProgramExpectations(Expectations, ABC):
         if said and text and not own:
             return f"`{said[-1].msg[:80]}` was logged by `{said[-1].name}`, not by `{node}`."
         lines = (line.strip() for _, program in self._running.programs for line in program.output().splitlines())
-        printed = next((line for line in lines if text and re.search(text, line) and "] [" not in line), "")
-        if printed:
-            return f"`{printed[:80]}` was printed, not logged. What `self.get_logger()` is given is logged."
+        printed = [line for line in lines if text and re.search(text, line)]
+        for line in printed:
+            if "] [" not in line:
+                return f"`{line[:80]}` was printed, not logged. What `self.get_logger()` is given is logged."
+            logger = _LOGGER.match(line)
+            if node and logger and logger[1] != node:
+                return (
+                    f"`{line[logger.end() :][:80]}` was logged by a logger called `{logger[1]}`. That of the node is "
+                    f"called `{node}`, with its namespace, and `self.get_logger()` returns it."
+                )
         return ""
 
     @cached_property
