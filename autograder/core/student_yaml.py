@@ -249,9 +249,9 @@ class _Loader(yaml.SafeLoader):
         for key_node, _ in node.value:
             if not isinstance(key_node, yaml.ScalarNode):
                 raise _RefusedError(key_node.start_mark, "a key is a plain word, not a list or a mapping")
-            if key_node.tag == _PREFIX + "merge" and self._aliases:
-                continue
             if key_node.tag == _PREFIX + "merge":
+                if self._aliases:
+                    continue
                 raise _RefusedError(key_node.start_mark, "merge keys (`<<`) are not allowed; write the lines out")
             key = self.construct_object(key_node)
             if key in first:
