@@ -1,10 +1,9 @@
 """YAML that a student wrote: one safe way to read it, for tables of answers, parameter files and launch files.
 
-What it accepts is what `yaml.safe_load` makes of plain YAML. Everything that lets a short text stand for a long one
-(anchors, aliases, merge keys), every tag beyond the plain types, and everything too large or too deep is refused; and
-whatever is wrong with a text becomes one `StudentFileError`, a sentence with the line as the notebook shows it. In a
-table of answers a single value may have an anchor, and a line that stands twice is no reason to refuse the others.
-A launch file may have anchors, as in `ros2 launch`: what an alias stands for counts as if it were written out.
+What it accepts is what `yaml.safe_load` makes of plain YAML. Every tag beyond the plain types, and everything too large
+or too deep is refused, where what an alias stands for counts as if it were written out; and whatever is wrong with a
+text becomes one `StudentFileError`, a sentence with the line as the notebook shows it. In a table of answers a line
+that stands twice is no reason to refuse the others.
 """
 
 from __future__ import annotations
@@ -87,14 +86,13 @@ def cell_line(index: int, text: str) -> int:
     return text.count("\n", 0, index) + 2
 
 
-def load(text: str, name: str = "the file", table: bool = False, aliases: bool = False) -> Any:
+def load(text: str, name: str = "the file", table: bool = False) -> Any:
     """Read a YAML text.
 
     Args:
         text: what stands below the cell's first line.
         name: what the sentence of an error calls it.
         table: whether it is a table of answers, in which the value of a key that stands there twice is a `Twice`.
-        aliases: whether anchors, aliases and merge keys are read, too.
 
     Raises:
         StudentFileError: it is not YAML, or not plain enough. Nothing else is ever raised.
@@ -102,7 +100,7 @@ def load(text: str, name: str = "the file", table: bool = False, aliases: bool =
     if len(text) > FILE_BYTES or len(text.encode("utf-8", "replace")) > FILE_BYTES:
         raise StudentFileError(f"{name} is larger than {FILE_BYTES // 1024} KiB.", "file-too-large")
     try:
-        loader = _Loader(text, table, aliases)
+        loader = _Loader(text, table)
         try:
             return loader.get_single_data()
         finally:
@@ -123,8 +121,8 @@ def load(text: str, name: str = "the file", table: bool = False, aliases: bool =
         raise _error(text, name, None, " is not YAML: it cannot be read") from None
 
 
-def read(path: Path, table: bool = False, aliases: bool = False) -> Any:
-    """Read a student's YAML file; for `table` and `aliases` see `load`.
+def read(path: Path, table: bool = False) -> Any:
+    """Read a student's YAML file; for `table` see `load`.
 
     Raises:
         StudentFileError: it is missing, is no text, or `load` refuses it.
@@ -139,7 +137,7 @@ def read(path: Path, table: bool = False, aliases: bool = False) -> Any:
         raise StudentFileError(because, "file-missing", hint=hint) from None
     try:
         text = content.decode("utf-8", "strict" if len(content) <= FILE_BYTES else "replace")
-        return load(text, name, table, aliases)
+        return load(text, name, table)
     except UnicodeDecodeError:
         raise StudentFileError(f"{name} is not text in UTF-8.") from None
 
@@ -175,17 +173,15 @@ class _RefusedError(Exception):
 class _Loader(yaml.SafeLoader):
     """PyYAML's safe loader for plain YAML; it refuses while it reads, before anything can grow."""
 
-    def __init__(self, text: str, table: bool, aliases: bool) -> None:
+    def __init__(self, text: str, table: bool) -> None:
         super().__init__(text)
-        self._text, self._table, self._aliases = text, table, aliases
+        self._text, self._table = text, table
         self._depth = self._values = 0
         self._open: set[str] = set()  # anchors whose value is still being read
 
     def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
         event: Any = self.peek_event()  # type: ignore[no-untyped-call]
-        if not self._aliases:
-            self._refuse_names(event)
-        if isinstance(event, yaml.AliasEvent) and self._aliases:
+        if isinstance(event, yaml.AliasEvent):
             if event.anchor in self._open:
                 raise _RefusedError(event.start_mark, f"`*{event.anchor[:40]}` stands inside what it is to repeat")
             return self._written_out(super().compose_node(parent, index), event.start_mark, self._depth)
@@ -218,14 +214,6 @@ class _Loader(yaml.SafeLoader):
             return node
         return type(node)(node.tag, items, node.start_mark, node.end_mark, node.flow_style)
 
-    def _refuse_names(self, event: Any) -> None:
-        if isinstance(event, yaml.AliasEvent) and not self._table:
-            raise _RefusedError(
-                event.start_mark, f"aliases (`*{str(event.anchor)[:40]}`) are not allowed; write it out"
-            )
-        if event.anchor is not None and not (self._table and isinstance(event, yaml.ScalarEvent | yaml.AliasEvent)):
-            raise _RefusedError(event.start_mark, f"anchors (`&{event.anchor[:40]}`) are not allowed; leave it out")
-
     def construct_object(self, node: yaml.Node, deep: bool = False) -> Any:
         if not isinstance(node, yaml.ScalarNode):
             return super().construct_object(node, deep)
@@ -250,9 +238,7 @@ class _Loader(yaml.SafeLoader):
             if not isinstance(key_node, yaml.ScalarNode):
                 raise _RefusedError(key_node.start_mark, "a key is a plain word, not a list or a mapping")
             if key_node.tag == _PREFIX + "merge":
-                if self._aliases:
-                    continue
-                raise _RefusedError(key_node.start_mark, "merge keys (`<<`) are not allowed; write the lines out")
+                continue
             key = self.construct_object(key_node)
             if key in first:
                 line = cell_line(first[key].start_mark.index, self._text)

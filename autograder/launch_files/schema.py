@@ -54,7 +54,7 @@ def read_file(path: Path) -> list[Action]:
             hint = "It is started from where the package installs it: `data_files` in setup.py has to name it."
         raise place.error("there is no such file.", hint)
     try:
-        content = student_yaml.read(path, aliases=True)
+        content = student_yaml.read(path)
     except student_yaml.StudentFileError as error:
         where = f"line {error.line} of the cell" if error.line else ""
         because = error.because.removeprefix(f"`{path.name}`").lstrip(", ").removeprefix(where).lstrip(" :")

@@ -160,7 +160,7 @@ def _defect(file: CellFile) -> str:
         from autograder.core import student_yaml
 
         try:
-            student_yaml.load(file.text, aliases=file.name.endswith((".launch.yaml", ".launch.yml")))
+            student_yaml.load(file.text)
         except student_yaml.StudentFileError as error:
             return error.because.removeprefix("the file, ").rstrip(".")
     elif file.name.endswith(".json"):
