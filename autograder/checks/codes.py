@@ -11,7 +11,6 @@ GROUPS: dict[str, dict[str, str]] = {
         "node-present": "a node is on the graph that should have gone",
         "count": "a topic has another number of such ends than asked for",
         "extra-publisher": "more nodes publish than may, or the messages of one topic carry several senders' numbers",
-        "extra-subscription": "more subscriptions than may are on the topic",
         "publisher-present": "a publisher is still on a topic that should have none",
         "subscription-present": "a subscription is still on a topic that should have none",
         "qos-lifespan": "the end has another lifespan than asked for",

@@ -11,10 +11,13 @@ class Listener(Node):
         self.last = None
         self.missing = 0
         self.lost = self.create_publisher(Int64, "lost", 10)
-        self.create_subscription(String, "chatter", self.hear, 10)
+        self.create_subscription(String, "chatter", self.write_down, 10)
+        self.create_subscription(String, "chatter", self.count, 10)
 
-    def hear(self, message):
+    def write_down(self, message):
         self.get_logger().info(f"heard: {message.data}")
+
+    def count(self, message):
         number = int(message.data.split()[-1])
         if self.last is not None and number > self.last + 1:
             self.missing += len(range(self.last + 1, number))

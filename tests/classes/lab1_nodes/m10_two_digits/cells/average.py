@@ -1,0 +1,38 @@
+%%node average
+import rclpy
+from rclpy.executors import ExternalShutdownException
+from rclpy.node import Node
+from std_msgs.msg import Float64MultiArray
+from std_srvs.srv import Trigger
+
+
+class Average(Node):
+    def __init__(self):
+        super().__init__("average")
+        self.value = None
+        self.create_subscription(Float64MultiArray, "samples", self.take, 10)
+        self.create_service(Trigger, "mean", self.mean)
+
+    def take(self, message):
+        self.value = sum(message.data) / len(message.data) if message.data else None
+
+    def mean(self, request, response):
+        response.success = bool(self.value)
+        if self.value:
+            response.message = f"{self.value:.4f}"
+        else:
+            response.message = "there are no numbers"
+        return response
+
+
+def main():
+    rclpy.init()
+    try:
+        rclpy.spin(Average())
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    finally:
+        rclpy.try_shutdown()
+
+
+main()
