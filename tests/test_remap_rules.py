@@ -234,8 +234,12 @@ def table(tmp_path: Path) -> Iterator[Path]:
 
 
 @pytest.mark.parametrize(
-    "text", ["-r a:=b -p c:=1", "--ros-args -r a:=b -p c:=1", '"-r  a:=b\\n-p c:=1"', ">-\n  -r a:=b\n  -p c:=1"]
-)
+    "text",
+    [
+        "-r a:=b -p c:=1", "--ros-args -r a:=b -p c:=1", '"-r  a:=b\\n-p c:=1"', ">-\n  -r a:=b\n  -p c:=1",
+        "-r a:=b -p c:=1 --", "-r a:=b -- --ros-args -p c:=1", "--ros-args -r a:=b --ros-args -p c:=1 --",
+    ],
+)  # fmt: skip
 def test_a_command_line_is_split_as_a_shell_does(table: Path, text: str) -> None:
     table.write_text(f"front: {text}\n")
     assert command_line("rules.yaml", "front").words() == ["-r", "a:=b", "-p", "c:=1"]
@@ -281,6 +285,9 @@ def test_only_a_parameter_file_that_rcl_does_not_read_either_is_called_unreadabl
         ("front: a:=b\n", "command-line"),
         ("front: -r\n", "command-line"),
         ("front: -r a:=b c:=d\n", "command-line"),
+        ("front: -r a:=b -- c:=d\n", "command-line"),
+        ("front: -r -- --ros-args a:=b\n", "command-line"),
+        ("front: --ros-args --\n", "unanswered"),
         ("front: --enable-stdout-logs x\n", "command-line"),
         ("front: --log-level\n", "command-line"),
         ("front: -r --disable-rosout-logs\n", "command-line"),

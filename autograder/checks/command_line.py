@@ -48,11 +48,10 @@ class CommandLine:
         text = self._text()
         example = f"`{self.entry}: -r camera:=front_camera`"
         try:
-            words = shlex.split(text)
+            given = shlex.split(text)
         except ValueError as error:
             raise CommandLineError(f"`{self.entry}` in `{self.file}`: {error}.", "command-line") from None
-        if words[:1] == ["--ros-args"]:
-            words = words[1:]
+        words = _without_brackets(given)
         if not words:
             raise CommandLineError(f"`{self.entry}` in `{self.file}` has no words.", "unanswered", f"Write {example}.")
         option = ""  # the one that the next word belongs to
@@ -64,7 +63,7 @@ class CommandLine:
                     "There is no space beside `:=`."
                     if before.endswith(":=") or word.startswith(":=")
                     else "Leave out `ros2 run` and all that stands before the words after `--ros-args`."
-                    if "ros2" in words or "--ros-args" in words
+                    if "ros2" in given or "--ros-args" in given
                     else f"Every rule has its own `-r`, every parameter its own `-p`: {example}.",
                 )
             option = "" if option or word in _ALONE else word
@@ -100,6 +99,16 @@ class CommandLine:
                 "Write the words in one line, as you would type them, without brackets and commas.",
             )
         return text
+
+
+def _without_brackets(words: list[str]) -> list[str]:
+    """The ROS arguments alone: they stand between `--ros-args` and `--` or the end, and may do so several times."""
+    kept: list[str] = []
+    for word, after in itertools.pairwise([*words, "--ros-args"]):
+        bracket = word == "--ros-args" or (word, after) == ("--", "--ros-args")
+        if not bracket or (kept and kept[-1] in _WITH_A_WORD):
+            kept.append(word)
+    return kept
 
 
 def command_line(
