@@ -19,6 +19,7 @@ SET_UP = """\
 %load_ext autograder
 from autograder.checks import Program, answers, launch, vary
 from rclpy.qos import QoSProfile
+from rcl_interfaces.msg import Log
 from std_msgs.msg import Int32, String
 from std_srvs.srv import Trigger
 """
@@ -129,6 +130,8 @@ def test_a_right_node_earns_the_points_under_names_and_values_that_vary(grade: G
         ("        self.count = 0", "        self.count = nothing", 'ros.expect_node("/talker")', "crashed",
          "self.count = nothing"),
         ("        self.count = 0", "        self.handle = 0", 'ros.expect_node("/talker")', "crashed", "another name"),
+        ("        self.count = 0", "        self.timers = []", 'ros.expect_node("/talker")', "crashed",
+         "needs another name"),
         ("def tick(self):", "def tick(self):\n        self.handle = 0",
          'ros.expect_messages("/chatter", String, within=6)', "callback-exception", "another name"),
         ("def main():", "class NoWord(Exception): pass\n\n\ndef main():\n    raise NoWord(1)",
@@ -147,6 +150,9 @@ def test_a_right_node_earns_the_points_under_names_and_values_that_vary(grade: G
          "did not return the response"),
         ("response.success = True", "raise ValueError('no')", 'ros.call("/how_many", Trigger, Trigger.Request())',
          "service-exception", "ValueError: no"),
+        ("self.count += 1", "self.count += 1; self.count == 60 and self.get_logger().info('tick')",
+         'ros.expect_messages("/rosout", Log, at_least=3, within=6)', "too-few",
+         "the timer of `tick` (line 16, every 0.05 s) fired "),
         ("self.count += 1", "self.count += 1; print('tick', self.count)",
          'ros.expect_log("tick", node="talker", within=6)', "no-log", "was printed, not logged"),
         ("self.count += 1", "self.count += 1; self.get_logger().info('tick')",

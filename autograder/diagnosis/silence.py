@@ -162,22 +162,29 @@ def _publishers(scene: Scene, topic: str) -> list[tuple[Inside, Thing]]:
 def account(scene: Scene, topic: str) -> str:
     """What was seen of a silent publisher, and so ruled out, where no reason is established."""
     found = _publishers(scene, topic)
+    said = [f"The publisher on `{topic}` is on the graph"]
     if not found or not all(inside.alive for inside, _ in found):
-        return f"The publisher on `{topic}` is on the graph, and nothing (more) came from it."
+        # That of /rosout is made by rcl, where the probe does not see it: what ran is said of every node.
+        said += [text for inside in scene.insides if inside.alive for text in _runs(inside)][:6]
+        return f"{', '.join(said)}, and nothing (more) came from it."
     inside, publisher = found[0]
-    said = [f"The publisher on `{topic}` is on the graph", f"its node `{publisher.node}` is spun"]
-    runs: list[str] = []
-    for thing in inside.callbacks:
-        if thing.node == publisher.node:
-            stopped = " and is cancelled until `reset()` is called" * thing.cancelled
-            runs.append(f"{called(thing)} {_ran(thing.kind, thing.runs)}{stopped}")
-    said += runs[:6]
+    said += [f"its node `{publisher.node}` is spun", *_runs(inside, publisher.node)[:6]]
     sent = {0: "nothing was published", 1: "one message was published"}.get(
         publisher.runs, f"{publisher.runs} messages were published"
     )
     if publisher.runs:
         sent += f", {'the last of them ' * (publisher.runs > 1)}{inside.now - publisher.last:.1f} s ago"
     return f"{', '.join(said)}, and {sent}."
+
+
+def _runs(inside: Inside, node: str = "") -> list[str]:
+    """How often each callback ran, of one node or of all of the program."""
+    stopped = " and is cancelled until `reset()` is called"
+    return [
+        f"{called(thing)} {_ran(thing.kind, thing.runs)}{stopped * thing.cancelled}"
+        for thing in inside.callbacks
+        if not node or thing.node == node
+    ]
 
 
 def _ran(kind: str, runs: int) -> str:

@@ -25,6 +25,13 @@ KNOWN_ERRORS = (
         "of rclpy's own `Node`: give yours another name.",
     ),
     (
+        "object has no setter",
+        "crashed",
+        "rclpy's own `Node` has `clients`, `context`, `default_callback_group`, `guards`, `publishers`, `services`, "
+        "`subscriptions`, `timers` and `waitables`, and none of them can be set. An attribute of your node needs "
+        "another name, such as `self.my_timers`.",
+    ),
+    (
         "ModuleNotFoundError",
         "crashed",
         "Python finds no module of this name. Is the name right? The code of a package of yours is only installed if "
