@@ -51,7 +51,7 @@ class CommandLine:
             given = shlex.split(text)
         except ValueError as error:
             raise CommandLineError(f"`{self.entry}` in `{self.file}`: {error}.", "command-line") from None
-        words = _without_brackets(given)
+        words = _ros_arguments(given)
         if not words:
             raise CommandLineError(f"`{self.entry}` in `{self.file}` has no words.", "unanswered", f"Write {example}.")
         option = ""  # the one that the next word belongs to
@@ -101,12 +101,12 @@ class CommandLine:
         return text
 
 
-def _without_brackets(words: list[str]) -> list[str]:
-    """The ROS arguments alone: they stand between `--ros-args` and `--` or the end, and may do so several times."""
+def _ros_arguments(words: list[str]) -> list[str]:
+    """Leave out what only begins and ends the ROS arguments: rcl takes `--ros-args … -- --ros-args …` as one list."""
     kept: list[str] = []
     for word, after in itertools.pairwise([*words, "--ros-args"]):
-        bracket = word == "--ros-args" or (word, after) == ("--", "--ros-args")
-        if not bracket or (kept and kept[-1] in _WITH_A_WORD):
+        marks = word == "--ros-args" or (word, after) == ("--", "--ros-args")
+        if not marks or (kept and kept[-1] in _WITH_A_WORD):
             kept.append(word)
     return kept
 
