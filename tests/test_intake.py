@@ -28,6 +28,7 @@ from autograder.core.results import Isolation, Status
 from autograder.course.lab import grade_id_of, load_lab
 from autograder.grading.job import Cell, Job
 from autograder.grading.worker import run_job
+from autograder.intake.asked import Accepted
 from autograder.intake.collect import collect
 from autograder.launch_files import LaunchFileError, read_launch_file
 from autograder.report.terminal import plain
@@ -61,7 +62,7 @@ def test_every_attack_says_what_is_tried_and_what_must_hold() -> None:
 def hold(case: dict[str, Any], source: Path, course: Path) -> None:
     """Take a class in; what was taken and said must be as the case wants it, and nothing lies anywhere else."""
     before = {path for path in course.parent.rglob("*") if not path.is_relative_to(course / "build")}
-    collected = collect(source, toy.LAB, course)
+    collected = collect(source, toy.LAB, course, accepted=case.get("accepted", ()))
     taken = {student: path.read_text(encoding="utf-8") for student, path in collected.notebooks.items()}
     others = [text for student, text in sorted(taken.items()) if student not in case["taken"]]
     assert {student: text for student, text in taken.items() if student in case["taken"]} == case["taken"]
@@ -271,7 +272,7 @@ def taken_from(content: bytes, tmp_path: Path) -> dict[str, Path]:
     """Take a zip in that may be anything; nothing but a sentence may come of it."""
     (tmp_path / "class.zip").write_bytes(content)
     try:
-        collected = collect(tmp_path / "class.zip", toy.LAB, tmp_path / "course")
+        collected = collect(tmp_path / "class.zip", toy.LAB, tmp_path / "course", accepted=tuple(Accepted))
     except KitError:
         return {}
     for student, path in collected.notebooks.items():

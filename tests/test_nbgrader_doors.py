@@ -64,7 +64,11 @@ def test_validate_says_what_check_says_and_runs_nothing_here(root: Path, mark: P
     status, told = nbgrader(root, "validate", root / "build" / "submitted" / "ann" / "toy" / "toy.ipynb")
     assert status == 0 and "Success! Your notebook passes all the tests." in told
     status, told = nbgrader(root, "validate", root / "build" / "submitted" / "bob" / "toy" / "toy.ipynb")
-    assert "1 part(s) did not pass" in told and "The talker: 0 of 3 points" in told and "A hidden check failed" in told
+    assert (
+        "1 part(s) did not pass" in told
+        and "The talker: failed, 0 of 3 points" in told
+        and "A hidden check failed" in told
+    )
     assert "Partial credit" not in told and "secret" not in told
     status, told = nbgrader(root, "validate", "--invert", "build/submitted/bob/toy/toy.ipynb")
     assert "PASSED ON 1 CELL(S)" in told and "The table" in told
@@ -96,6 +100,38 @@ def test_a_module_beside_a_submission_is_not_imported(root: Path, mark: Path) ->
         (folder / f"{name}.py").write_text(f"from pathlib import Path\nPath({str(mark)!r}).touch()\n")
     _, told = nbgrader(folder, "validate", "toy.ipynb")
     assert "was not checked" in told and not mark.exists()
+
+
+PLANTED = {
+    "nbgrader_config.py": "{write}",
+    "nbgrader_config.json": '{{"Application": {{"log_level": 10}}, "ExportApp": {{"plugin_class": "planted.Plugin"}}}}',
+    "planted.py": "{write}",
+    "course.toml": 'title = "A course"',
+    "sitecustomize.py": "{write}",
+    "jupyter_config.py": "{write}",
+    "jupyter_server_config.py": "{write}",
+    "ipython_config.py": "{write}",
+}
+
+
+@pytest.mark.parametrize(
+    "command",
+    [("validate", "toy.ipynb"), ("autograde", "toy"), ("generate_feedback", "toy"), ("list",), ("export",),
+     ("db", "student", "list"), ("quickstart", "new")],
+    ids=lambda command: command[0],
+)  # fmt: skip
+def test_nothing_that_lies_in_an_unpacked_submission_is_run(tmp_path: Path, command: tuple[str, ...]) -> None:
+    folder, mark = tmp_path / "eve", tmp_path / "executed"
+    toy.hand_in(tmp_path, "eve", toy.CELLS)
+    write = f"from pathlib import Path\nPath({str(mark)!r}).touch()\n"
+    for name, text in PLANTED.items():
+        (folder / name).write_text(text.format(write=write))
+    nbgrader = Path(sys.prefix, "bin", "nbgrader")
+    done = subprocess.run(
+        [str(nbgrader), *command], cwd=folder, env=environment(folder), capture_output=True, text=True, check=False
+    )
+    assert not mark.exists(), done.stderr
+    assert command[0] != "validate" or f"{folder / 'nbgrader_config.py'} is passed over" in done.stderr
 
 
 def test_no_setting_leads_to_nbgraders_execution(root: Path, mark: Path) -> None:
@@ -139,7 +175,7 @@ def test_buttons_in_jupyterlab_take_the_same_way(root: Path, mark: Path) -> None
         answer = post(address, "assignments/validate", path="build/submitted/bob/toy/toy.ipynb")
         graded = post(address, "formgrader/api/submission/toy/ann/autograde")
     assert answer["success"]
-    assert [entry["source"] for entry in answer["value"]["failed"]] == ["The talker: 0 of 3 points"]
+    assert [entry["source"] for entry in answer["value"]["failed"]] == ["The talker: failed, 0 of 3 points"]
     assert "A hidden check failed" in answer["value"]["failed"][0]["error"]
     assert graded["success"], graded
     assert points(root) == {"ann": 5.0}

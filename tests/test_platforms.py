@@ -15,7 +15,9 @@ import pytest
 import toy
 
 from autograder.core.errors import KitError
-from autograder.intake.collect import Collected, collect
+from autograder.intake.asked import Accepted
+from autograder.intake.collect import Collected
+from autograder.intake.collect import collect as taken_in
 from autograder.submission import timestamp
 
 ROSTER = """id,name,email,section,canvas_id,moodle_id,github
@@ -144,6 +146,11 @@ def lay_out(files: Mapping[str, str | bytes], place: Path, zipped: bool) -> Path
     return place / "in"
 
 
+def collect(source: Path, lab: str, course: Path, format_name: str = "") -> Collected:
+    """Take in a class of which somebody has said that whoever is missing, strange or there twice may be so."""
+    return taken_in(source, lab, course, format_name, tuple(Accepted))
+
+
 def texts(collected: Collected) -> dict[str, str]:
     return {student: path.read_text() for student, path in collected.notebooks.items()}
 
@@ -182,7 +189,7 @@ def test_when_it_was_handed_in_is_kept(tmp_path: Path) -> None:
 def test_by_what_the_exchange_knows_feedback_is_kept_as_long_as_a_submission_is_from_there(tmp_path: Path) -> None:
     for name, secret in (("exchange", "b2b2"), ("submitted", "")):
         (tmp_path / name).mkdir()
-        collected = collect(lay_out(PLATFORMS[name][1], tmp_path / name, True), toy.LAB, tmp_path / "course")
+        collected = collect(lay_out(PLATFORMS[name][1], tmp_path / name, True), toy.LAB, tmp_path / "course", name)
         file = collected.notebooks["jd01"].with_name("submission_secret.txt")
         assert (file.read_text() if file.is_file() else "") == secret
 
@@ -295,12 +302,12 @@ INCOMPLETE: dict[str, tuple[dict[str, str], dict[str, str], list[str]]] = {
     "Moodle's files without folders": (
         {"Jane Doe_501_assignsubmission_file_toy.ipynb": "jd", "Jo_502_assignsubmission_file_mine.ipynb": "jo",
          "Jo_502_assignsubmission_onlinetext.html": "", "Cem_503_assignsubmission_file_a.pdf": ""},
-        {"Jane Doe": "jd", "Jo": "jo"}, ["Cem handed in no notebook"],
+        {"Jane Doe": "jd", "Jo": "jo"}, ["'Cem' holds 'Cem_503_assignsubmission_file_a.pdf' and no notebook"],
     ),
     "two notebooks of other names": (
         {"Jane_501_assignsubmission_file_/a.ipynb": "", "Jane_501_assignsubmission_file_/b.ipynb": "",
          "Jo_502_assignsubmission_file_/toy (1).ipynb": "jo", "Jo_502_assignsubmission_file_/old.ipynb": "old"},
-        {"Jo": "jo"}, ["Jane handed in 'a.ipynb' and 'b.ipynb', none called toy.ipynb"],
+        {"Jo": "jo"}, ["'Jane' holds 2 notebooks, of which none is called toy.ipynb"],
     ),
     "a second file in Canvas": (
         {"doe_1_10_toy.ipynb": "jd", "doe_1_11_scratch.ipynb": "no", "roe_2_12_toy.ipynb": "jr"},
@@ -309,7 +316,7 @@ INCOMPLETE: dict[str, tuple[dict[str, str], dict[str, str], list[str]]] = {
     "a user name with a line in Blackboard": (
         {"Lab_2_a_doe_attempt_2026-11-19-10-00-00_toy.ipynb": "ad", "Lab_2_bob_attempt_2026-11-19-10-00-00.txt": "",
          "Lab_2_b_doe_attempt_2026-11-19-10-00-00_toy.ipynb": "bd"},
-        {"a_doe": "ad", "b_doe": "bd"}, ["bob handed in no notebook"],
+        {"a_doe": "ad", "b_doe": "bd"}, ["'bob' holds 'Lab_2_bob_attempt_2026-11-19-10-00-00.txt' and no notebook"],
     ),
     "a group in Gradescope": (
         {"submission_metadata.yml": """submission_1:
@@ -317,21 +324,21 @@ INCOMPLETE: dict[str, tuple[dict[str, str], dict[str, str], list[str]]] = {
 submission_2:
   :submitters: [{":name": Cem}]
 """, "submission_1/toy.ipynb": "ab", "submission_2/a.pdf": "", "submission_3/toy.ipynb": "?"},
-        {"Ann": "ab", "Bob": "ab"}, ["Cem handed in no notebook", "submission_3 is of nobody"],
+        {"Ann": "ab", "Bob": "ab"}, ["'Cem' holds 'a.pdf' and no notebook", "submission_3 is of nobody"],
     ),
     "repositories without a notebook": (
         {"toy-ann/labs/toy/toy.ipynb": "a", "toy-bob/labs/toy/toy.ipynb": "b", "toy-cem/README.md": "",
          "toy-dan/labs/toy/mine.ipynb": "d"},
-        {"ann": "a", "bob": "b", "dan": "d"}, ["toy-cem holds no notebook of toy"],
+        {"ann": "a", "bob": "b", "dan": "d"}, ["'cem' holds 'README.md' and no notebook"],
     ),
     "nbgrader's folders": (
         {"submitted/ann/toy/toy.ipynb": "a", "submitted/bob/toy/mine.ipynb": "b", "submitted/cem/toy/a.pdf": "",
          "submitted/dan/other/other.ipynb": ""},
-        {"ann": "a", "bob": "b"}, ["cem handed in no notebook"],
+        {"ann": "a", "bob": "b"}, ["'cem' holds 'a.pdf' and no notebook"],
     ),
     "files": (
         {"ann.ipynb": "a", "bob.pdf": "", "toy.ipynb": "", "roster.csv": "id"},
-        {"ann": "a"}, ["'bob.pdf' is no student's notebook", "'toy.ipynb' is no student's notebook"],
+        {"ann": "a"}, ["'bob.pdf' is no student's", "Nothing says whose 'toy.ipynb' is"],
     ),
 }  # fmt: skip
 

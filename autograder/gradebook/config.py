@@ -12,6 +12,7 @@ from autograder.gradebook.exchange_files import CollectNotebooks
 from autograder.gradebook.export_plugin import ExportOfClass
 from autograder.gradebook.feedback import FeedbackExporter
 from autograder.gradebook.released_notebook import RELEASE, WITHOUT_GRADEBOOK
+from autograder.grading.validate import HEADING
 
 NOT_RELEASED = [".ipynb_checkpoints", "*.pyc", "__pycache__", ".*", "nodes"]
 """Files beside a lab's source, and beside what a student hands in, that are not part of it."""
@@ -42,7 +43,7 @@ def configure(config: Any, root: Path) -> None:
     config.GenerateFeedback.exporter_class = FeedbackExporter
     config.GenerateFeedback.preprocessors = []
     config.GenerateAssignment.preprocessors = RELEASE
-    config.Validator.failed_warning = "{num_failed} part(s) did not pass, or could not be checked:"
+    config.Validator.failed_warning = HEADING
     config.ClearSolutions.code_stub = {"python": CODE_STUB}
     config.ClearSolutions.text_stub = TEXT_STUB
 

@@ -1,4 +1,4 @@
-"""Everything that the kit uses of nbgrader and that nbgrader has not promised to keep, in one place.
+"""What the kit uses of nbgrader and nbgrader has not promised to keep; of its validator see `grading/validate.py`.
 
 `tests/test_private_names.py` says which of these an update has moved; pyproject.toml keeps untested ones away.
 """
@@ -17,10 +17,8 @@ from nbgrader.converters import Autograde
 from nbgrader.converters.generate_solution import GenerateSolution
 from nbgrader.dbutil import ALEMBIC_DIR
 from nbgrader.preprocessors import Execute, SaveAutoGrades, SaveCells
-from nbgrader.validator import Validator
 
-Verdicts = dict[str, list[dict[str, str]]]
-"""What did not pass, or what did, in the form that nbgrader's validator shows."""
+from autograder.grading.validate import Verdicts, replace_validator
 
 
 def in_first_pass(autograde: Autograde) -> bool:
@@ -103,14 +101,11 @@ def replace_execution(validate: Callable[[Path, bool], Verdicts], refuse: Callab
     """
     execute = Execute.preprocess
 
-    def validated(self: Any, filename: str) -> Verdicts:
-        return validate(Path(filename), self.invert)
-
     def preprocess(self: Any, nb: Any, resources: Any = None, km: Any = None) -> Any:
         if isinstance(self.parent, GenerateSolution):
             return execute(self, nb, resources, km)
         raise refuse()
 
-    Validator.validate = validated
+    replace_validator(validate)
     if execute.__qualname__ != preprocess.__qualname__:  # else it is replaced already
         Execute.preprocess = preprocess

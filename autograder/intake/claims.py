@@ -1,4 +1,4 @@
-"""What a format says of the files that it recognises: whose notebook each is."""
+"""What the names in a class say: whose each entry is."""
 
 from __future__ import annotations
 
@@ -6,18 +6,18 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from autograder.intake.members import Member
+from autograder.intake.entries import Entry
 
 
 @dataclass(frozen=True)
 class Claim:
-    """A notebook that somebody handed in."""
+    """An entry that is somebody's."""
 
-    member: Member
+    entry: Entry
     owner: Mapping[str, str]
     """What the platform calls the student, by kind: `name`, `email`, `id`, `canvas_id`, `moodle_id`, `github`."""
     called: str = ""
-    """The file's name as the student gave it, without what the platform put before it."""
+    """A file's name as the student gave it, without what the platform put before it."""
     attempt: tuple[Any, ...] = ()
     """Of two attempts of one student, the greater one is the later."""
     turn: tuple[Any, ...] = ()
@@ -26,20 +26,25 @@ class Claim:
     """Date and time, as nbgrader reads them; empty if nothing says so."""
     late: bool = False
     """The platform has marked it as late."""
-    secret: str = ""
-    """By what nbgrader's exchange knows the feedback on it; empty if it did not come from there."""
+    by_hand: bool = False
+    """Its name is not of the platform's form: somebody has added it."""
+    only: str = ""
+    """The folder in the entry in which the work for this lab lies; empty: anywhere."""
 
 
 @dataclass
 class Recognised:
-    """What a format makes of the files."""
+    """What a format makes of the entries of a class."""
 
-    format: str
     claims: list[Claim] = field(default_factory=list)
     strange: list[str] = field(default_factory=list)
-    """Sentences about what was recognised and holds no notebook."""
+    """Sentences about what was recognised and is nobody's."""
+    aside: list[Entry] = field(default_factory=list)
+    """What is of another lab, or tells whose the others are: it is not used, and needs not be."""
 
-
-def nothing_from(everybody: Mapping[str, str], with_notebook: set[str]) -> list[str]:
-    """Sentences about who handed in no notebook."""
-    return [f"{who[:100]} handed in no notebook." for key, who in everybody.items() if key not in with_notebook]
+    @property
+    def entries(self) -> list[Entry]:
+        """Those that the format has recognised and that may hold a notebook."""
+        return [claim.entry for claim in self.claims if claim.entry.is_work] + [
+            entry for entry in self.aside if entry.is_work
+        ]

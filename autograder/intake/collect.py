@@ -1,47 +1,44 @@
-"""Takes in what was handed in: a folder or a zip with a folder for each student, into `build/submitted`.
+"""Takes in what was handed in: a folder or a zip with something of each student's, into `build/submitted`.
 
 Of each student only the lab's notebook is taken, as bytes, and what nbgrader's exchange puts beside it. Names are
 checked, links are not followed, nothing is unpacked to a place that a name in a zip could choose. What is not taken is
-said, and costs nobody else anything.
+said, and costs nobody else anything. Where somebody would be lost or replaced, nothing is taken in until a person has
+said that this is right.
 """
 
 from __future__ import annotations
 
 import contextlib
-import hashlib
-import os
 import unicodedata
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from autograder.core.errors import KitError
 from autograder.core.files import read_plain, write_beside
 from autograder.course.paths import CoursePaths
-from autograder.intake.claims import Claim
-from autograder.intake.formats import recognise
-from autograder.intake.latest import latest
-from autograder.intake.members import members
-from autograder.intake.plain_class import HandedIn, plain_class
-from autograder.intake.record import Taken, keep_class
+from autograder.intake.asked import Accepted
+from autograder.intake.choosing import Chosen, beside, choose, read
+from autograder.intake.entries import Entry, NotUnderstoodError
+from autograder.intake.formats import PLAIN
+from autograder.intake.members import is_notebook
+from autograder.intake.naming import Student, file_name, named
+from autograder.intake.objections import Gone, count, gone, some, stop
+from autograder.intake.reading import Known, Reading, read_class
+from autograder.intake.record import Taken, keep_class, known_persons
+from autograder.intake.record import read_class as taken_before
 from autograder.intake.roster import FILE_NAME, Roster, read_roster
 from autograder.submission import exchange_secret, timestamp
 from autograder.submission.notebook_file import NOTEBOOK_BYTES
 
-_NOT_FIRST = " .@+-,()"
-"""To a shell, a spreadsheet or a listing these mean something at the beginning of a name."""
-_NOT_LAST = " ."
-_NAME_BYTES = 120
-"""A longer name is shortened: a gradebook takes 128 characters, a file's name 255 bytes with what is put around it."""
-
-
-_CLOSED = """\
+CLOSED = """\
 # Here lie submissions under the names that nbgrader looks for. Without this file, nbgrader started in this folder
 # would take it for a course of its own, and execute them.
 import sys
 
 sys.exit("This folder is not a course: start nbgrader in the folder above it. Nothing was executed.")
 """
+"""nbgrader's configuration in the folder of what was taken in."""
 
 
 @dataclass
@@ -49,147 +46,216 @@ class Collected:
     """What was taken in."""
 
     format: str = ""
-    """The learning platform that the submissions came from; empty for a folder for each student."""
+    """The learning platform that the submissions came from; empty for a class that none gave out."""
+    around: tuple[str, ...] = ()
+    """The folders and zips in the source that lie around the class."""
     notebooks: dict[str, Path] = field(default_factory=dict)
     """The notebook under `build/submitted`, by student; an empty file where nothing was handed in."""
     refused: list[str] = field(default_factory=list)
     """What was left out, and why, as sentences."""
     notes: list[str] = field(default_factory=list)
     """What replaced what, who was late, and who has another name here, as sentences."""
+    files: int = 0
+    """How many were seen."""
+    students: int = 0
+    """Whose they are."""
+    unused: list[str] = field(default_factory=list)
+    """Notebooks that do not count and need not, each with the reason, in a few words."""
+    companions: int = 0
+    """Files of students that are no notebooks."""
+
+    @property
+    def line(self) -> str:
+        """How many files were seen, how many students they are, and which files were not used and why."""
+        given = f", as {self.format} gives them out" if self.format else ""
+        inside = f", inside {'/'.join(self.around)[:100]!r}" if self.around else ""
+        told = f"{count(self.files, 'file')} of {count(self.students, 'student')}{given}{inside}."
+        unused = [*self.unused]
+        if self.companions:
+            unused.append(
+                f"{count(self.companions, 'file')} that {'is' if self.companions == 1 else 'are'} no notebook"
+            )
+        if unused:
+            told += f" Not used: {some(unused, '; ')}."
+        if self.refused:
+            told += f" LEFT OUT: {some([one.removesuffix('.') for one in self.refused], '; ')}."
+        return told if unused or self.refused else f"{told} All are used."
 
 
-def collect(source: Path, lab: str, root: Path) -> Collected:
+def collect(
+    source: Path, lab: str, root: Path, format_name: str = "", accepted: Collection[Accepted] = ()
+) -> Collected:
     """Take in a class.
 
     Args:
-        source: a folder or a zip, as a learning platform gives it out (`formats`), or with `<student>/<lab>.ipynb` or
-            `<student>/<lab>/<lab>.ipynb`; one more folder around them does no harm.
+        source: a folder or a zip, as a learning platform gives it out (`formats`), or with something of each student's
+            under the student's name; folders and zips around all of them do no harm.
         lab: to take.
         root: of the course. A file `roster.csv` there joins the platforms' names to those of the gradebook.
+        format_name: as what to read it; empty: as what it is.
+        accepted: what somebody has said to be right.
 
     Raises:
-        KitError: there is nothing to take in.
+        KitError: there is nothing to take in, or it can be read in two ways, or somebody would be lost or replaced. In
+            each case nothing is changed.
     """
-    collected = Collected()
-    paths = CoursePaths(root)
     roster = read_roster(root / FILE_NAME) if (root / FILE_NAME).is_file() else None
-    found = _of_platform(source, lab, roster, collected)
-    if found is None:
-        found = plain_class(source, lab, collected.refused)
-        if roster is not None:
-            found = _by_roster(found, roster, collected)
-    if found and not (paths.build / "nbgrader_config.py").is_file():
-        write_beside(paths.build / "nbgrader_config.py", _CLOSED)
-    owners: dict[str, str] = {}
-    taken: dict[str, Taken] = {}
-    for folder, handed_in in sorted(found.items(), key=lambda item: item[0]):
-        student = _student(folder)
-        if not student:
-            collected.refused.append("A submission without a student's name was left out.")
-            continue
-        if student in owners:
-            collected.refused.append(_twice(owners[student], folder))
-            continue
-        owners[student] = folder
-        if student != unicodedata.normalize("NFC", folder):
-            collected.notes.append(f"{folder[:80]!r} cannot be a file's name here; the student is called {student!r}.")
-        path = paths.submitted_notebook(student, lab)
-        # An unchanged file keeps its time: nbgrader and people can see that nothing new was handed in.
-        if _read(paths.submitted, [student, lab, path.name]) != handed_in.notebook:
-            _make_room(paths.submitted, student, lab)
-            write_beside(path, handed_in.notebook)
-        said = timestamp.moment(handed_in.timestamp) if handed_in.timestamp else ""
-        if said is None:
-            collected.refused.append(f"{timestamp.FILE_NAME} of {student} is no date and time; it was left out.")
-        _keep(paths.submitted, [student, lab, timestamp.FILE_NAME], said or "")
-        _keep(paths.submitted, [student, lab, exchange_secret.FILE_NAME], handed_in.secret)
-        collected.notebooks[student] = path
-        taken[student] = Taken(
-            source=str(source.resolve()), file=handed_in.file, owner=dict(handed_in.owner), late=handed_in.late
-        )
-    if not collected.notebooks:
+    before = taken_before(root, lab)
+    reading = read_class(source, lab, format_name, _known(roster, before))
+    recognised = reading.recognised
+    students = named(recognised.claims, roster, known_persons(root, lab))
+    missing = gone(source, students, roster, before)
+    stop(source, students, reading, missing.lost, before, accepted)
+    collected = Collected(_title(reading), reading.around, notes=list(reading.notes))
+    collected.refused += [f"{sentence} It was left out." for sentence in recognised.strange]
+    handed_in = {
+        student.name: (student, *found)
+        for student in _one_each(students, reading, collected)
+        if (found := _handed_in(student, lab, reading, collected)) is not None
+    }
+    collected.students = len({id(student.claims[0]) for student in students})
+    collected.files = len(recognised.strange) + sum(
+        _number_of_files(entry) for entry in {claim.entry: None for claim in recognised.claims}
+    )
+    if not handed_in:
         why = f" {collected.refused[0]}" if collected.refused else ""
         raise KitError(
             f"There are no submissions in {source}.{why}", f"Each student needs a folder that holds {lab}.ipynb."
         )
-    collected.notes += keep_class(root, lab, source, taken, complete=not collected.refused)
+    paths = CoursePaths(root)
+    if not (paths.build / "nbgrader_config.py").is_file():
+        write_beside(paths.build / "nbgrader_config.py", CLOSED)
+    taken: dict[str, Taken] = {}
+    for name, (student, chosen, notebook) in handed_in.items():
+        collected.notebooks[name] = _write(paths, name, lab, chosen, notebook, collected)
+        claim = chosen.claim
+        platform = reading.format is not PLAIN and not claim.by_hand
+        taken[name] = Taken(
+            source=str(source.resolve()),
+            around="/".join(reading.around),
+            file="/".join(chosen.member.path) if platform and chosen.member is not None else "",
+            owner=dict(student.claims[0].owner) if platform else {},
+            late=claim.late,
+        )
+    keep_class(root, lab, taken, {**missing.lost, **missing.renamed})
+    collected.notes += _farewells(missing, before)
     return collected
 
 
-def _of_platform(source: Path, lab: str, roster: Roster | None, collected: Collected) -> dict[str, HandedIn] | None:
-    """What was handed in by student, if the source is what a learning platform gives out; None if not."""
+def _title(reading: Reading) -> str:
+    claims = reading.recognised.claims
+    flat = reading.format is PLAIN and claims and all(is_notebook(claim.entry.name) for claim in claims)
+    return "a folder of files" if flat else reading.format.title
+
+
+def _number_of_files(entry: Entry) -> int:
     try:
-        files = members(source)
-    except Exception:  # a damaged zip: the plain way says what is wrong with it
-        return None
-    recognised = recognise(files, lab)
-    if recognised is None:
-        return None
-    collected.format = recognised.format
-    collected.refused += [f"{sentence} It was left out." for sentence in recognised.strange]
-    by_student: dict[str, list[Claim]] = {}
-    for claim in recognised.claims:
-        student = roster.student(claim.owner) if roster is not None else _called(claim, recognised.claims)
-        if student is None:
-            who = ", ".join(claim.owner.values())[:100]
+        return len(entry.files)
+    except NotUnderstoodError:  # it is a file that cannot be looked into
+        return 1
+
+
+def _known(roster: Roster | None, before: Mapping[str, Taken]) -> Known:
+    def is_student(name: str) -> bool:
+        ways = dict.fromkeys(("id", "email", "name", "github"), name)
+        return name in before or (roster is not None and roster.student(ways) is not None)
+
+    return Known(is_student, roster is not None, {taken.around for taken in before.values()} if before else None)
+
+
+def _one_each(students: Sequence[Student], reading: Reading, collected: Collected) -> list[Student]:
+    """The students under the names that they have here, each once; what stands in the way of that has been accepted."""
+    found: dict[str, Student] = {}
+    for student in students:
+        name = file_name(student.name)
+        here = Student(name, student.claims)
+        if not name:
+            collected.refused.append("A submission without a student's name was left out.")
+        elif not student.listed and reading.format is not PLAIN and not student.claims[0].by_hand:
+            who = ", ".join(student.claims[0].owner.values())[:100]
             collected.refused.append(f"{who!r} is no student of the roster, or more than one; it was left out.")
+        elif name in found:
+            # What somebody has added beside a platform's files is the later one.
+            kept, left = (here, found[name]) if student.claims[0].by_hand else (found[name], here)
+            one, other = (given.claims[0].entry.name[:80] for given in (kept, left))
+            collected.refused.append(f"{one!r} and {other!r} mean the same student; the second was left out.")
+            found[name] = kept
         else:
-            by_student.setdefault(student, []).append(claim)
-    found: dict[str, HandedIn] = {}
-    for student, claims in by_student.items():
-        last = latest(claims, lab)
-        if last is None:
-            names = " and ".join(sorted(repr(claim.member.name[:100]) for claim in claims)[:2])
-            collected.refused.append(f"{student} handed in {names}, none called {lab}.ipynb; it was left out.")
-            continue
-        try:
-            content = last.member.read(NOTEBOOK_BYTES + 1)
-        except Exception as error:  # each way of packing fails in its own way; the class goes on
-            collected.refused.append(
-                f"{last.member.name[:100]!r} of {student} cannot be read ({error}); it was left out."
-            )
-            continue
-        if not content.strip():  # what an upload that failed leaves behind
-            collected.refused.append(f"{last.member.name[:100]!r} of {student} is an empty file; it was left out.")
-            continue
-        found[student] = HandedIn(
-            content, last.handed_in.encode(), last.secret, "/".join(last.member.path), last.owner, last.late
+            found[name] = here
+            if not student.listed:
+                collected.notes.append(f"{name[:100]!r} is no student of the roster, and keeps this name.")
+            if name != unicodedata.normalize("NFC", student.name):
+                collected.notes.append(
+                    f"{student.name[:80]!r} cannot be a file's name here; the student is called {name!r}."
+                )
+    return [found[name] for name in sorted(found)]
+
+
+def _handed_in(student: Student, lab: str, reading: Reading, collected: Collected) -> tuple[Chosen, bytes] | None:
+    """What of a student's counts, and its bytes; None if nobody can say, which is told."""
+    who = student.name[:80]
+    try:
+        chosen = choose(student.claims, lab)
+        notebook = read(chosen.member) if chosen.member is not None else b""
+    except NotUnderstoodError as reason:
+        collected.refused.append(f"{who!r} {reason}; it was left out.")
+        return None
+    collected.companions += chosen.companions
+    if chosen.member is None:
+        if reading.format is not PLAIN:
+            collected.refused.append(f"{who!r} handed in no notebook; it was left out.")
+            return None
+        return chosen, notebook
+    for other in chosen.doubtful:
+        with contextlib.suppress(Exception):  # each way of packing fails in its own way
+            if other.read(NOTEBOOK_BYTES + 1) == notebook:
+                collected.unused.append(f"{'/'.join(other.path)[-200:]!r} (the same as {chosen.member.name[:80]!r})")
+                continue
+        collected.refused.append(
+            f"{'/'.join(other.path)[-200:]!r} is a copy of the notebook of {who!r} with other contents;"
+            f" {chosen.member.name[:80]!r} counts, and the copy was left out."
         )
-        for claim in claims:
-            if claim is not last:
-                collected.notes.append(f"{student}: {last.member.name[:100]!r} replaces {claim.member.name[:100]!r}.")
-        if last.late:
-            collected.notes.append(f"{student}: {recognised.format} has marked it as late.")
-    return found
+    for other in chosen.others:
+        collected.unused.append(f"{'/'.join(other.path)[-200:]!r} ({chosen.member.name[:80]!r} of {who!r} counts)")
+    for claim in chosen.replaced:
+        names = f"{chosen.claim.entry.name[:100]!r} replaces {claim.entry.name[:100]!r}"
+        collected.notes.append(f"{who}: {names}.")
+        collected.unused.append(f"{claim.entry.name[:100]!r} (a later one of {who!r} counts)")
+    if chosen.claim.late:
+        collected.notes.append(f"{who}: {reading.format.title} has marked it as late.")
+    return chosen, notebook
 
 
-def _called(claim: Claim, claims: Sequence[Claim]) -> str:
-    """The name that a platform gives a student; with its number for them where two have one name."""
-    owner = claim.owner
-    name = next((owner[kind] for kind in ("id", "github", "name", "canvas", "email") if owner.get(kind)), "")
-    number = owner.get("canvas_id") or owner.get("moodle_id") or ""
-    others = (other.owner for other in claims if other.owner != owner)
-    return f"{name}_{number}" if number and any(name in other.values() for other in others) else name
+def _write(paths: CoursePaths, student: str, lab: str, chosen: Chosen, notebook: bytes, collected: Collected) -> Path:
+    """Write a student's notebook, and what nbgrader's exchange put beside it; return the notebook's place."""
+    path = paths.submitted_notebook(student, lab)
+    # An unchanged file keeps its time: nbgrader and people can see that nothing new was handed in.
+    if _read(paths.submitted, [student, lab, path.name]) != notebook:
+        _make_room(paths.submitted, student, lab)
+        write_beside(path, notebook)
+    stamp = chosen.claim.handed_in.encode() or beside(chosen, timestamp.FILE_NAME, timestamp.MOST_BYTES)
+    said = timestamp.moment(stamp) if stamp else ""
+    if said is None:
+        collected.refused.append(f"{timestamp.FILE_NAME} of {student} is no date and time; it was left out.")
+    _keep(paths.submitted, [student, lab, timestamp.FILE_NAME], said or "")
+    secret = exchange_secret.secret(beside(chosen, exchange_secret.FILE_NAME, exchange_secret.MOST_BYTES))
+    _keep(paths.submitted, [student, lab, exchange_secret.FILE_NAME], secret)
+    return path
 
 
-def _by_roster(found: dict[str, HandedIn], roster: Roster, collected: Collected) -> dict[str, HandedIn]:
-    """A folder for each student: their names as the roster has them. Those that it does not have keep theirs."""
-    named: dict[str, HandedIn] = {}
-    folders: dict[str, str] = {}
-    for folder, handed_in in sorted(found.items(), key=lambda item: item[0]):
-        student = roster.student({"id": folder, "email": folder, "name": folder, "github": folder})
-        name = student or folder
-        if name in named:
-            collected.refused.append(_twice(folders[name], folder))
-            continue
-        if student is None:
-            collected.notes.append(f"{folder[:100]!r} is no student of the roster, and keeps this name.")
-        named[name], folders[name] = handed_in, folder
-    return named
-
-
-def _twice(folder: str, other: str) -> str:
-    return f"The folders {folder[:80]!r} and {other[:80]!r} mean the same student; the second was left out."
+def _farewells(missing: Gone, before: Mapping[str, Taken]) -> list[str]:
+    """Sentences about who has left the class."""
+    left = [
+        f"{student} is not among the submissions any more, and has left grades.csv, the class page and the exports."
+        " The gradebook keeps the grades."
+        for student in missing.lost
+        if student in before
+    ]
+    return left + [
+        f"{student} has another name now, and has left grades.csv, the class page and the exports. Points that somebody"
+        " gave by hand stay in the gradebook under the old name."
+        for student in missing.renamed
+    ]
 
 
 def _keep(submitted: Path, parts: Sequence[str], text: str) -> None:
@@ -199,30 +265,6 @@ def _keep(submitted: Path, parts: Sequence[str], text: str) -> None:
         path.unlink(missing_ok=True)
     elif _read(submitted, parts) != text.encode():
         write_beside(path, text)
-
-
-def _student(given: str) -> str:
-    """The name by which a student is known here, which files and pages can have; empty if nothing was given.
-
-    Accents are joined to their letters: a Mac writes `José` with two characters where other systems write one. A name
-    that is long, or has characters that would mean something to a program, is made different from all others by a
-    digest of the whole.
-    """
-    name = unicodedata.normalize("NFC", given)
-    plain = "".join(character if _in_names(character) else "_" for character in name)
-    if plain[:1] in _NOT_FIRST:
-        plain = f"_{plain[1:]}"
-    if plain[-1:] in _NOT_LAST:
-        plain = f"{plain[:-1]}_"
-    if not name or (plain == name and len(os.fsencode(name)) <= _NAME_BYTES):
-        return name
-    digest = hashlib.sha256(name.encode("utf-8", "surrogatepass")).hexdigest()[:8]
-    return f"{plain.encode()[: _NAME_BYTES - 9].decode('utf-8', 'ignore').rstrip(_NOT_LAST)}-{digest}"
-
-
-def _in_names(character: str) -> bool:
-    """Letters and digits of any script with their marks, and what stands between the parts of names."""
-    return unicodedata.category(character)[0] in "LMN" or character in "_ .@+-,'\u2018\u2019()"
 
 
 def _read(folder: Path, parts: Sequence[str]) -> bytes | None:

@@ -1,188 +1,253 @@
 """The formats in which learning platforms hand out submissions, each told by the names that only it gives.
 
-A format reads the path of each file. Where it finds a notebook it says whose it is, in the words of the platform, and
-which of several submissions of one student is the last. Sources: the platforms' own documentation of their downloads.
+A format reads the names at the level of the class, and says of each that has its form whose it is, in the words of the
+platform. It never looks at a name inside a student's folder or zip. Sources: the platforms' own documentation of their
+downloads.
 """
 
 from __future__ import annotations
 
+import contextlib
 import re
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 
 import yaml
 
-from autograder.intake import nbgrader_folders
-from autograder.intake.claims import Claim, Recognised, nothing_from
-from autograder.intake.members import Member, is_notebook
+from autograder.intake.asked import FormatName
+from autograder.intake.choosing import is_of_lab
+from autograder.intake.claims import Claim, Recognised
+from autograder.intake.entries import Entry, Kind, NotUnderstoodError
+from autograder.intake.members import Member, is_hidden, is_notebook
 from autograder.intake.roster import FILE_NAME as ROSTER
 from autograder.submission.timestamp import moment
 
+_METADATA = "submission_metadata.yml"
 _METADATA_BYTES = 8 * 1024 * 1024
+_TEXT_BYTES = 2000
 
 
-_CANVAS = re.compile(r"(?P<name>[^_]+)(?P<late>_LATE)?_(?P<user>\d+)_(?P<number>\d+)_(?P<file>.+)", re.IGNORECASE)
+@dataclass(frozen=True)
+class Format:
+    """One form of a class."""
+
+    name: FormatName
+    title: str
+    """Who gives it out."""
+    read: Callable[[Sequence[Entry], str], Recognised]
+    """Says of the entries of a class, for a lab, whose they are."""
+    around: re.Pattern[str] = re.compile(r"(?!)")
+    """Names of folders that only this platform puts around a class."""
+    certain: bool = True
+    """Nobody else gives such names; otherwise most of a class must have them."""
+
+
+# What a platform writes comes first in a name, and what the student called the file last: what has the form once more
+# is the student's.
+_CANVAS = re.compile(
+    r"(?P<name>.+?)(?P<late>_LATE)?_(?P<user>\d+)_((?P<number>\d+)_(?P<file>.+)|(text|link)\.html)", re.IGNORECASE
+)
 """`doejane_LATE_12345_678910_lab2_executors-1.ipynb`: who, the user, the upload, and the file as it was called."""
-_MOODLE = re.compile(r"(?P<name>.+)_(?P<id>\d+)_assignsubmission_[a-z]+(?:_(?P<file>.*))?")
+_MOODLE = re.compile(r"(?P<name>.+?)_(?P<id>\d+)_assignsubmission_[a-z]+(?:_(?P<file>.*)|\.html)?")
+_MOODLE_FOLDER = re.compile(r"(?P<name>.+)_(?P<id>\d+)_assignsubmission_[a-z]+_?")
 """The folder `Jane Doe_12345_assignsubmission_file_`, or the beginning of a file's name: Moodle offers both."""
-_BLACKBOARD = re.compile(r"(?P<head>.+?_(?P<user>[^_]+))_attempt_(?P<when>\d{4}(?:-\d\d){5})(?:_(?P<file>.+)|\.txt)")
+_MOODLE_ID = re.compile(r"_(\d+)_assignsubmission_[a-z]+")
+_BLACKBOARD = re.compile(r"(?P<head>.+?_(?P<user>[^_]+_*?))_attempt_(?P<when>\d{4}(?:-\d\d){5})(?:_(?P<file>.+)|\.txt)")
 """`Lab 2_jdoe_attempt_2026-11-20-18-30-00_lab2_executors.ipynb`, and a text with the same beginning."""
+_BLACKBOARD_NAME = re.compile(r"Name:.*\((?P<user>[^()]+)\)\s*")
 _SUBMISSION = re.compile(r"submission_(?P<number>\d+)")
 """Gradescope's folders; whose they are stands in `submission_metadata.yml`."""
+_INBOUND = re.compile(r"(?P<student>.+?)\+(?P<lab>[^+]+)\+(?P<when>\d{4}-\d\d-\d\d \d\d:\d\d:\d\d(\.\d+)?[^+]*)(\+.+)?")
+"""nbgrader's exchange: `inbound/jane+lab2_executors+2026-11-20 18:30:00.123456 UTC+Hc2x`. What stands behind the time
+keeps others from guessing the folder's name, and may be switched off; it says nothing about the student."""
+_OF_NBGRADER = {"source", "release", "submitted", "autograded", "feedback", "solutions", "labs", "build", "gradebook"}
+"""Folders of a course beside nbgrader's folder of submissions."""
 
 
-def _given_out(member: Member, form: re.Pattern[str]) -> re.Match[str] | None:
-    """What a platform calls a file, or else a zip that it lies in; None if no name is of the form."""
-    return next(filter(None, map(form.fullmatch, (member.name, *member.zips))), None)
+def _forms(entries: Sequence[Entry], form: re.Pattern[str]) -> list[tuple[Entry, re.Match[str]]]:
+    """The entries whose names are of a form; a zip's and a folder's name counts without the ending."""
+    named = ((entry, entry.stem if entry.kind is Kind.ZIP else entry.name) for entry in entries)
+    return [(entry, match) for entry, name in named if entry.kind is not Kind.LINK and (match := form.fullmatch(name))]
 
 
-def _called(member: Member, match: re.Match[str]) -> str:
-    return match["file"] or member.name if match.string == member.name else member.name
-
-
-def canvas(files: Sequence[Member], lab: str) -> Recognised:
+def canvas(entries: Sequence[Entry], lab: str) -> Recognised:
     """Canvas, "Download submissions": one flat folder."""
-    found = Recognised("Canvas")
-    with_notebook: set[str] = set()
-    others: dict[str, str] = {}
-    for member in files:
-        match = _given_out(member, _CANVAS)
-        if match and is_notebook(member.name):
-            with_notebook.add(match.string)
-            owner = {"canvas": match["name"], "canvas_id": match["user"]}
-            turn = (int(match["number"]), member.name == f"{lab}.ipynb", member.path)
-            found.claims.append(Claim(member, owner, _called(member, match), turn=turn, late=bool(match["late"])))
-        elif match:
-            others.setdefault(match.string, match["name"])
-    found.strange += _no_notebooks(others, with_notebook)
+    found = Recognised()
+    for entry, match in _forms(entries, _CANVAS):
+        owner = {"canvas": match["name"], "canvas_id": match["user"]}
+        called = match["file"] or entry.name
+        turn = (int(match["number"] or 0), called == f"{lab}.ipynb", entry.name)
+        found.claims.append(Claim(entry, owner, called, turn=turn, late=bool(match["late"])))
     return found
 
 
-def _no_notebooks(others: Mapping[str, str], with_notebook: set[str]) -> list[str]:
-    """Sentences about what was uploaded, each with its student, and is no notebook, nor a zip that holds one."""
-    return [f"{given[:100]!r} of {who} is no notebook." for given, who in others.items() if given not in with_notebook]
-
-
-def moodle(files: Sequence[Member], lab: str) -> Recognised:
+def moodle(entries: Sequence[Entry], lab: str) -> Recognised:
     """Moodle, "Download all submissions": a folder for each student and kind of submission, or files with its name."""
-    found = Recognised("Moodle")
-    everybody: dict[str, str] = {}
-    for member in files:
-        match = next(filter(None, map(_MOODLE.fullmatch, member.path)), None)
-        if match:
-            everybody.setdefault(match["id"], match["name"])
-        if match and is_notebook(member.name):
-            owner = {"name": match["name"], "moodle_id": match["id"]}
-            called = _called(member, match)
-            found.claims.append(Claim(member, owner, called, turn=(called == f"{lab}.ipynb", member.path)))
-    found.strange += nothing_from(everybody, {claim.owner["moodle_id"] for claim in found.claims})
+    found = Recognised()
+    folders = _forms([entry for entry in entries if entry.kind is Kind.FOLDER], _MOODLE_FOLDER)
+    files = _forms([entry for entry in entries if entry.kind is not Kind.FOLDER], _MOODLE)
+    for entry, match in (*folders, *files):
+        if entry.kind is not Kind.FOLDER and len(set(_MOODLE_ID.findall(match.string))) > 1:
+            found.strange.append(f"{entry.name[:200]!r} can be read as the name of two students' files.")
+            found.aside.append(entry)
+            continue
+        owner = {"name": match["name"], "moodle_id": match["id"]}
+        called = match["file"] or "" if entry.kind is not Kind.FOLDER else ""
+        found.claims.append(Claim(entry, owner, called, turn=(called == f"{lab}.ipynb", entry.name)))
     return found
 
 
-def blackboard(files: Sequence[Member], lab: str) -> Recognised:
+def blackboard(entries: Sequence[Entry], lab: str) -> Recognised:
     """Blackboard, "Assignment file download": one flat folder, with a text for each attempt."""
-    found = Recognised("Blackboard")
-    matches = [(member, match) for member in files if (match := _given_out(member, _BLACKBOARD))]
+    found = Recognised()
+    matches = _forms(entries, _BLACKBOARD)
     heads = list({match["head"]: None for _, match in matches})
     start = len(_common_start(heads, "_")) if len(heads) > 1 else 0  # the assignment; a user's name may have a `_`, too
-    with_notebook: set[str] = set()
-    everybody: dict[str, str] = {}
-    others: dict[str, str] = {}
-    for member, match in matches:
-        user = match["head"][start:] if start else match["user"]
-        everybody[user] = user
-        if is_notebook(member.name):
-            with_notebook |= {match.string, user}
-            numbers = match["when"].split("-")
-            when = f"{'-'.join(numbers[:3])} {':'.join(numbers[3:])}"
-            turn = (member.name == f"{lab}.ipynb", member.path)
-            found.claims.append(Claim(member, {"id": user}, _called(member, match), (match["when"],), turn, when))
-        elif match["file"]:
-            others.setdefault(match.string, user)
-    found.strange += _no_notebooks(others, with_notebook)
-    found.strange += nothing_from(everybody, with_notebook | set(others.values()))
+    users = {match["head"]: user for entry, match in matches if (user := _blackboard_user(entry, match))}
+    for entry, match in matches:
+        user = users.get(match["head"]) or (match["head"][start:] if start else match["user"])
+        numbers = match["when"].split("-")
+        when = f"{'-'.join(numbers[:3])} {':'.join(numbers[3:])}"
+        called = match["file"] or ""
+        turn = (called == f"{lab}.ipynb", entry.name)
+        found.claims.append(Claim(entry, {"id": user}, called, (match["when"],), turn, when))
     return found
 
 
-def gradescope(files: Sequence[Member], lab: str) -> Recognised:
+def _blackboard_user(entry: Entry, match: re.Match[str]) -> str:
+    """The user name in the text that Blackboard writes for an attempt: `Name: Jane Doe (jdoe)`; empty if not there."""
+    if match["file"] or entry.kind is not Kind.OTHER:
+        return ""
+    with contextlib.suppress(Exception):  # a damaged zip raises many kinds
+        first = entry.files[0].read(_TEXT_BYTES).decode("utf-8-sig", "replace").splitlines()[:1]
+        named = _BLACKBOARD_NAME.fullmatch(first[0]) if first else None
+        if named and match["head"].endswith(f"_{named['user']}"):
+            return named["user"]
+    return ""
+
+
+def gradescope(entries: Sequence[Entry], lab: str) -> Recognised:
     """Gradescope, "Export submissions": folders with numbers, and a file that says whose they are."""
-    found = Recognised("Gradescope")
-    metadata = next((member for member in files if member.name == "submission_metadata.yml"), None)
+    found = Recognised()
+    metadata = next((entry for entry in entries if entry.name == _METADATA and entry.kind is Kind.OTHER), None)
     if metadata is None:
         return found
+    found.aside.append(metadata)
     told = _gradescope_metadata(metadata)
-    with_notebook: set[str] = set()
-    for member in files:
-        folder = next((part for part in member.path[:-1] if _SUBMISSION.fullmatch(part)), "")
-        if folder in told and is_notebook(member.name):
-            with_notebook.add(folder)
-            owners, when = told[folder]
-            attempt = (when, int(folder.removeprefix("submission_")))
-            turn, handed_in = (member.name == f"{lab}.ipynb", member.path), moment(when.encode()) or ""
-            found.claims += [Claim(member, owner, member.name, attempt, turn, handed_in) for owner in owners]
-        elif folder:
-            told.setdefault(folder, ([], ""))
-    names = {folder: ", ".join(next(iter(owner.values())) for owner in told[folder][0]) or folder for folder in told}
-    found.strange += [
-        f"{name} handed in no notebook." if told[folder][0] else f"{folder} is of nobody in {metadata.name}."
-        for folder, name in names.items() if folder not in with_notebook
-    ]  # fmt: skip
-    return found
+    if told is None:
+        found.strange.append(f"{_METADATA} cannot be read, and it alone says whose the folders are.")
+    for entry, match in _forms(entries, _SUBMISSION):
+        owners, when = (told or {}).get(entry.stem, ([], ""))
+        if not owners:
+            found.strange.append(f"{entry.name} is of nobody in {_METADATA}.")
+            found.aside.append(entry)
+        attempt = (when, int(match["number"]))
+        found.claims += [Claim(entry, owner, "", attempt, (), moment(when.encode()) or "") for owner in owners]
+    return found if len(found.aside) > 1 or found.claims else Recognised()
 
 
-def _gradescope_metadata(member: Member) -> dict[str, tuple[list[dict[str, str]], str]]:
-    """Of each folder, who handed it in, which may be a group, and when."""
+def _gradescope_metadata(entry: Entry) -> dict[str, tuple[list[dict[str, str]], str]] | None:
+    """Of each folder, who handed it in, which may be a group, and when; None if the file cannot be read."""
     try:
         # Ruby writes its keys as symbols, `:name:`, which YAML takes for texts that begin with a colon.
-        read = yaml.safe_load(member.read(_METADATA_BYTES))
+        read = yaml.safe_load(entry.files[0].read(_METADATA_BYTES))
     except Exception:  # what PyYAML does not understand raises many kinds
-        return {}
+        return None
     told: dict[str, tuple[list[dict[str, str]], str]] = {}
-    for folder, entry in (read if isinstance(read, dict) else {}).items():
-        who = entry.get(":submitters") if isinstance(entry, dict) else None
+    for folder, line in (read if isinstance(read, dict) else {}).items():
+        who = line.get(":submitters") if isinstance(line, dict) else None
         if isinstance(who, list):
             kinds = {":name": "name", ":email": "email", ":sid": "id"}
             group = [{kind: str(one[key]) for key, kind in kinds.items() if one.get(key)}
                      for one in who if isinstance(one, dict)]  # fmt: skip
-            told[str(folder)] = ([owner for owner in group if owner], str(entry.get(":created_at", "")))
+            told[str(folder)] = ([owner for owner in group if owner], str(line.get(":created_at", "")))
     return told
 
 
-def classroom(files: Sequence[Member], lab: str) -> Recognised:
+def classroom(entries: Sequence[Entry], lab: str) -> Recognised:
     """GitHub Classroom: a repository for each student, whose name is that of the assignment and the student's."""
-    found = Recognised("GitHub Classroom")
-    where = [(member, member.path.index("labs")) for member in files
-             if "labs" in member.path[1:-1] and is_notebook(member.name)]  # fmt: skip
-    where = [(member, at) for member, at in where if member.path[at + 1 : -1] == (lab,)]
-    repositories = {member.path[:at]: member.path[at - 1] for member, at in where}
-    names = list(repositories.values())
-    start = _common_start(names, "-")
-    if len(set(names)) == len(names) > 1 and start:
-        for member, at in where:
-            turn = (member.name == f"{lab}.ipynb",)
-            found.claims.append(Claim(member, _github(member.path[at - 1], start), member.name, turn=turn))
-        folders = {path[:-1] for path in repositories}
-        others = {member.path[:at]: member.path[at - 1] for member in files
-                  for at in range(1, len(member.path)) if member.path[: at - 1] in folders}  # fmt: skip
-        found.strange = [f"{name} holds no notebook of {lab}." for path, name in others.items()
-                         if path not in repositories and name.startswith(start)]  # fmt: skip
+    found = Recognised()
+    folders = [entry for entry in entries if entry.kind in (Kind.FOLDER, Kind.ZIP) and "-" in entry.stem]
+    with_lab = [entry for entry in folders if _has_labs(entry, lab)]
+    start = _common_start([entry.stem for entry in with_lab], "-")
+    if len(with_lab) < 2 or not start:
+        return found
+    for entry in folders:
+        if entry.stem.startswith(start):
+            owner = {"github": entry.stem[len(start) :], "repository": entry.stem}
+            found.claims.append(Claim(entry, owner))
     return found
 
 
-def _github(repository: str, start: str) -> dict[str, str]:
-    return {"github": repository[len(start) :], "repository": repository}
+def _has_labs(entry: Entry, lab: str) -> bool:
+    """Whether it is laid out as the repository that students get."""
+    with contextlib.suppress(NotUnderstoodError):
+        paths = [entry.below(member) for member in entry.files]
+        return any(len(path) == 3 and path[:2] == ("labs", lab) and is_notebook(path[2]) for path in paths)
+    return False
 
 
-def flat(files: Sequence[Member], lab: str) -> Recognised:
-    """A folder of notebooks named after the students."""
-    found = Recognised("a folder of files")
-    notebooks = [member for member in files if is_notebook(member.name)]
-    if all(len(member.path) == 1 for member in notebooks) and any(m.name != f"{lab}.ipynb" for m in notebooks):
-        for member in files:
-            if is_notebook(member.name) and member.name != f"{lab}.ipynb":
-                found.claims.append(Claim(member, {"id": member.name[: -len(".ipynb")].removeprefix(f"{lab}_")}))
-            elif member.name != ROSTER:
-                found.strange.append(f"{'/'.join(member.path)[:100]!r} is no student's notebook.")
+def exchange(entries: Sequence[Entry], lab: str) -> Recognised:
+    """nbgrader's exchange, before `collect`: the folder `inbound`."""
+    found = Recognised()
+    for entry, match in _forms([entry for entry in entries if entry.kind is Kind.FOLDER], _INBOUND):
+        if match["lab"] == lab:
+            found.claims.append(Claim(entry, {"id": match["student"]}, "", (match["when"],), (), match["when"]))
+        else:
+            found.aside.append(entry)
+    return found if found.claims else Recognised()
+
+
+def submitted(entries: Sequence[Entry], lab: str) -> Recognised:
+    """nbgrader's `submitted` folder in a course: `submitted/STUDENT/LAB/LAB.ipynb`."""
+    found = Recognised()
+    folder = next((entry for entry in entries if entry.kind is Kind.FOLDER and entry.name == "submitted"), None)
+    if folder is None:
+        return found
+    for entry in folder.inside:
+        inside = {path[0] for member in _files(entry) if len(path := entry.below(member)) > 1}
+        if entry.kind is Kind.FOLDER and lab in inside:
+            found.claims.append(Claim(entry, {"id": entry.name}, only=lab))
+        elif entry.kind in (Kind.FOLDER, Kind.LINK):
+            found.aside.append(entry)
+    if found.claims:
+        found.aside += [folder, *(entry for entry in entries if entry.name in _OF_NBGRADER and entry is not folder)]
+    return found if found.claims else Recognised()
+
+
+def _files(entry: Entry) -> Sequence[Member]:
+    try:
+        return entry.files
+    except NotUnderstoodError:
+        return []
+
+
+def plain(entries: Sequence[Entry], lab: str) -> Recognised:
+    """No platform: a folder, a zip or a notebook for each student, with the student's name."""
+    found = Recognised()
+    for entry in entries:
+        student = owner_of(entry, lab)
+        if entry.kind is Kind.LINK:
+            found.strange.append(f"{entry.shown} is a link; links are not followed.")
+        elif is_hidden((entry.name,)):
+            if entry.is_work and entry.name != ".ipynb_checkpoints":
+                found.strange.append(f"{entry.name[:80]!r} is hidden: its name begins with a dot.")
+        elif student is not None:
+            found.claims.append(Claim(entry, {"id": student}, entry.name))
+        elif entry.is_work:
+            found.strange.append(f"Nothing says whose {entry.name[:80]!r} is: it is called as the lab is.")
+        elif entry.name != ROSTER:
+            found.strange.append(f"{entry.name[:80]!r} is no student's folder, notebook or zip.")
     return found
+
+
+def owner_of(entry: Entry, lab: str) -> str | None:
+    """Return the student after whom something in a class without a platform is named; None if it is nobody's."""
+    if entry.kind is Kind.FOLDER:
+        return entry.name
+    if entry.kind not in (Kind.ZIP, Kind.NOTEBOOK) or is_of_lab(entry.stem, lab):
+        return None
+    return entry.stem.removeprefix(f"{lab}_")
 
 
 def _common_start(names: Sequence[str], end: str) -> str:
@@ -194,18 +259,17 @@ def _common_start(names: Sequence[str], end: str) -> str:
     return start[: start.rfind(end) + 1]
 
 
-FORMATS: tuple[Callable[[Sequence[Member], str], Recognised], ...] = (
-    gradescope, nbgrader_folders.exchange, nbgrader_folders.submitted, moodle, blackboard, canvas, classroom,
-)  # fmt: skip
-"""Those whose names nobody else would give come first; it counts where two find the same number of students."""
-
-
-def recognise(files: Sequence[Member], lab: str) -> Recognised | None:
-    """Return what a format makes of the files; None if none fits: then it is a plain class.
-
-    Of several that fit, the one that finds most students counts: what a student packed may look like a format, too.
-    """
-    found = [read(files, lab) for read in FORMATS]
-    best = max(found, key=lambda one: len({tuple(claim.owner.items()) for claim in one.claims}))
-    best = best if best.claims else flat(files, lab)
-    return best if best.claims else None
+PLAIN = Format(FormatName.PLAIN, "", plain)
+PLATFORMS: Mapping[str, Format] = {
+    one.name: one
+    for one in (
+        Format(FormatName.GRADESCOPE, "Gradescope", gradescope, re.compile(r"assignment_\d+_export")),
+        Format(FormatName.EXCHANGE, "nbgrader's exchange", exchange, re.compile(r"inbound")),
+        Format(FormatName.SUBMITTED, "nbgrader's folder submitted", submitted),
+        Format(FormatName.MOODLE, "Moodle", moodle),
+        Format(FormatName.BLACKBOARD, "Blackboard", blackboard),
+        Format(FormatName.CANVAS, "Canvas", canvas),
+        Format(FormatName.CLASSROOM, "GitHub Classroom", classroom, re.compile(r".+-submissions(-.+)?"), certain=False),
+    )
+}
+"""Those that give names of their own."""

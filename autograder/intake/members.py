@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import io
 import os
 import stat
@@ -14,47 +15,34 @@ from pathlib import Path, PurePosixPath
 from autograder.core.files import read_plain
 
 MOST = 20_000
-"""More files than this are no class."""
-_DEPTH = 8
-"""Folders inside each other that are looked into; a wrapper, a repository and its folders are five."""
+"""More files than this are no student's work."""
+_DEPTH = 32
+"""Folders inside each other that are looked into."""
 _ZIP_BYTES = 64 * 1024 * 1024
 """The largest zip inside another, in bytes; one student's repository."""
 _ZIPS = 3
 """Zips inside each other that are looked into: a class in a folder's zip, a student's, and what they packed."""
-PACKERS = (".", "__MACOSX")
-"""What the names of folders and files begin with that a system or a packer made."""
+_OF_SYSTEMS = ("__MACOSX", ".git", ".DS_Store")
+"""Folders that a system or a program made, with nothing in them that somebody handed in."""
+
+
+class TooManyError(Exception):
+    """It holds more files than anybody's work."""
 
 
 @dataclass(frozen=True)
 class Member:
-    """One file."""
+    """One file, or a link or something else that cannot be read as one."""
 
     path: tuple[str, ...]
     """From the source on; a zip inside is a folder of its name without `.zip`."""
     read: Callable[[int], bytes]
     """At most so many bytes of it. Raises OSError, or what a damaged zip raises."""
-    zips: tuple[str, ...] = ()
-    """The names, without `.zip`, of the zips inside the source that it lies in, the outermost first."""
 
     @property
     def name(self) -> str:
         """The file's own name."""
         return self.path[-1]
-
-
-def members(source: Path) -> list[Member]:
-    """Return the files of a folder or zip; what cannot be read or looked into is left out.
-
-    Raises:
-        zipfile.BadZipFile: the source is a zip that cannot be read, or one of those errors that zipfile has besides.
-    """
-    found: list[Member] = []
-    listing = in_folder(source, ()) if source.is_dir() else in_zip(zipfile.ZipFile(source), [])
-    for member in listing:
-        if len(found) >= MOST:
-            break
-        found += unpacked(member) or [member]
-    return found[:MOST]
 
 
 def in_folder(source: Path, parts: tuple[str, ...]) -> Iterator[Member]:
@@ -63,21 +51,35 @@ def in_folder(source: Path, parts: tuple[str, ...]) -> Iterator[Member]:
     Args:
         source: from which paths count.
         parts: the folder's path in it.
+
+    Raises:
+        OSError: the folder cannot be looked into. One below it is then a file that cannot be read.
     """
-    folder = source.joinpath(*parts)
-    try:
-        entries = sorted(os.scandir(folder), key=lambda entry: entry.name)
-    except OSError:
-        return
-    for entry in entries:
+    for entry in sorted(os.scandir(source.joinpath(*parts)), key=lambda entry: entry.name):
         path = (*parts, entry.name)
-        if entry.name.startswith(PACKERS):
+        if is_unseen(entry.name):
             continue
-        if entry.is_dir(follow_symlinks=False):
-            if len(path) < _DEPTH:
+        if entry.is_dir(follow_symlinks=False) and len(path) < _DEPTH:
+            try:
                 yield from in_folder(source, path)
-        elif entry.is_file(follow_symlinks=False):
-            yield Member(path, lambda most, path=path: read_plain(source, path, most))  # type: ignore[misc]
+            except OSError as error:
+                yield Member(path, partial(_refuse, error))
+        elif not entry.is_dir(follow_symlinks=False):
+            yield Member(path, partial(read_plain, source, path))
+
+
+def _refuse(error: OSError, most: int) -> bytes:
+    raise OSError(error.errno or errno.EACCES, error.strerror)
+
+
+def is_unseen(name: str) -> bool:
+    """Whether a file or folder is none that somebody handed in: a system or a packer put it there."""
+    return name in _OF_SYSTEMS or name.startswith("._")
+
+
+def is_hidden(path: tuple[str, ...]) -> bool:
+    """Whether a listing would not show it, or what it lies in, such as a checkpoint of JupyterLab's."""
+    return any(part.startswith(".") for part in path)
 
 
 def in_zip(archive: zipfile.ZipFile, bad: list[str], above: tuple[str, ...] = ()) -> Iterator[Member]:
@@ -88,12 +90,21 @@ def in_zip(archive: zipfile.ZipFile, bad: list[str], above: tuple[str, ...] = ()
         bad: gets the names that lead nowhere in it, or out of it.
         above: the folders that the zip counts as being in.
     """
-    for info in archive.infolist()[:MOST]:
+    for info in archive.infolist():
         path = PurePosixPath(_name(info).replace("\\", "/"))
         if not path.parts or path.is_absolute() or ".." in path.parts or "\0" in info.orig_filename:
             bad.append(info.orig_filename)
-        elif not info.is_dir() and not any(part.startswith(PACKERS) for part in path.parts):
-            yield Member((*above, *path.parts), lambda most, info=info: _read(archive, info, most))  # type: ignore[misc]
+        elif not info.is_dir() and not any(is_unseen(part) for part in path.parts):
+            yield Member((*above, *path.parts), partial(_read, archive, info))
+
+
+def empty_folders(archive: zipfile.ZipFile) -> Iterator[tuple[str, ...]]:
+    """Give the paths of the folders that a zip names as such."""
+    for info in archive.infolist():
+        path = PurePosixPath(_name(info).replace("\\", "/"))
+        proper = path.parts and not path.is_absolute() and ".." not in path.parts and "\0" not in info.orig_filename
+        if proper and info.is_dir():
+            yield path.parts
 
 
 def _read(archive: zipfile.ZipFile, info: zipfile.ZipInfo, most: int) -> bytes:
@@ -123,38 +134,68 @@ def is_notebook(name: str) -> bool:
     return name.lower().endswith(".ipynb")
 
 
-def unpacked(member: Member) -> list[Member]:
-    """Return the files of a zip inside, and of zips in that; none if it is no zip, or too large.
+def looked_into(file: Member) -> list[Member]:
+    """Return a file, or what it holds if it is a zip that can be read.
+
+    Raises:
+        TooManyError: it holds more than anybody's work.
+    """
+    return _inner(file, file, _ZIPS)
+
+
+def unpacked(zipped: Member) -> list[Member]:
+    """Return the files of a zip, and of zips in it that can be read, which count as folders.
 
     What a zip holds is read out of it anew for each file that is wanted: large zips do not fill the memory.
+
+    Raises:
+        OSError, zipfile.BadZipFile: or what else a damaged zip raises.
+        TooManyError: it holds more than anybody's work.
     """
-    return _held(member, member, _ZIPS)
+    return _held(zipped, zipped, _ZIPS)
+
+
+def packed_in(zipped: Member) -> list[Member]:
+    """Return the files of a zip, among which other zips are files; raises as `unpacked`."""
+    above = (*zipped.path[:-1], zipped.name[: -len(".zip")])
+    files = enumerate(in_zip(_opened(zipped), [], above))
+    return [Member(file.path, partial(_read_again, zipped, above, number)) for number, file in files]
 
 
 def _held(zipped: Member, now: Member, depth: int) -> list[Member]:
     """The files of a zip, which is `now` in an archive that is open, and `zipped` when that is closed again."""
-    if not is_zip(zipped.name) or not depth:
-        return []
-    name = zipped.name[: -len(".zip")]
-    above = (*zipped.path[:-1], name)
-
-    def read_again(path: tuple[str, ...], most: int) -> bytes:
-        return next(again for again in in_zip(_opened(zipped), [], above) if again.path == path).read(most)
-
+    above = (*zipped.path[:-1], zipped.name[: -len(".zip")])
     files: list[Member] = []
+    for number, file in enumerate(in_zip(_opened(now), [], above)):
+        later = Member(file.path, partial(_read_again, zipped, above, number))
+        files += _inner(later, file, depth - 1)
+        if len(files) > MOST:
+            raise TooManyError(f"it holds more than {MOST} files")
+    return files
+
+
+def _inner(later: Member, now: Member, depth: int) -> list[Member]:
+    """A file, or what it holds if it is a zip that can be read."""
+    if not is_zip(now.name) or not depth:
+        return [later]
     try:
-        for file in in_zip(_opened(now), [], above):
-            later = Member(file.path, partial(read_again, file.path), (*zipped.zips, name))
-            files += _held(later, file, depth - 1) or [later]
-            if len(files) >= MOST:
-                break
+        return _held(later, now, depth) or [later]
+    except TooManyError:
+        raise
     except Exception:  # a damaged zip raises many kinds; it is then a file as any other
-        return []
-    return files[:MOST]
+        return [later]
+
+
+def _read_again(zipped: Member, above: tuple[str, ...], number: int, most: int) -> bytes:
+    """Read one file of a zip, known by its place: two may have one name."""
+    for at, file in enumerate(in_zip(_opened(zipped), [], above)):
+        if at == number:
+            return file.read(most)
+    raise OSError("it is not in the zip any more")
 
 
 def _opened(member: Member) -> zipfile.ZipFile:
     content = member.read(_ZIP_BYTES + 1)
     if len(content) > _ZIP_BYTES:
-        raise OSError("it is too large")
+        raise OSError(f"it is larger than {_ZIP_BYTES // 1024**2} MiB")
     return zipfile.ZipFile(io.BytesIO(content))

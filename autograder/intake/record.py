@@ -10,6 +10,11 @@ from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
 from autograder.core.files import write_beside
 from autograder.course.paths import CoursePaths
 
+_OF_PLATFORMS = ("canvas_id", "moodle_id", "repository", "email")
+"""Kinds of names that mean one person on a platform, the surest first."""
+_IN_EACH_LAB = ("moodle_id",)
+"""Those that a platform gives anew for each assignment."""
+
 
 class Taken(BaseModel):
     """One student's submission, as it came in."""
@@ -18,6 +23,8 @@ class Taken(BaseModel):
 
     source: str
     """The folder or zip that it was taken from."""
+    around: str = ""
+    """The folders and zips in the source that lay around the class."""
     file: str = ""
     """The notebook's path in there, with the platform's names; empty where no platform gave it out."""
     owner: dict[str, str] = {}
@@ -25,7 +32,8 @@ class Taken(BaseModel):
     late: bool = False
     """The platform has marked it as late."""
     left: bool = False
-    """The source was taken in once more, and the student was not in it: they have left the class."""
+    """The student was not among the submissions when they were taken in once more, or never was, and somebody has said
+    that this is right."""
 
 
 _CLASS = TypeAdapter(dict[str, Taken])
@@ -44,38 +52,41 @@ def left_class(root: Path, lab: str) -> set[str]:
     return {student for student, taken in read_class(root, lab).items() if taken.left}
 
 
-def keep_class(root: Path, lab: str, source: Path, taken: Mapping[str, Taken], complete: bool) -> list[str]:
-    """Note what was taken in from a source.
+def person(owner: Mapping[str, str]) -> tuple[str, str] | None:
+    """Return by what a platform tells one person from all others; None if a name is all that is known."""
+    return next(((kind, owner[kind]) for kind in _OF_PLATFORMS if owner.get(kind)), None)
 
-    Who was taken from the same source before, and is not in it any more, has left the class. Grades stay in the
-    gradebook, and count again when the student is back.
+
+def known_persons(root: Path, lab: str) -> dict[tuple[str, str], str]:
+    """Return what the persons of a course's platforms are called here, as taken in before, for this lab or another."""
+    known: dict[tuple[str, str], str] = {}
+    folder = CoursePaths(root).taken(lab).parent
+    others = [path.stem for path in sorted(folder.glob("*.json")) if path.stem != lab]
+    for name in (*others, lab):  # what this lab's class says counts most
+        for student, taken in read_class(root, name).items():
+            who = person(taken.owner)
+            if who is not None and (name == lab or who[0] not in _IN_EACH_LAB):
+                known[who] = student
+    return known
+
+
+def keep_class(root: Path, lab: str, taken: Mapping[str, Taken], gone: Mapping[str, Taken]) -> None:
+    """Note what was taken in.
+
+    Grades of who has left stay in the gradebook, and count again when the student is back.
 
     Args:
         root: of the course.
         lab: that the submissions answer.
-        source: where they came from.
         taken: what is known of each, by student.
-        complete: nothing in the source was left out; otherwise nobody can say who has left.
-
-    Returns:
-        Sentences about who has left.
+        gone: who is not in the class any more.
     """
     known = read_class(root, lab)
-    missing = [
-        student
-        for student, before in known.items()
-        if complete and before.source == str(source.resolve()) and student not in taken and not before.left
-    ]
-    for student in missing:
-        known[student].left = True
+    for student in gone:
         CoursePaths(root).feedback_page(student, lab).unlink(missing_ok=True)
+    known.update({student: one.model_copy(update={"left": True}) for student, one in gone.items()})
     known.update(taken)
     content = _CLASS.dump_json(dict(sorted(known.items())), indent=1) + b"\n"
     path = CoursePaths(root).taken(lab)
     if not path.is_file() or path.read_bytes() != content:
         write_beside(path, content)
-    return [
-        f"{student} is not among the submissions any more, and has left grades.csv, the class page and the exports."
-        " The gradebook keeps the grades."
-        for student in missing
-    ]

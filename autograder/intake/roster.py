@@ -1,7 +1,7 @@
 """The roster: a table of the class, by which a platform's names become the names of the gradebook.
 
-A CSV file with a line of headings. `id` is the name in the gradebook; `name`, `email`, `section`, `canvas_id`,
-`moodle_id`, `github` and others are what platforms call the same student.
+A CSV file with a line of headings, or the roster that GitHub Classroom gives out. `id` is the name in the gradebook;
+`name`, `email`, `section`, `canvas_id`, `moodle_id`, `github` and others are what platforms call the same student.
 """
 
 from __future__ import annotations
@@ -17,6 +17,8 @@ from pathlib import Path
 from autograder.core.errors import KitError
 
 FILE_NAME = "roster.csv"
+_OF_CLASSROOM = {"identifier": "id", "github_username": "github"}
+"""What GitHub Classroom calls the columns of the roster that it gives out."""
 
 
 class Roster:
@@ -91,6 +93,8 @@ def read_roster(path: Path) -> Roster:
     except (OSError, UnicodeError, csv.Error) as error:
         raise KitError(f"The roster {path} cannot be read: {error}.", "It is a CSV file in UTF-8.") from error
     columns = [(name or "").strip().lower() for name in reader.fieldnames or []]
+    other = _OF_CLASSROOM if "id" not in columns else {}
+    columns = [other.get(name, name) for name in columns]
     if "id" not in columns:
         raise KitError(
             f"The roster {path} has no column `id`; its first line is {heading[:80]!r}.",
@@ -98,7 +102,8 @@ def read_roster(path: Path) -> Roster:
         )
     students: dict[str, dict[str, str]] = {}
     for number, line in lines:
-        named = {(key or "").strip().lower(): value.strip() for key, value in line.items() if isinstance(value, str)}
+        given = {(key or "").strip().lower(): value.strip() for key, value in line.items() if isinstance(value, str)}
+        named = {other.get(key, key): value for key, value in given.items()}
         # Spreadsheets give a column of numbers in which one is missing a decimal point: 4711.0.
         known = {
             key: re.sub(r"^(\d+)\.0+$", r"\1", value) if key.endswith("_id") else value for key, value in named.items()

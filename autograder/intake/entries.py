@@ -1,0 +1,226 @@
+"""What lies side by side in a class: folders, zips and files, whose names decide whose they are.
+
+The names at this level were written by a learning platform, or by who put the class together. What lies inside an
+entry was written by a student, and decides nothing about whose it is.
+"""
+
+from __future__ import annotations
+
+import zipfile
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from enum import Enum, auto
+from functools import cached_property, partial
+from pathlib import Path
+
+from autograder.core.errors import KitError
+from autograder.core.files import read_plain
+from autograder.intake.members import (
+    MOST,
+    Member,
+    TooManyError,
+    empty_folders,
+    in_folder,
+    in_zip,
+    is_notebook,
+    is_unseen,
+    is_zip,
+    looked_into,
+    packed_in,
+    unpacked,
+)
+
+_MOST_OF_CLASS = 500_000
+"""Files in a zip; a class of five thousand repositories has fewer."""
+_NAMED = 5
+"""Of more bad names than this only their number is said."""
+
+
+class NotUnderstoodError(Exception):
+    """Something was handed in, and not in a way that says which notebook counts. Nobody gets a zero for that."""
+
+
+class Kind(Enum):
+    """What an entry is."""
+
+    FOLDER = auto()
+    ZIP = auto()
+    NOTEBOOK = auto()
+    OTHER = auto()
+    """A file of another kind."""
+    LINK = auto()
+    """Which is not followed."""
+
+
+@dataclass(eq=False)
+class Entry:
+    """One thing in a class."""
+
+    path: tuple[str, ...]
+    """From the source on; the last part is its name."""
+    kind: Kind
+    list_files: Callable[[], list[Member]]
+    list_entries: Callable[[], list[Entry]]
+    shown: str = ""
+    """How a sentence calls a link."""
+
+    @property
+    def name(self) -> str:
+        """Its name at the level of the class."""
+        return self.path[-1]
+
+    @property
+    def stem(self) -> str:
+        """Its name; of a file and a zip without the ending."""
+        return self.name.rpartition(".")[0] if self.kind in (Kind.ZIP, Kind.NOTEBOOK, Kind.OTHER) else self.name
+
+    @property
+    def is_work(self) -> bool:
+        """Whether it may hold a notebook."""
+        return self.kind in (Kind.FOLDER, Kind.ZIP, Kind.NOTEBOOK)
+
+    @cached_property
+    def files(self) -> list[Member]:
+        """The files in it; of a file, that file.
+
+        Raises:
+            NotUnderstoodError: it cannot be looked into, or is too large for anybody's work.
+        """
+        try:
+            return self.list_files()
+        except NotUnderstoodError:
+            raise
+        except TooManyError as error:
+            raise NotUnderstoodError(f"cannot be anybody's work: {error}") from error
+        except Exception as error:  # a damaged zip raises many kinds
+            why = getattr(error, "strerror", None) or error
+            raise NotUnderstoodError(f"cannot be read ({why})") from error
+
+    @cached_property
+    def inside(self) -> list[Entry]:
+        """What lies in a folder or zip, if that should be one around a class; nothing if it cannot be read."""
+        try:
+            return self.list_entries()
+        except Exception:  # a damaged zip raises many kinds; reading its files says which
+            return []
+
+    def below(self, member: Member) -> tuple[str, ...]:
+        """Return a file's path in this folder or zip."""
+        # A zip counts as a folder of its name without the ending, so its path is as long.
+        return member.path[len(self.path) :] if self.kind in (Kind.FOLDER, Kind.ZIP) else (member.name,)
+
+
+@dataclass
+class Listed:
+    """What lies in a source."""
+
+    entries: list[Entry]
+    bad: list[str] = field(default_factory=list)
+    """Names in a zip that lead nowhere in it."""
+
+    def bad_names(self) -> list[str]:
+        """Return a sentence about the bad names, if there are any."""
+        if not self.bad:
+            return []
+        names = ", ".join(repr(name[:60]) for name in self.bad[:_NAMED])
+        more = f" and {len(self.bad) - _NAMED} more" if len(self.bad) > _NAMED else ""
+        return [f"The zip has entries whose names lead nowhere in it; they were left out: {names}{more}."]
+
+
+def listed(source: Path, lab: str) -> Listed:
+    """Return what lies in a folder or zip.
+
+    Raises:
+        KitError: it is neither, or no class.
+    """
+    if source.is_dir():
+        return Listed(_of_folder(source, ()))
+    try:
+        archive = zipfile.ZipFile(source)
+    except Exception as error:  # a damaged directory raises more than BadZipFile
+        raise KitError(
+            f"{source} is neither a folder nor a zip that can be read ({error}).",
+            f"Give a folder that holds `<student>/{lab}.ipynb` for each student, or a whole zip of it.",
+        ) from error
+    if not archive.infolist():
+        raise KitError(f"{source} is an empty zip: there is nothing in it.", "Download or pack it once more.")
+    if len(archive.infolist()) > _MOST_OF_CLASS:
+        raise KitError(f"{source} has {len(archive.infolist())} entries; that is no class.", "Check the file.")
+    bad: list[str] = []
+    files = list(in_zip(archive, bad))
+    return Listed(grouped(files, (), list(empty_folders(archive))), bad)
+
+
+def _of_folder(source: Path, parts: tuple[str, ...]) -> list[Entry]:
+    entries = []
+    for path in sorted(source.joinpath(*parts).iterdir()):
+        where = (*parts, path.name)
+        if is_unseen(path.name):
+            continue
+        if path.is_symlink():
+            shown = str(path).encode("utf-8", "replace").decode()
+            entries.append(Entry(where, Kind.LINK, list, list, shown))
+        elif path.is_dir():
+            listing = partial(_few, in_folder(source, where))
+            entries.append(Entry(where, Kind.FOLDER, listing, partial(_of_folder, source, where)))
+        else:
+            entries.append(_file(Member(where, partial(read_plain, source, where))))
+    return entries
+
+
+def _few(files: Iterator[Member]) -> list[Member]:
+    """The files of one student, with those in zips that can be read.
+
+    Raises:
+        TooManyError: there are more than that can be.
+    """
+    found: list[Member] = []
+    for file in files:
+        found += looked_into(file)
+        if len(found) > MOST:
+            raise TooManyError(f"it holds more than {MOST} files")
+    return found
+
+
+def _file(member: Member) -> Entry:
+    if is_zip(member.name):
+        above = (*member.path[:-1], member.name[: -len(".zip")])
+        held = partial(unpacked, member)
+        return Entry(member.path, Kind.ZIP, partial(_some, held), lambda: grouped(packed_in(member), above))
+    kind = Kind.NOTEBOOK if is_notebook(member.name) else Kind.OTHER
+    return Entry(member.path, kind, lambda: [member], list)
+
+
+def _some(held: Callable[[], list[Member]]) -> list[Member]:
+    files = held()
+    if not files:
+        raise NotUnderstoodError("is an empty zip")
+    return files
+
+
+def grouped(files: Sequence[Member], above: tuple[str, ...], empty: Sequence[tuple[str, ...]] = ()) -> list[Entry]:
+    """Return what lies side by side in a zip, or in a folder of it.
+
+    Args:
+        files: of the zip.
+        above: the folder.
+        empty: paths of folders that the zip names, whether they hold anything or not.
+    """
+    depth = len(above)
+    folders: dict[str, list[Member]] = {
+        path[depth]: [] for path in empty if len(path) == depth + 1 and path[:depth] == above
+    }
+    single: list[Member] = []
+    for member in files:
+        if member.path[:depth] != above:
+            continue
+        if len(member.path) > depth + 1:
+            folders.setdefault(member.path[depth], []).append(member)
+        else:
+            single.append(member)
+    entries = [
+        Entry((*above, name), Kind.FOLDER, partial(_few, iter(held)), partial(grouped, held, (*above, name), empty))
+        for name, held in folders.items()
+    ]
+    entries = [*entries, *map(_file, single)]
+    return sorted((entry for entry in entries if not is_unseen(entry.name)), key=lambda entry: entry.path)

@@ -1,0 +1,249 @@
+"""Decides as what a class is to be read: which platform gave it out, and what lies around it.
+
+A class without a platform is always one of the readings. Where two are possible, nobody guesses: the reading stops with
+a sentence, and an option names the format.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from autograder.core.errors import KitError
+from autograder.intake.choosing import choose, is_of_lab
+from autograder.intake.claims import Claim, Recognised
+from autograder.intake.entries import Entry, Kind, NotUnderstoodError, listed
+from autograder.intake.formats import PLAIN, PLATFORMS, Format, owner_of
+from autograder.intake.members import is_hidden, is_notebook
+
+_MOST_AROUND = 3
+"""So many folders and zips may lie around a class."""
+_SHOWN = 3
+"""Of more names only these are said."""
+
+
+@dataclass
+class Reading:
+    """A class, as it is read."""
+
+    format: Format
+    recognised: Recognised
+    around: tuple[str, ...] = ()
+    """The folders and zips around it, in the source."""
+    notes: list[str] = field(default_factory=list)
+    """Who was added by hand, as sentences."""
+
+    @property
+    def owners(self) -> list[str]:
+        """What the students are called, each once."""
+        return list(dict.fromkeys(_called(claim) for claim in self.recognised.claims))
+
+
+@dataclass(frozen=True)
+class Known:
+    """What is known of a class before it is read."""
+
+    is_student: Callable[[str], bool] = lambda _: False
+    """Whether the roster has a student of that name, or one was taken in before."""
+    roster: bool = False
+    """There is a roster, so that whoever is not in it is no student."""
+    around: Collection[str] | None = None
+    """The folders and zips that lay around the class when it was taken in before; None: it was not."""
+
+
+@dataclass(frozen=True)
+class _Asked:
+    source: Path
+    lab: str
+    format: Format | None
+    """Which somebody has named."""
+    known: Known
+
+
+def read_class(source: Path, lab: str, format_name: str = "", known: Known | None = None) -> Reading:
+    """Read what lies in a folder or zip as a class.
+
+    Args:
+        source: the folder or zip.
+        lab: whose notebooks are wanted.
+        format_name: of the format, if somebody has named it; else empty.
+        known: what is known beforehand.
+
+    Raises:
+        KitError: the source is no class, or can be read in two ways.
+    """
+    named = {**PLATFORMS, PLAIN.name: PLAIN}.get(format_name)
+    found = listed(source, lab)
+    reading = _read(found.entries, (), _Asked(source, lab, named, known or Known()))
+    reading.recognised.strange += found.bad_names()
+    return reading
+
+
+def _read(entries: Sequence[Entry], around: tuple[str, ...], asked: _Asked) -> Reading:
+    reading = None if asked.format is PLAIN else _of_platform(entries, around, asked)
+    if reading is not None:
+        return reading
+    work = _work(entries)
+    beside = [entry for entry in entries if entry not in work]
+    if len(work) == 1 and work[0].kind is not Kind.NOTEBOOK and len(around) < _MOST_AROUND:
+        inner = _inside(work[0], around, asked)
+        if inner is not None:
+            inner.recognised.strange += PLAIN.read(beside, asked.lab).strange
+            return inner
+    if asked.format not in (None, PLAIN):
+        raise KitError(
+            f"Nothing in {asked.source} has a name as {asked.format.title} gives it.",
+            "Leave --format out, or name another.",
+        )
+    return Reading(PLAIN, PLAIN.read(entries, asked.lab), around)
+
+
+def _work(entries: Sequence[Entry]) -> list[Entry]:
+    return [entry for entry in entries if entry.is_work and not is_hidden((entry.name,))]
+
+
+def _of_platform(entries: Sequence[Entry], around: tuple[str, ...], asked: _Asked) -> Reading | None:
+    """What a platform gave out, if the names say so; None if no name does.
+
+    Raises:
+        KitError: some names say so, and others do not.
+    """
+    work = _work(entries)
+    formats = [asked.format] if asked.format is not None else list(PLATFORMS.values())
+    options: list[tuple[Format, Recognised, int, int]] = []
+    for one in formats:
+        told = one.read(entries, asked.lab)
+        seen = {id(claim.entry) for claim in told.claims} | {id(entry) for entry in told.aside}
+        of_form = sum(id(entry) in seen for entry in work)
+        if seen and (of_form or not work) and (one.certain or 2 * of_form >= len(work)):
+            options.append((one, told, of_form, len(work) - of_form))
+    whole = [option for option in options if not option[3]]
+    if asked.format is None and len(whole or options) > 1:
+        raise _two_ways(asked, [option[0].title for option in whole or options], [])
+    if not options:
+        return None
+    chosen, told, of_form, rest = (whole or options)[0]
+    seen = {id(claim.entry) for claim in told.claims} | {id(entry) for entry in told.aside}
+    others = [entry for entry in entries if id(entry) not in seen]
+    if rest and asked.format is None and (of_form < 2 or of_form < rest):
+        names = [entry.name for entry in work if id(entry) not in seen]
+        raise _two_ways(asked, [chosen.title], names)
+    added = PLAIN.read(others, asked.lab)
+    told.claims += [replace(claim, by_hand=True) for claim in added.claims]
+    told.strange += added.strange
+    notes = [
+        f"{claim.entry.name[:100]!r} has no name as {chosen.title} gives it: somebody has added it, and it is taken as"
+        f" the work of {claim.owner['id'][:100]!r}."
+        for claim in added.claims
+    ]
+    return Reading(chosen, told, around, notes)
+
+
+def _two_ways(asked: _Asked, titles: Sequence[str], others: Sequence[str]) -> KitError:
+    ways = " or ".join(f"as what {title} gives out" for title in titles)
+    names = f" {_few([repr(name[:80]) for name in others])} {_have(others)} no such name." if others else ""
+    plain = "" if len(titles) > 1 else ", or as a class whose folders and files have the students' names"
+    return KitError(
+        f"{asked.source} can be read {ways}{plain}.{names} Nothing was graded.",
+        f"Say which it is: --format {' or --format '.join(_named(titles))} or --format plain.",
+    )
+
+
+def _named(titles: Sequence[str]) -> list[str]:
+    return [one.name for one in PLATFORMS.values() if one.title in titles]
+
+
+def _have(names: Sequence[str]) -> str:
+    return "has" if len(names) == 1 else "have"
+
+
+def _few(names: Sequence[str]) -> str:
+    more = f" and {len(names) - _SHOWN} more" if len(names) > _SHOWN else ""
+    return ", ".join(names[:_SHOWN]) + more
+
+
+def _inside(only: Entry, around: tuple[str, ...], asked: _Asked) -> Reading | None:
+    """The class in the one folder or zip that lies in the source; None if that is a student's.
+
+    Raises:
+        KitError: it may be either.
+    """
+    student = owner_of(only, asked.lab)
+    if student is not None and asked.known.is_student(student):
+        return None
+    if any(is_notebook(entry.name) and entry.stem.casefold() == asked.lab.casefold() for entry in only.inside):
+        return None  # whatever else is in it
+    inner = _read(only.inside, (*around, only.name), asked)
+    if inner.format.around.fullmatch(only.stem) or inner.format is asked.format is not PLAIN:
+        return inner
+    is_class = len(inner.around) > len(around) + 1 or _is_class(inner, only.inside, asked.lab)
+    if student is None:  # nobody can be called so
+        return inner if is_class else None
+    if not is_class and not _may_be_class(inner, only.inside, asked.lab):
+        return None
+    owners = inner.owners
+    if asked.known.roster and all(map(asked.known.is_student, owners)):
+        return inner
+    before = asked.known.around
+    if is_class and not _is_students(only, asked.lab) and (before is None or "/".join(inner.around) in before):
+        return inner
+    if asked.format is PLAIN:
+        return None
+    place = asked.source.joinpath(*around, only.name)
+    packed = asked.source.is_file() or any(name.lower().endswith(".zip") for name in around)
+    how = "unpack it, and" if packed else f"name {place}, or"
+    raise KitError(
+        f"{asked.source} holds only {only.name[:80]!r}. That may be one student's work, or a class of {len(owners)}:"
+        f" {_few([repr(name[:80]) for name in owners])}. Nothing was graded.",
+        f"If it is the class, {how} name the folder that holds the students' work. If it is a student's, put it beside"
+        " the others', or add --format plain.",
+    )
+
+
+def _is_students(entry: Entry, lab: str) -> bool:
+    """Whether it can be understood as one student's work."""
+    try:
+        return choose([Claim(entry, {"id": entry.stem}, entry.name)], lab).member is not None
+    except NotUnderstoodError:
+        return False
+
+
+def _may_be_class(inner: Reading, inside: Sequence[Entry], lab: str) -> bool:
+    """Whether it could be a class, by the names in it: more than what one student packs."""
+    work = _work(inside)
+    if any(is_notebook(entry.name) and is_of_lab(entry.name, lab) for entry in work):
+        return False
+    if any(entry.name in (lab, "labs") for entry in work):  # as students get it; but somebody may be called so
+        return any(_holds_notebook(entry) for entry in work if entry.name not in (lab, "labs"))
+    return bool(inner.recognised.claims)
+
+
+def _is_class(inner: Reading, inside: Sequence[Entry], lab: str) -> bool:
+    """Whether it can hardly be anything but a class: a platform's names, or two students' notebooks of the lab."""
+    if not _may_be_class(inner, inside, lab):
+        return False
+    if inner.format is not PLAIN:
+        return True
+    return sum(_holds_lab(claim.entry, lab) for claim in inner.recognised.claims) > 1
+
+
+def _holds_notebook(entry: Entry) -> bool:
+    try:
+        return any(is_notebook(member.name) for member in entry.files)
+    except NotUnderstoodError:
+        return False
+
+
+def _holds_lab(entry: Entry, lab: str) -> bool:
+    try:
+        return entry.kind is not Kind.NOTEBOOK and any(
+            is_notebook(member.name) and is_of_lab(member.name, lab) for member in entry.files
+        )
+    except NotUnderstoodError:
+        return False
+
+
+def _called(claim: Claim) -> str:
+    owner = claim.owner
+    return next((owner[kind] for kind in ("id", "github", "name", "canvas", "email") if owner.get(kind)), "")
