@@ -5,14 +5,17 @@ from __future__ import annotations
 import contextlib
 import os
 import time
+from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
 
-from autograder.core.processes import cpu_time, descendants, read_text, stat_fields
+from autograder.core.processes import cpu_time, descendants, read_text, stat_fields, threads
 
-_NOT_KEPT_FROM_ANYTHING = 3.0
-"""Seconds of CPU in one wait after which a process was not kept from anything; a node starts in a third of one."""
 _CPU_TO_BEGIN = 1.0
-"""Seconds of CPU that a program may take to begin; one that computes on takes what it gets, and always waits."""
+"""Seconds of CPU that a program may take to begin; one that computes on takes what it gets."""
+_PIECE = 1.0
+"""Seconds between two measurements."""
+_CPUS = "AUTOGRADER_CPUS"
 
 
 @dataclass(frozen=True)
@@ -21,6 +24,8 @@ class CpuWait:
 
     when: float
     """Seconds on the monotonic clock at which this was read."""
+    used: float
+    """Seconds for which it ran."""
     waited: float
     """Seconds for which it was ready to run and got no CPU, up to its last turn."""
     turns: int
@@ -45,6 +50,15 @@ class CpuUse:
         return self.cpu > _CPU_TO_BEGIN and self.cpu > free / 2
 
 
+def computes(pid: int) -> bool:
+    """Whether a process has computed for most of the time in which nobody kept it from that."""
+    if cpu_time(pid) <= _CPU_TO_BEGIN:
+        return False
+    with contextlib.suppress(OSError, IndexError, ValueError):
+        return _use(pid).computes()
+    return False
+
+
 def cpu_uses() -> dict[int, CpuUse]:
     """Return what this process and its descendants have had of the CPUs, by process.
 
@@ -53,47 +67,131 @@ def cpu_uses() -> dict[int, CpuUse]:
     uses: dict[int, CpuUse] = {}
     for pid in (os.getpid(), *descendants(os.getpid())):
         with contextlib.suppress(OSError, IndexError, ValueError):
-            fields = stat_fields(f"/proc/{pid}")
-            began = int(fields[19]) / os.sysconf("SC_CLK_TCK")
-            threads = _cpu_waits(pid)
-            if threads:
-                uses[pid] = CpuUse(cpu_time(pid), time.clock_gettime(time.CLOCK_BOOTTIME) - began, threads)
+            use = _use(pid)
+            if use.threads:
+                uses[pid] = use
     return uses
+
+
+def _use(pid: int) -> CpuUse:
+    fields = stat_fields(f"/proc/{pid}")
+    began = int(fields[19]) / os.sysconf("SC_CLK_TCK")
+    threads = _cpu_waits(pid)
+    return CpuUse(cpu_time(pid), time.clock_gettime(time.CLOCK_BOOTTIME) - began, threads)
 
 
 def _cpu_waits(pid: int) -> dict[int, CpuWait]:
     waits: dict[int, CpuWait] = {}
-    for task in os.listdir(f"/proc/{pid}/task"):
+    for task in threads(pid):
         with contextlib.suppress(OSError, IndexError, ValueError):
             folder = f"/proc/{pid}/task/{task}"
-            _, waited, turns = map(int, read_text(f"{folder}/schedstat").split())
+            used, waited, turns = map(int, read_text(f"{folder}/schedstat").split())
             state = stat_fields(folder)[0]
-            waits[int(task)] = CpuWait(time.monotonic(), waited / 1e9, turns, state == "R")
+            waits[task] = CpuWait(time.monotonic(), used / 1e9, waited / 1e9, turns, state == "R")
     return waits
 
 
-def kept_waiting(before: dict[int, CpuUse], after: dict[int, CpuUse]) -> float:
-    """Return by how many seconds a message through all these processes may have come late because of others.
+def kept_waiting(before: dict[int, CpuUse], after: dict[int, CpuUse], share: float = 1.0) -> dict[int, float]:
+    """Return by how many seconds each of these processes may have been late because of others.
 
-    It passes one process after another, so their waits add up; the threads of one wait side by side. Not counted are
-    the waits of a program that computes on and on, and of any process as long as its own kind may have caused: the time
-    for which the rest of these processes had a CPU.
+    A wait counts only as far as its own kind cannot have caused it: the time for which the rest of these threads had a
+    CPU is taken off. So who computes on and on, in however many threads and processes, gains nothing by it. The threads
+    of a process wait side by side.
+
+    Args:
+        before: what each of them had of the CPUs.
+        after: and what it had later.
+        share: of one CPU that all of them together may have; 1.0 if they may have a whole one. Who computes on and on
+            uses that up, and then all of them wait.
     """
+    weight = {pid: 1 / share if pid != os.getpid() and use.computes() else 1.0 for pid, use in after.items()}
     used = {pid: use.cpu - (before[pid].cpu if pid in before else 0.0) for pid, use in after.items()}
-    together = sum(used.values())
-    kept = 0.0
+    together = sum(weight[pid] * used[pid] for pid in after)
+    kept = {}
     for pid, use in after.items():
-        if used[pid] > _NOT_KEPT_FROM_ANYTHING or (pid != os.getpid() and use.computes()):
-            continue
         known = before[pid].threads if pid in before else {}
-        waited = max(_waited_since(known.get(thread), wait) for thread, wait in use.threads.items())
-        kept += max(0.0, waited - (together - used[pid]))
+        waits = [_since(known.get(thread), wait) for thread, wait in use.threads.items()]
+        kept[pid] = max(0.0, *(waited - max(0.0, together - own) for waited, own in waits))
     return kept
 
 
-def _waited_since(before: CpuWait | None, after: CpuWait) -> float:
+def _since(before: CpuWait | None, after: CpuWait) -> tuple[float, float]:
+    """For how many seconds a thread has waited since then, and for how many it ran."""
     if before is None:
-        before = CpuWait(after.when, 0.0, 0, ready=False)
+        before = CpuWait(after.when, 0.0, 0.0, 0, ready=False)
+    waited = after.waited - before.waited
     if after.ready and before.ready and after.turns == before.turns:
-        return after.when - before.when  # the kernel adds a wait when it is over, and this one is not
-    return after.waited - before.waited
+        waited = after.when - before.when  # the kernel adds a wait when it is over, and this one is not
+    return waited, after.used - before.used
+
+
+class Withheld:
+    """The time that others have withheld from the processes of a launch, and from the one that watches it.
+
+    It is measured piece by piece: what these processes used in one second does not excuse what others took in another.
+    """
+
+    def __init__(self) -> None:
+        """Nothing has been measured yet."""
+        self._share = min(1.0, cpus())
+        self._before: tuple[float, dict[int, CpuUse]] | None = None
+        self._pieces: list[tuple[float, float, float, float]] = []
+        """Of each piece when it began and ended, and what was withheld in it: from all together, and from one."""
+
+    def measure(self, least: float = _PIECE) -> None:
+        """Measure up to now, if the last time was at least so many seconds ago."""
+        now = time.monotonic()
+        if self._before is not None and now - self._before[0] < least:
+            return
+        uses = cpu_uses()
+        if self._before is not None:
+            kept = kept_waiting(self._before[1], uses, self._share).values()
+            self._pieces.append((self._before[0], now, sum(kept), max(kept, default=0.0)))
+        self._before = now, uses
+
+    def from_all(self, when: float) -> float:
+        """Return by how many seconds a message may have come late that went through all the processes, one by one.
+
+        Args:
+            when: seconds on the monotonic clock; what was withheld before that does not count.
+        """
+        return sum(kept * min(1.0, (end - when) / (end - begin)) for begin, end, kept, _ in self._pieces if end > when)
+
+    def from_one(self, when: float) -> float:
+        """Return for how many seconds, at the most, a single process had no chance to run; `when` as in `from_all`."""
+        return sum(kept * min(1.0, (end - when) / (end - begin)) for begin, end, _, kept in self._pieces if end > when)
+
+
+def cpus() -> float:
+    """Return how many CPUs this process and those below it may have together; less than one with a small quota."""
+    given = os.environ.get(_CPUS)
+    return float(given) if given else min([float(len(os.sched_getaffinity(0))), *_quotas()])
+
+
+def _quotas() -> Iterator[float]:
+    """The CPUs that each control group around this process may use (cgroups(7), in either version)."""
+    with contextlib.suppress(OSError):
+        for line in Path("/proc/self/cgroup").read_text().splitlines():
+            _, kinds, path = line.split(":", 2)
+            if kinds and "cpu" not in kinds.split(","):
+                continue
+            inner = PurePosixPath(path)
+            for root in ("/sys/fs/cgroup", "/sys/fs/cgroup/cpu", "/sys/fs/cgroup/unified"):
+                for folder in (inner, *inner.parents):
+                    yield from _quota(Path(root + str(folder)))
+
+
+def _quota(group: Path) -> Iterator[float]:
+    with contextlib.suppress(OSError, ValueError):
+        quota, period = (group / "cpu.max").read_text().split()
+        if quota != "max":
+            yield int(quota) / int(period)
+    with contextlib.suppress(OSError, ValueError):
+        quota = (group / "cpu.cfs_quota_us").read_text()
+        if int(quota) > 0:
+            yield int(quota) / int((group / "cpu.cfs_period_us").read_text())
+
+
+def cpus_environment() -> dict[str, str]:
+    """Return the variable that tells a process in a sandbox, which sees no control group, of `cpus`."""
+    return {_CPUS: f"{cpus():g}"}

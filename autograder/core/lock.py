@@ -22,6 +22,7 @@ def only_one(path: Path, what: str) -> Iterator[None]:
 
     Raises:
         KitError: another process holds it.
+        OSError: it cannot be written; its `filename` says which.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     # Inherited by nothing: a child that lives on must not keep the lock.
@@ -34,7 +35,10 @@ def only_one(path: Path, what: str) -> Iterator[None]:
                 f"{what} is at work in {path.parent.parent} already: {who}.",
                 "Wait until it has ended, or end it with Ctrl-C, then start again: what is finished is kept.",
             ) from error
-        file.truncate(0)
-        file.write(f"process {os.getpid()}, since {time.strftime('%H:%M:%S')}")
-        file.flush()
+        try:
+            os.ftruncate(file.fileno(), 0)
+            os.write(file.fileno(), f"process {os.getpid()}, since {time.strftime('%H:%M:%S')}".encode())
+        except OSError as error:
+            error.filename = str(path)  # a full disk names no file
+            raise
         yield

@@ -42,6 +42,15 @@ def stat_fields(folder: str) -> list[str]:
     return read_text(f"{folder}/stat").rpartition(")")[2].split()
 
 
+def threads(pid: int) -> list[int]:
+    """Return the ids of a process's threads.
+
+    Raises:
+        OSError: it has ended.
+    """
+    return [int(entry) for entry in os.listdir(f"/proc/{pid}/task")]
+
+
 def descendants(root: int) -> dict[int, Process]:
     """Return the living processes below `root`, without itself. What cannot be read has just ended."""
     everyone: dict[int, list[str]] = {}
@@ -96,6 +105,13 @@ def cpu_time(pid: int) -> float:
         fields = stat_fields(f"/proc/{pid}")
         return sum(map(int, fields[11:15])) / os.sysconf("SC_CLK_TCK")
     return 0.0
+
+
+def wants_cpu(pid: int) -> bool:
+    """Whether the first thread of a process computes, or waits for a CPU or a disk; not if the process is gone."""
+    with contextlib.suppress(OSError, IndexError):
+        return stat_fields(f"/proc/{pid}")[0] in "RD"
+    return False
 
 
 def pid_of(handle: int) -> int:

@@ -13,6 +13,7 @@ from typing import Annotated
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 from autograder.core.files import write_beside
+from autograder.core.output import plain
 from autograder.core.picture import Picture
 from autograder.core.version import VERSION
 
@@ -24,8 +25,8 @@ def encodable(text: str) -> str:
     return text.encode("utf-8", "replace").decode("utf-8")
 
 
-Text = Annotated[str, AfterValidator(encodable)]
-"""A text that may quote a student's program, whose notes can hold anything: a result must always be writable."""
+Text = Annotated[str, AfterValidator(lambda text: plain(encodable(text)))]
+"""A text that may quote a student's program, whose notes can hold anything: it can always be written and shown."""
 
 
 class Status(StrEnum):
@@ -105,6 +106,9 @@ class CellResult(_Model):
     points: float | None = None
     """None: the grader could not find out; an instructor decides."""
     seconds: float = 0.0
+    starved: float = 0.0
+    """Seconds for which others kept the programs, or the grader, from the CPUs when something was decided against them;
+    0 if that cannot have made a difference."""
     outcomes: list[Outcome] = Field(default_factory=list)
     parts: list[Part] = Field(default_factory=list)
     """The parts that give points independently of each other; empty: all or nothing."""
@@ -150,6 +154,8 @@ class CheckResult(CellResult):
     grade_id: str = Field(min_length=1)
     title: str = ""
     """The nearest heading above its cell."""
+    run_again: bool = False
+    """It was run a second time, alone, because others had kept its programs from the CPUs."""
 
 
 class SubmissionResult(_Model):

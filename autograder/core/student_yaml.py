@@ -8,6 +8,7 @@ that stands twice is no reason to refuse the others.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -81,18 +82,25 @@ class Twice:
         return "stands there twice, in lines {} and {} of the cell".format(*self.lines)
 
 
+class Written(dict[Any, Any]):
+    """A mapping that also knows the text of each value that is a plain one: `010`, where YAML makes 8 of it."""
+
+    written: dict[Any, str]
+
+
 def cell_line(index: int, text: str) -> int:
     """Return the line of a cell at which a character of its file stands: the magic above the file is line 1."""
     return text.count("\n", 0, index) + 2
 
 
-def load(text: str, name: str = "the file", table: bool = False) -> Any:
+def load(text: str, name: str = "the file", table: bool = False, written: bool = False) -> Any:
     """Read a YAML text.
 
     Args:
         text: what stands below the cell's first line.
         name: what the sentence of an error calls it.
         table: whether it is a table of answers, in which the value of a key that stands there twice is a `Twice`.
+        written: whether each mapping is a `Written`.
 
     Raises:
         StudentFileError: it is not YAML, or not plain enough. Nothing else is ever raised.
@@ -100,7 +108,7 @@ def load(text: str, name: str = "the file", table: bool = False) -> Any:
     if len(text) > FILE_BYTES or len(text.encode("utf-8", "replace")) > FILE_BYTES:
         raise StudentFileError(f"{name} is larger than {FILE_BYTES // 1024} KiB.", "file-too-large")
     try:
-        loader = _Loader(text, table)
+        loader = _Loader(text, table, written)
         try:
             return loader.get_single_data()
         finally:
@@ -121,8 +129,8 @@ def load(text: str, name: str = "the file", table: bool = False) -> Any:
         raise _error(text, name, None, " is not YAML: it cannot be read") from None
 
 
-def read(path: Path, table: bool = False) -> Any:
-    """Read a student's YAML file; for `table` see `load`.
+def read(path: Path, table: bool = False, written: bool = False) -> Any:
+    """Read a student's YAML file; for `table` and `written` see `load`.
 
     Raises:
         StudentFileError: it is missing, is no text, or `load` refuses it.
@@ -137,7 +145,7 @@ def read(path: Path, table: bool = False) -> Any:
         raise StudentFileError(because, "file-missing", hint=hint) from None
     try:
         text = content.decode("utf-8", "strict" if len(content) <= FILE_BYTES else "replace")
-        return load(text, name, table)
+        return load(text, name, table, written)
     except UnicodeDecodeError:
         raise StudentFileError(f"{name} is not text in UTF-8.") from None
 
@@ -149,8 +157,10 @@ def _error(text: str, name: str, index: int | None, what: str, code: str = "not-
 
 
 def _taken_elsewhere(text: str, index: int, problem: str) -> bool:
-    """Whether libyaml, with which ROS 2 reads parameter files, may take what PyYAML does not: a tab that is no
-    indentation, a second document."""
+    """Whether ROS 2, which reads parameter files with libyaml, may take what PyYAML does not: a tab that is no
+    indentation, a second document, an anchor's name that stands twice."""
+    if "second occurrence" in problem:
+        return True
     begin = text.rfind("\n", 0, index) + 1
     return "found another document" in problem or ("'\\t'" in problem and bool(text[begin:index].strip()))
 
@@ -173,9 +183,9 @@ class _RefusedError(Exception):
 class _Loader(yaml.SafeLoader):
     """PyYAML's safe loader for plain YAML; it refuses while it reads, before anything can grow."""
 
-    def __init__(self, text: str, table: bool) -> None:
+    def __init__(self, text: str, table: bool, written: bool) -> None:
         super().__init__(text)
-        self._text, self._table = text, table
+        self._text, self._table, self._written = text, table, written
         self._depth = self._values = 0
         self._open: set[str] = set()  # anchors whose value is still being read
 
@@ -251,3 +261,15 @@ class _Loader(yaml.SafeLoader):
                 )
             first[key] = key_node
         return {**super().construct_mapping(node, deep), **twice}
+
+    def make_mapping(self, node: yaml.MappingNode) -> Iterator[dict[Any, Any]]:
+        """The mapping, filled when all of it is known, as PyYAML makes each."""
+        made: dict[Any, Any] = Written() if self._written else {}
+        yield made
+        made.update(self.construct_mapping(node))
+        if isinstance(made, Written):
+            plain = [(key, value) for key, value in node.value if isinstance(value, yaml.ScalarNode)]
+            made.written = {self.construct_object(key): value.value for key, value in plain}
+
+
+_Loader.add_constructor(_PREFIX + "map", _Loader.make_mapping)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -20,9 +21,12 @@ from autograder.gradebook.grades import write_grades
 from autograder.gradebook.progress import Steps
 from autograder.gradebook.recorder import Recorder
 from autograder.gradebook.scores import read_grades
+from autograder.grading.canaries import Canaries
 from autograder.grading.class_runner import run_class
+from autograder.grading.known_answers import known_answers
 from autograder.grading.runner import Settings
 from autograder.grading.store import ResultStore
+from autograder.intake.asked import Accepted
 from autograder.intake.collect import Collected, collect
 
 
@@ -41,6 +45,8 @@ class ClassRun:
     """What the gradebook holds now, with what people gave."""
     told: list[str]
     """What was changed about the gradebook itself, as sentences."""
+    canaries: list[str] = field(default_factory=list)
+    """What came of the known answers among the class, as sentences."""
     seconds: dict[str, float] = field(default_factory=dict)
     """How long it took in all; until the last submission had run; and how long nbgrader worked, mostly meanwhile."""
 
@@ -57,7 +63,28 @@ class Tried:
     collected: Collected
 
 
-def grade_class(root: Path, lab_name: str, source: Path, settings: Settings) -> ClassRun:
+@dataclass(frozen=True)
+class Intake:
+    """What somebody has said of a class before it is taken in, and who is told what came of that."""
+
+    format: str = ""
+    """As what to read it; empty: as what it is."""
+    accepted: Collection[Accepted] = ()
+    """What need not stop it."""
+    told: Callable[[Collected], None] = lambda _: None
+    """Called as soon as the class is taken in, before anything is run."""
+
+    def collect(self, source: Path, lab: str, root: Path) -> Collected:
+        """Take in a class; raises as the function of that name."""
+        collected = collect(source, lab, root, self.format, self.accepted)
+        self.told(collected)
+        return collected
+
+
+_AS_IT_IS = Intake()
+
+
+def grade_class(root: Path, lab_name: str, source: Path, settings: Settings, intake: Intake = _AS_IT_IS) -> ClassRun:
     """Grade every submission in a folder or zip.
 
     Args:
@@ -65,17 +92,19 @@ def grade_class(root: Path, lab_name: str, source: Path, settings: Settings) -> 
         lab_name: the lab they answer.
         source: folder or zip.
         settings: how to run them.
+        intake: what somebody has said of the class.
 
     Raises:
-        KitError: usage or set-up; or another grading is at work.
+        KitError: usage or set-up; another grading is at work; or a known answer among the class got other points than
+            it must, so that nothing is recorded.
         KeyboardInterrupt: finished results are kept, and the next run goes on from them.
     """
     with only_one(CoursePaths(root).lock, "A grading"):
         remove_unfinished(CoursePaths(root).build)
-        return _graded(root, load_lab(root, lab_name), source, settings)
+        return _graded(root, load_lab(root, lab_name), source, settings, intake)
 
 
-def try_class(root: Path, lab_name: str, source: Path, settings: Settings) -> Tried:
+def try_class(root: Path, lab_name: str, source: Path, settings: Settings, intake: Intake = _AS_IT_IS) -> Tried:
     """Run what `grade_class` would run, and record nothing; `grade_class` takes what was run here.
 
     Raises:
@@ -83,12 +112,16 @@ def try_class(root: Path, lab_name: str, source: Path, settings: Settings) -> Tr
     """
     lab = load_lab(root, lab_name)
     with only_one(CoursePaths(root).lock, "A grading"):
-        collected = collect(source, lab.name, root)
+        collected = intake.collect(source, lab.name, root)
         store = ResultStore(root)
         before = {student: store.last(lab.name, student) for student in collected.notebooks}
         console = Console(file=sys.stderr, highlight=False)
+        canaries = _canaries(root, lab, settings)
         with Steps(len(collected.notebooks), console) as steps:
-            after = run_class(collected.notebooks, root, lab, settings, steps.finished, steps.started, tried=True)
+            after = run_class(
+                collected.notebooks, root, lab, settings, steps.finished, steps.started, tried=True, canaries=canaries
+            )
+    _refuse_flipped(canaries, root, settings, len(after))
     return Tried(
         before={student: result for student, result in before.items() if result is not None},
         after=list(after.values()),
@@ -97,11 +130,23 @@ def try_class(root: Path, lab_name: str, source: Path, settings: Settings) -> Tr
     )
 
 
-def _graded(root: Path, lab: Lab, source: Path, settings: Settings) -> ClassRun:
+def _canaries(root: Path, lab: Lab, settings: Settings) -> Canaries | None:
+    """The known answers for a run; None if they are switched off, or the course cannot have any."""
+    known = known_answers(root, lab) if settings.canaries else []
+    return Canaries(lab, known, settings) if known else None
+
+
+def _refuse_flipped(canaries: Canaries | None, root: Path, settings: Settings, results: int) -> None:
+    if canaries is not None and canaries.flips and not settings.despite_canaries:
+        raise canaries.refusal(root, results - len(canaries.doubtful))
+
+
+def _graded(root: Path, lab: Lab, source: Path, settings: Settings, intake: Intake) -> ClassRun:
     console = Console(file=sys.stderr, highlight=False)
-    collected = collect(source, lab.name, root)
+    collected = intake.collect(source, lab.name, root)
     began = time.monotonic()
     recorder = Recorder(root, lab, settings.force)
+    canaries = _canaries(root, lab, settings)
     recorded: set[str] = set()
 
     with Steps(len(collected.notebooks), console) as steps:
@@ -117,16 +162,24 @@ def _graded(root: Path, lab: Lab, source: Path, settings: Settings) -> ClassRun:
 
         def finished(result: SubmissionResult) -> None:
             steps.finished(result)
-            recording.put(result.student)
+            if canaries is None:
+                recording.put(result.student)
+            elif steps.done == steps.total:
+                steps.watching()
 
         try:
-            results = run_class(collected.notebooks, root, lab, settings, finished, steps.started)
+            results = run_class(collected.notebooks, root, lab, settings, finished, steps.started, canaries=canaries)
             ran = time.monotonic()
+            _refuse_flipped(canaries, root, settings, len(results))
+            for student in results if canaries is not None else ():
+                recording.put(student)
             recording.finish()
         except BaseException as error:
             recording.give_up()
             if isinstance(error, KeyboardInterrupt):
-                kept = f"{steps.done} of {steps.total} results are kept in {CoursePaths(root).results / lab.name}"
+                paths = CoursePaths(root)
+                where = (paths.results if canaries is None else paths.tried) / lab.name
+                kept = f"{steps.done} of {steps.total} results are kept in {where}"
                 steps.say(f"\n{kept}; run again to go on.")
             raise
     return ClassRun(
@@ -136,6 +189,7 @@ def _graded(root: Path, lab: Lab, source: Path, settings: Settings) -> ClassRun:
         grades=write_grades(root),
         by_student={grade.student: grade for grade in read_grades(root, lab.name)},
         told=recorder.told,
+        canaries=canaries.told(root) if canaries is not None else [],
         seconds={
             "all": round(time.monotonic() - began, 2),
             "running": round(ran - began, 2),

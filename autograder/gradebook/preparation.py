@@ -12,6 +12,9 @@ def prepare_nbgrader() -> None:
     # Without this module jsonschema does not check one format of strings; with it, building its grammar takes 3 s.
     sys.modules.setdefault("rfc3987_syntax", None)  # type: ignore[arg-type]
     os.environ["TRAITLETS_APPLICATION_RAISE_CONFIG_FILE_ERROR"] = "1"
+    from autograder.gradebook.own_courses import guard_configuration
+
+    guard_configuration()
     # nbgrader runs `alembic` by name.
     tools = str(Path(sys.executable).parent)
     if tools not in os.environ.get("PATH", "").split(os.pathsep):

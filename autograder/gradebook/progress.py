@@ -73,6 +73,10 @@ class Steps:
         elif trouble:
             self.say(line)
 
+    def watching(self) -> None:
+        """The whole class has run; known answers among it may still run."""
+        self._progress.update(self._task, description="canaries", more="")
+
     def recording(self, recorded: int) -> None:
         """Everything has run; so many are in the gradebook."""
         self._progress.update(self._task, description="recording", completed=recorded, more="")

@@ -10,11 +10,10 @@ from typing import Any
 from autograder.core.errors import KitError
 from autograder.course.paths import CoursePaths
 from autograder.gradebook.backup import file_of
+from autograder.gradebook.own_courses import TEMPLATE as TEMPLATE
 
 CONFIG_FILE = "nbgrader_config.py"
 _KIT = str(Path(__file__).resolve().parents[2])
-TEMPLATE = Path(__file__).with_name("nbgrader_config.template")
-"""A course's `nbgrader_config.py` as it begins, without settings of its own."""
 
 
 @cache

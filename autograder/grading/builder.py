@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import sys
 
+from autograder.core.errors import KitError
 from autograder.grading.builds import Sources
+from autograder.packages.fair_build import build
 from autograder.packages.workspace import SOURCES
-from autograder.sandbox.build import build_packages
 from autograder.sandbox.scratch import Scratch
 
 
@@ -19,7 +20,11 @@ def main() -> int:
         for path, text in given.files.items():
             (folder / path).parent.mkdir(parents=True, exist_ok=True)
             (folder / path).write_text(text, encoding="utf-8")
-        run = build_packages(scratch / SOURCES, [given.package], given.isolation)
+        try:
+            run = build(scratch / SOURCES, given.package, given.isolation)
+        except KitError as error:  # the worker tries again, and says it
+            print(error, file=sys.stderr)
+            return 1
     sys.stdout.write(run.model_dump_json())
     return 0
 

@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Generator, Mapping, Sequence
 from contextlib import closing
 from pathlib import Path
 
 from autograder.core.results import SubmissionResult
 from autograder.course.lab import Lab
+from autograder.course.paths import CoursePaths
 from autograder.course.settings import read_settings
-from autograder.grading import executors
+from autograder.grading import executors, once_more
+from autograder.grading.canaries import Canaries
 from autograder.grading.job import Job
 from autograder.grading.runner import Settings, job_of, stored, without_running
 from autograder.grading.store import ResultStore
 from autograder.grading.validation import validated
 from autograder.submission.reader import read_submission
+from autograder.submission.submission import Submission
 
 
 def run_class(
@@ -25,11 +28,12 @@ def run_class(
     on_result: Callable[[SubmissionResult], None],
     on_start: Callable[[str], None] = lambda _: None,
     tried: bool = False,
+    canaries: Canaries | None = None,
 ) -> dict[str, SubmissionResult]:
     """Run a class, several submissions at once, and return the results by student, without their pictures.
 
     Each result is kept as soon as it is there, so that an interrupted run loses only what was running. A run that fails
-    or hangs fails alone.
+    or hangs fails alone. At the end checks are run again, alone, whose programs others kept from the CPUs.
 
     Args:
         submissions: notebook by student.
@@ -40,37 +44,115 @@ def run_class(
         on_start: called, in any thread, with each student whose submission begins to run.
         tried: keep what is run apart from the results, for nothing of it is to count yet; a later run takes it from
             there.
+        canaries: known answers to run among the class. What runs is kept apart until all of them have run; what ran
+            beside one that flipped is doubtful, and a later run does not take it, unless the settings say so.
 
     Raises:
         KitError: the course's executor cannot be used.
         KeyboardInterrupt: after every run has been stopped; finished results are kept.
     """
     executor = executors.chosen(settings.executor or read_settings(root).executor, settings.at_once)
-    kept, apart = ResultStore(root), ResultStore(root, tried=True)
-    store = apart if tried else kept
+    stores = _Stores(root, lab, settings, tried, canaries)
     results: dict[str, SubmissionResult] = {}
     jobs: dict[str, Job] = {}
     for student, path in submissions.items():
         submission = read_submission(path, lab)
-        result = stored(student, submission, lab, settings, kept)
-        if result is None:
-            result = stored(student, submission, lab, settings, apart)
-            if result is not None and not tried:
-                kept.save(result)
+        result = stores.known(student, submission)
         if result is None:
             job = job_of(submission, student, lab, settings)
             if submission.readable:
                 jobs[student] = job
                 continue
             result = without_running(submission, job)
-            store.save(result)
+            stores.told.save(result)
         results[student] = result.without_pictures()
         on_result(result)
-    with closing(executor.run(list(jobs.values()), on_start)) as ran:
+    mixed = canaries.among(jobs) if canaries is not None and stores.watched(jobs) else list(jobs.values())
+    with closing(_believed(executor, mixed, lambda name: on_start(name) if name in jobs else None)) as ran:
         for result in ran:
-            # It may come from another machine: only what belongs to the job is believed.
-            believed = validated(result, jobs[result.student].checks)
-            store.save(believed)
-            results[believed.student] = believed.without_pictures()
-            on_result(believed)
+            if canaries is not None and result.student not in jobs:
+                canaries.take(result)
+                continue
+            stores.run.save(result)
+            results[result.student] = result.without_pictures()
+            on_result(result)
+    if canaries is not None:
+        canaries.class_seconds = sum(results[student].seconds.get("total", 0.0) for student in jobs)
+        stores.settle(jobs, canaries)
     return {student: results[student] for student in submissions}
+
+
+def _believed(
+    executor: executors.Executor, jobs: Sequence[Job], started: Callable[[str], None]
+) -> Generator[SubmissionResult]:
+    """Run jobs, and yield what may be believed of each result: it may come from another machine.
+
+    Checks whose programs others kept from the CPUs are run again when all have run, alone, before they are believed.
+    """
+    by_student = {job.student: job for job in jobs}
+    to_run_again: list[tuple[Job, SubmissionResult]] = []
+    with closing(executor.run(jobs, started)) as ran:
+        for result in ran:
+            job = by_student[result.student]
+            believed = validated(result, job.checks)
+            again = once_more.open_checks(job, believed)
+            if again is None:
+                yield believed
+            else:
+                to_run_again.append((again, believed))
+    for job, first in to_run_again:
+        with closing(executor.run([job], started)) as ran:
+            for result in ran:
+                yield once_more.settled(job, first, validated(result, job.checks))
+
+
+class _Stores:
+    """The places of results that count, that do not count yet, and that are doubtful.
+
+    Args:
+        root: of the course.
+        lab: whose results they are.
+        settings: how submissions are run.
+        tried: nothing of this run is to count yet.
+        canaries: known answers that run in it.
+    """
+
+    def __init__(self, root: Path, lab: Lab, settings: Settings, tried: bool, canaries: Canaries | None) -> None:
+        paths = CoursePaths(root)
+        self._counting, self._apart = ResultStore(root), ResultStore(root, paths.tried)
+        self._doubtful = ResultStore(root, paths.doubtful)
+        self._lab, self._settings, self._tried = lab, settings, tried
+        self._waits = tried or canaries is not None
+        self._waiting: list[str] = []
+        self.told = self._apart if tried else self._counting
+        """Of what can be told without running anything."""
+        self.run = self._apart if self._waits else self._counting
+        """Of what runs now."""
+
+    def known(self, student: str, submission: Submission) -> SubmissionResult | None:
+        """Return the result of a submission if running it again could say nothing new."""
+        lab, settings = self._lab, self._settings
+        result = stored(student, submission, lab, settings, self._counting)
+        if result is not None:
+            return result
+        if settings.despite_canaries and stored(student, submission, lab, settings, self._doubtful) is not None:
+            self._doubtful.move(lab.name, student, self._apart)
+        result = stored(student, submission, lab, settings, self._apart)
+        if result is not None and self._waits:
+            self._waiting.append(student)
+        elif result is not None:
+            self._apart.move(lab.name, student, self._counting)
+        return result
+
+    def watched(self, jobs: Collection[str]) -> bool:
+        """Whether anything runs, or has run in an earlier run that did not come to its end."""
+        return bool(jobs) or (bool(self._waiting) and not self._settings.despite_canaries)
+
+    def settle(self, ran: Collection[str], canaries: Canaries) -> None:
+        """Let the results of a run count if its canaries allow it, and put away those that are doubtful."""
+        flipped = bool(canaries.flips) and not self._settings.despite_canaries
+        for student in (*self._waiting, *ran):
+            if flipped and student in canaries.doubtful:
+                self._apart.move(self._lab.name, student, self._doubtful)
+            elif not self._tried and not (flipped and student in self._waiting):
+                self._apart.move(self._lab.name, student, self._counting)

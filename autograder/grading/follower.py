@@ -9,6 +9,7 @@ from pydantic import ValidationError
 
 from autograder.core.results import CheckResult, Outcome
 from autograder.course.lab import Cell
+from autograder.grading.once_more import is_open
 from autograder.grading.validation import believed, was_killed
 
 
@@ -69,7 +70,7 @@ class Ear:
             self._left.remove(cell)
             if was_killed(check) and check.grade_id not in self._killed:
                 self._killed.add(check.grade_id)  # it is tried once more
-            else:
+            elif not is_open(check):  # else it is run again, alone, when the others have ended
                 self._tell(believed(cell, check))
             self._now()
 

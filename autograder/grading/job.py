@@ -9,8 +9,14 @@ from autograder.course.lab import Cell
 from autograder.packages.workspace import SOURCES
 from autograder.sandbox.build import BUILD_SECONDS, BuildRun
 
-CELL_SECONDS = 120.0
-"""Seconds after which a check cell is ended; all of them together have a limit too (`supervisor.SECONDS_PER_CHECK`)."""
+CELL_SECONDS = 240.0
+"""Seconds after which a check cell is ended: twice as long as any takes with all its patience on a busy machine.
+
+All of them together have a limit too (`supervisor.SECONDS_PER_CHECK`).
+"""
+CELL_CPU_SECONDS = 30.0
+"""Seconds of the grader's own CPU after which a check cell is ended: there was far too much to look at. Right answers
+take less than 1 s; the programs' own CPU is not counted here."""
 STUCK_SECONDS = 30.0
 """Seconds more after which a cell that did not end is stuck in a call that no exception reaches: the worker ends."""
 
@@ -37,6 +43,8 @@ class Job(BaseModel):
     built: dict[str, BuildRun] = Field(default_factory=dict)
     """What builds of its packages came to before the worker began, by the digest of what was built."""
     problems: list[Outcome] = Field(default_factory=list)
+    alone: bool = False
+    """These checks are run again, with nothing else of this kit beside them: their waits have more time."""
     messages: bool = False
     """The messages are wanted, too, that the checks received."""
 

@@ -6,12 +6,12 @@ is checked against the lab before anyone believes it.
 
 from __future__ import annotations
 
-import os
 import random
 from dataclasses import dataclass
 from pathlib import Path
 
-from autograder.core.results import Isolation, SubmissionResult
+from autograder.core.cpu_use import cpus
+from autograder.core.results import Isolation, Status, SubmissionResult
 from autograder.course.lab import Lab
 from autograder.grading.follower import Follower
 from autograder.grading.job import Job
@@ -38,11 +38,15 @@ class Settings:
     """How many run at once; 0 lets the machine decide."""
     executor: str = ""
     """Who runs them, as the course's setting of that name; empty: what that says."""
+    canaries: bool = True
+    """Run known answers among a class (`grading.canaries`)."""
+    despite_canaries: bool = False
+    """Believe results although a known answer got other points than it must."""
 
     @property
     def at_once(self) -> int:
         """How many run at once. A run mostly waits for messages, so a core carries several."""
-        return self.jobs or min(20, 5 * len(os.sched_getaffinity(0)))
+        return self.jobs or max(1, min(20, round(5 * cpus())))
 
 
 def stored(
@@ -91,13 +95,26 @@ def run_submission(
     return result
 
 
+_A_NOTEBOOK = "there is a notebook to check"
+
+
 def without_running(submission: Submission, job: Job) -> SubmissionResult:
-    """Return the result of a submission that cannot be read: no check is passed, and a person is to look at it."""
-    problem = submission.problems[-1].model_copy(update={"title": "there is a notebook to check"})
-    checks = [all_for_one_reason(cell, problem, points=0.0) for cell in job.checks]
-    if checks and problem.code != "no-notebook":
-        checks[0].flags.append(f"What was handed in has no points because it could not be read. {problem.because}")
-    return job.result(checks)
+    """Return the result of a submission that cannot be read.
+
+    Who handed in nothing has no points. What was handed in and not understood is no failure: a person decides.
+    """
+    problem = submission.problems[-1].model_copy(update={"title": _A_NOTEBOOK})
+    if problem.code == "no-notebook":
+        return job.result([all_for_one_reason(cell, problem, points=0.0) for cell in job.checks])
+    problem = problem.model_copy(update={"status": Status.UNKNOWN})
+    return job.result([all_for_one_reason(cell, problem, points=None) for cell in job.checks])
+
+
+def not_understood(result: SubmissionResult) -> str:
+    """Return why nobody could read what was handed in, as a sentence; empty if it could be read."""
+    outcomes = [outcome for check in result.checks for outcome in check.outcomes]
+    unread = (one.because for one in outcomes if one.title == _A_NOTEBOOK and one.status is Status.UNKNOWN)
+    return next(unread, "")
 
 
 def job_of(submission: Submission, student: str, lab: Lab, settings: Settings) -> Job:

@@ -17,13 +17,13 @@ class ResultStore:
 
     Args:
         root: of the course.
-        tried: those that were only tried, of which nothing is recorded.
+        folder: where they are, if they do not count: `CoursePaths.tried` or `CoursePaths.doubtful`.
     """
 
-    def __init__(self, root: Path, tried: bool = False) -> None:
+    def __init__(self, root: Path, folder: Path | None = None) -> None:
         """Nothing is read or written before it is asked for."""
         self._root = root
-        self._folder = CoursePaths(root).tried if tried else CoursePaths(root).results
+        self._folder = folder or CoursePaths(root).results
 
     def path(self, lab: str, student: str) -> Path:
         """Where the result of a submission is kept."""
@@ -36,6 +36,13 @@ class ResultStore:
             OSError: it cannot be written; the earlier one is still there.
         """
         result.save(self.path(result.lab, result.student))
+
+    def move(self, lab: str, student: str, to: ResultStore) -> None:
+        """Move a result, if there is one, to another store of the course, in place of an earlier one there."""
+        there = to.path(lab, student)
+        there.parent.mkdir(parents=True, exist_ok=True)
+        with contextlib.suppress(FileNotFoundError):
+            self.path(lab, student).replace(there)
 
     def fitting(
         self, lab: Lab, student: str, digest: str, isolation: Isolation | None = None, seed: int | None = None

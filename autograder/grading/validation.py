@@ -14,6 +14,8 @@ from autograder.course.lab import Cell
 
 NO_RESULT = "no-result"
 """The reason code of a check about which the grading process said nothing."""
+TOO_BUSY = "too-busy"
+"""The reason code of a check whose programs others kept from the CPUs, twice."""
 _LINES, _CHARACTERS = 7, 1000
 """As much of what the worker printed last is kept."""
 
@@ -52,6 +54,15 @@ def undecided(cell: Cell, because: str, printed: str = "", code: str = NO_RESULT
     return all_for_one_reason(cell, outcome, points=None)
 
 
+def too_busy(cell: Cell, seconds: float) -> CheckResult:
+    """Return the result of a check whose programs others kept from the CPUs for so many seconds, alone as well."""
+    because = (
+        f"This machine was too busy: others kept the programs of this check from the CPUs for {seconds:.1f} s"
+        " of the time that decides, also when it was run again alone. Run it again when the machine has less to do."
+    )
+    return undecided(cell, because, code=TOO_BUSY)
+
+
 def all_for_one_reason(cell: Cell, outcome: Outcome, points: float | None) -> CheckResult:
     """Return a check's result that consists of one outcome."""
     return CheckResult(
@@ -60,12 +71,12 @@ def all_for_one_reason(cell: Cell, outcome: Outcome, points: float | None) -> Ch
 
 
 def lacks_a_result(result: SubmissionResult) -> bool:
-    """Whether the grading process failed and kept back a result, which says nothing about the submission.
+    """Whether the grading process, or the machine, kept back a result, which says nothing about the submission.
 
     What was decided stands, and so does a check at which the worker got stuck or died twice: the same programs would
     bring it about again, and a person has to look.
     """
-    return any(outcome.code == NO_RESULT for check in result.checks for outcome in check.outcomes)
+    return any(outcome.code in (NO_RESULT, TOO_BUSY) for check in result.checks for outcome in check.outcomes)
 
 
 def was_killed(check: CheckResult) -> bool:

@@ -19,13 +19,14 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, TextIO
 
-from autograder.checks import findings, runtime
+from autograder.checks import findings, runtime, unusable
 from autograder.checks.misuse import place_of
 from autograder.checks.scoring import Score
 from autograder.core.results import CellResult, CheckResult, NodeLog, Outcome, Status
 from autograder.course.lab import Cell
-from autograder.grading.job import CELL_SECONDS, STUCK_SECONDS, Job
+from autograder.grading.job import CELL_CPU_SECONDS, CELL_SECONDS, STUCK_SECONDS, Job
 from autograder.graph import bag
+from autograder.graph.patience import ALONE
 from autograder.sandbox.inside.warm_up import load_ros
 from autograder.sandbox.limits import MIB
 from autograder.sandbox.scratch import Scratch
@@ -52,6 +53,7 @@ def run_job(job: Job, folder: Path, stacks: TextIO = sys.stderr) -> Iterator[Che
     for name, text in job.files.items():
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         (folder / name).write_text(text, encoding="utf-8")
+    findings.current.alone = job.alone
     runtime.current.configure(folder, job.isolation, job.seed, job.answers, job.built)
     if job.files:
         _ = runtime.current.sandbox  # it warms up while the set-up cells import their messages
@@ -60,7 +62,7 @@ def run_job(job: Job, folder: Path, stacks: TextIO = sys.stderr) -> Iterator[Che
     broken_set_up = ""
     try:
         for number, cell in enumerate(job.cells):
-            limit = CELL_SECONDS + job.build_seconds
+            limit = CELL_SECONDS + ALONE * job.alone + job.build_seconds
             started = time.monotonic()
             findings.current.reset()
             runtime.current.vary_for(f"{job.seed} {cell.grade_id}")
@@ -88,7 +90,14 @@ def _check_result(cell: Cell, value: object, error: str) -> CheckResult:
             *findings.current.outcomes,
             Outcome(status=Status.UNKNOWN, title="The check itself broke", because=because, code="grader"),
         ]
-        found = CellResult(max_points=cell.points or 0.0, points=None, outcomes=outcomes, logs=findings.current.logs)
+        found = CellResult(
+            max_points=cell.points or 0.0,
+            points=None,
+            starved=max(findings.current.starved, findings.current.patience.decided()),
+            outcomes=outcomes,
+            flags=list(dict.fromkeys(findings.current.flags)),
+            logs=findings.current.logs,
+        )
     return _shortened(CheckResult(grade_id=cell.grade_id, title=cell.title, **dict(found)))
 
 
@@ -128,14 +137,30 @@ def _out_of_time(*_: object) -> None:
     raise TimeoutError("the check took longer than it may")
 
 
-def _run_cell(cell: Cell, number: int, namespace: dict[str, Any], limit: float) -> tuple[str, object]:
-    """Run a cell, for at most `limit` seconds; gives an error text, or none, and the value of its last expression."""
+def _out_of_cpu(*_: object) -> None:
+    raise TimeoutError("the check took more of the grader's own CPU time than it may: far too much came in to look at")
+
+
+def _run_cell(
+    cell: Cell, number: int, namespace: dict[str, Any], limit: float, cpu: float = CELL_CPU_SECONDS
+) -> tuple[str, object]:
+    """Run a cell; gives an error text, or none, and the value of its last expression.
+
+    Args:
+        cell: the cell.
+        number: tells it from the others.
+        namespace: of all cells.
+        limit: seconds that it may take.
+        cpu: seconds of CPU that this process may take for it, which the student's programs are no part of.
+    """
     # Lines that begin with % are for the notebook only; an empty line keeps the numbers right.
     source = "\n".join("" if line.startswith("%") else line for line in cell.source.splitlines()) + "\n"
     filename = f"<check {number} {cell.grade_id}>"
     linecache.cache[filename] = (len(source), None, source.splitlines(keepends=True), filename)
     signal.signal(signal.SIGALRM, _out_of_time)
+    signal.signal(signal.SIGPROF, _out_of_cpu)
     signal.setitimer(signal.ITIMER_REAL, limit, 5.0)  # again and again: something may swallow the first
+    signal.setitimer(signal.ITIMER_PROF, cpu, 5.0)
     try:
         tree = ast.parse(source, filename)
         last = tree.body.pop() if tree.body and isinstance(tree.body[-1], ast.Expr) else None
@@ -145,8 +170,10 @@ def _run_cell(cell: Cell, number: int, namespace: dict[str, Any], limit: float) 
             value = eval(compile(ast.Expression(last.value), filename, "eval"), namespace)
     except Exception as error:
         place = place_of(error, lambda name: name == filename)
+        unusable.broke(error, place)
         return f"{type(error).__name__}: {error}" + (f" ({place})" if place else ""), None
     finally:
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
         signal.setitimer(signal.ITIMER_REAL, 0.0)
     return "", value
 

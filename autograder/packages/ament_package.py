@@ -23,6 +23,10 @@ _IMPORT = re.compile(r"^\s*(?:from|import)\s+([a-z]\w*)", re.MULTILINE)
 _ROS_PACKAGE = re.compile(r"rclpy|\w+_msgs|\w+_interfaces|\w+_srvs|tf2_ros")
 _PACKAGE_OF_CHECKS = re.compile(r"""package["']?\s*[=:]\s*["']([a-z][a-z0-9_]*)["']""")
 
+_STARTED_WITH = re.compile(r"""launch_file\(\s*["']([\w.]+)["'][^)]*?\bpackage\s*=\s*["'](\w+)["']""")
+_PACKAGE_OF_NODE = re.compile(r"""^[\s{-]*pkg:\s*["']?([a-z]\w*)""", re.MULTILINE)
+_LAUNCH_FILE = re.compile(r"\.launch\.ya?ml$")
+
 _PACKAGE_XML = """\
 <?xml version="1.0"?>
 <package format="3">
@@ -89,6 +93,34 @@ def package_name(lab: Lab) -> str:
     return next((name for name in named if name not in own), lab.name)
 
 
+def packages_of(lab: Lab, files: Mapping[str, str]) -> dict[str, dict[str, str]]:
+    """The packages that a lab's launch files name, with the files of each; the first one holds what no other does.
+
+    A launch file belongs to the package with which the lab starts it, or else to that of its nodes. Programs and
+    parameter files are in each package: its launch files may name any of them.
+    """
+    first, own = package_name(lab), packages_in(files)
+    text = "\n".join(cell.source for cell in lab.cells)
+    started = dict(_STARTED_WITH.findall(text))
+    belongs = {}
+    for file, content in files.items():
+        if _LAUNCH_FILE.search(file) and "/" not in file:
+            nodes = set(_PACKAGE_OF_NODE.findall(content)).difference(own)
+            belongs[file] = started.get(file) or (nodes.pop() if len(nodes) == 1 else first)
+    found = {first: {file: content for file, content in files.items() if belongs.get(file, first) == first}}
+    for name in sorted(set(belongs.values()) - {first, *own}):
+        found[name] = {
+            file: content
+            for file, content in files.items()
+            if "/" not in file and (file.endswith(".py") or belongs.get(file) == name or _has_parameters(file, content))
+        }
+    return found
+
+
+def _has_parameters(file: str, text: str) -> bool:
+    return not file.endswith(".py") and not _LAUNCH_FILE.search(file) and bool(node_keys(text))
+
+
 def packages_in(files: Iterable[str]) -> list[str]:
     """The packages that a lab has below `src/`, by the names of all its files."""
     return sorted({file.split("/")[1] for file in files if file.startswith(f"{SOURCES}/")})
@@ -109,6 +141,26 @@ def lab_files(lab: Lab, notebook: Path | None) -> dict[str, str]:
     return submission.files
 
 
+def write_packages(lab: Lab, files: Mapping[str, str], folder: Path) -> dict[str, Path]:
+    """Write the packages of a lab with the files of these names; returns their folders, by their names.
+
+    Raises:
+        KitError: see `write_package`; nothing is written then.
+    """
+    found = packages_of(lab, files)
+    _refuse_what_is_there(folder, [*found, *packages_in(files)])
+    title = f"Programs and launch files of {lab.name}"
+    return {name: write_package(name, title, of, folder) for name, of in found.items()}
+
+
+def _refuse_what_is_there(folder: Path, names: Iterable[str]) -> None:
+    for made in names:
+        if (folder / made).exists():
+            raise KitError(
+                f"{folder / made} exists already and stays as it is.", "Move it away, or name another folder."
+            )
+
+
 def write_package(name: str, title: str, files: Mapping[str, str], folder: Path) -> Path:
     """Write a package, and beside it those that are complete already; returns its folder.
 
@@ -121,11 +173,7 @@ def write_package(name: str, title: str, files: Mapping[str, str], folder: Path)
     Raises:
         KitError: something is there already, which is left as it is; or there are no programs.
     """
-    for made in (name, *packages_in(files)):
-        if (folder / made).exists():
-            raise KitError(
-                f"{folder / made} exists already and stays as it is.", "Move it away, or name another folder."
-            )
+    _refuse_what_is_there(folder, [name, *packages_in(files)])
     complete = {
         file.removeprefix(f"{SOURCES}/"): text for file, text in files.items() if file.startswith(f"{SOURCES}/")
     }
@@ -156,7 +204,7 @@ def _place(file: str, text: str, name: str) -> str:
     """The folder in the package that a file belongs into."""
     if file.endswith(".py"):
         return name
-    return "launch" if re.search(r"\.launch\.ya?ml$", file) or node_keys(text) else "config"
+    return "launch" if _LAUNCH_FILE.search(file) or node_keys(text) else "config"
 
 
 def _package_xml(name: str, title: str, files: Mapping[str, str]) -> str:

@@ -6,7 +6,7 @@ import difflib
 import re
 
 from autograder.diagnosis.reason import Diagnosis
-from autograder.packages.workspace import Built
+from autograder.packages.built import Built
 
 _MISSPELT = 0.85
 """How alike two names of programs have to be for one to be the other misspelt: `speed_sensor` is no `speed_monitor`."""

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from autograder.diagnosis.reason import Diagnosis
-from autograder.packages.workspace import Built
+from autograder.packages.built import Built
 
 CODES = {
     "package-xml": "package.xml is missing, or is no package description that ROS's tools accept",
@@ -28,7 +28,9 @@ CODES = {
     "interface-dependency": "an interface file uses a package that DEPENDENCIES does not name",
     "interface-group": "package.xml does not make the package a member of the group of interface packages",
     "build-failed": "the build failed in another way; its first error is quoted",
+    "build-files": "the build made too many files and was ended",
     "build-time": "the build took too long and was ended",
+    "build-limit": "the build went over one of the limits of builds, which is named, and was ended",
 }
 """The reason codes of builds, with what must have been seen for each."""
 
@@ -45,17 +47,29 @@ def why_not_built(built: Built, sources: Path) -> Diagnosis | None:
     wrong = not_described(sources, built.name)
     if wrong is not None:
         return wrong
-    if built.timed_out:
-        hint = "Does a build file wait for something?"
-        return Diagnosis("The build took too long and was ended.", "build-time", hint)
     if built.status == 0:
         return None
-    log = " ".join(built.log.split())
+    if built.over == "time":
+        hint = "Does a build file wait for something?"
+        return Diagnosis("The build took too long and was ended.", "build-time", hint)
+    if built.over:
+        hint = "Does a build file start programs without an end, or keep more and more?"
+        return Diagnosis(f"The build went over its limit of {built.over} and was ended.", "build-limit", hint)
+    return said_of_files(built.log) or _quoted(built.log)
+
+
+def said_of_files(log: str) -> Diagnosis | None:
+    """Return what the tools have said of the package's own files, in words that nothing else brings about; or None.
+
+    Args:
+        log: all that a build that failed has printed.
+    """
+    text = " ".join(log.split())
     for pattern, reason in _REASONS:
-        match = re.search(pattern, log)
+        match = re.search(pattern, text)
         if match:
             return reason(match)
-    return _quoted(built.log)
+    return None
 
 
 def needed_packages(sources: Path, to_build: bool = False) -> list[str]:
@@ -120,6 +134,14 @@ def _unknown_type(match: re.Match[str]) -> Diagnosis:
 
 
 _REASONS: list[tuple[str, _Reason]] = [
+    (
+        r"The build was ended: it made more than ([\d,]+) files",
+        lambda m: Diagnosis(
+            f"The build was ended because it made more than {m[1]} files and folders.",
+            "build-files",
+            "Does a build file make files in a loop?",
+        ),
+    ),
     (
         r"error: can't copy '([^']+)': doesn't exist",
         lambda m: Diagnosis(
@@ -226,8 +248,14 @@ def _quoted(log: str) -> Diagnosis:
         wrong = _python_error(log)
         if wrong:
             return Diagnosis(f"setup.py ends with an error: {wrong}.", "setup-py")
-    first = next((line for line in log.splitlines() if re.search(r"\berror\b|Error", line)), "")
-    return Diagnosis(f"The build fails: {first.strip()[:300]}", "build-failed", "The whole log is below.")
+    return Diagnosis(f"The build fails: {first_error(log)}", "build-failed", "The whole log is below.")
+
+
+def first_error(log: str) -> str:
+    """The first line of a build's log that speaks of an error, or else the last one; empty if there is none."""
+    lines = [line.strip() for line in log.splitlines() if line.strip()]
+    error = next((line for line in lines if re.search(r"\berror\b|Error", line)), "")
+    return (error or "".join(lines[-1:]))[:300]
 
 
 def _python_error(log: str) -> str:

@@ -6,47 +6,17 @@ import hashlib
 import shutil
 import sysconfig
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from pathlib import Path
 
 from autograder.core.errors import KitError
 from autograder.core.results import Isolation
-from autograder.sandbox.build import BuildRun, build_packages
+from autograder.packages.built import Built
+from autograder.packages.fair_build import build
+from autograder.sandbox.build import BuildRun
 
 SOURCES, INSTALLED = "src", "install"
 INSTALL = "Debian, Ubuntu: sudo apt-get install g++ cmake make python3-dev"
 """How to get what interfaces are built with."""
-
-
-@dataclass(frozen=True)
-class Built:
-    """What came of building a package."""
-
-    name: str
-    status: int
-    """Of colcon."""
-    log: str
-    timed_out: bool
-    files: frozenset[str] = field(default_factory=frozenset)
-    """What is installed, as paths below the package's folder in `install`."""
-    folder: Path = Path()
-    """That folder."""
-
-    @property
-    def executables(self) -> list[str]:
-        """Names that `ros2 run` finds: it looks for files in `lib/PACKAGE`."""
-        where = f"lib/{self.name}"
-        return sorted(Path(path).name for path in self.files if str(Path(path).parent) == where)
-
-    def shared(self, name: str) -> str:
-        """Where below `share/PACKAGE` a file of this name is, as `ros2 launch` looks for it; the name if nowhere."""
-        where = f"share/{self.name}/"
-        found = sorted(path for path in self.files if path.startswith(where) and Path(path).name == name)
-        return found[0].removeprefix(where) if found else name
-
-    def text(self, path: str) -> str:
-        """Return an installed file as text; empty if there is none."""
-        return (self.folder / path).read_text("utf-8", "replace") if path in self.files else ""
 
 
 class Workspace:
@@ -73,8 +43,8 @@ class Workspace:
         """Build a package, alone.
 
         Raises:
-            KitError: the package has interfaces, and this machine has nothing to compile them with.
-            OSError: the sandbox cannot be started, or what was built cannot be written.
+            KitError: this machine cannot build it, such as for want of a compiler; that says nothing about the package.
+            OSError: what was built cannot be written.
         """
         lacking = missing_tools()
         if lacking and (self.source(package) / "CMakeLists.txt").is_file():
@@ -84,7 +54,7 @@ class Workspace:
         digest = digest_of(package, _contents(self.source(package)))
         known, built = self._built.get(package, ("", None))
         if built is None or known != digest:
-            run = self._known.get(digest) or build_packages(self._folder / SOURCES, [package], self._isolation)
+            run = self._known.get(digest) or build(self._folder / SOURCES, package, self._isolation)
             built = self._install(package, run)
             self._built[package] = (digest, built)
         return built
@@ -98,7 +68,7 @@ class Workspace:
         for path, content in installed.items():
             (place / path).parent.mkdir(parents=True, exist_ok=True)
             (place / path).write_bytes(content)
-        return Built(package, run.status, run.log, run.timed_out, frozenset(installed), place)
+        return Built(package, run.status, run.log, run.over, frozenset(installed), place)
 
 
 def missing_tools() -> list[str]:

@@ -19,16 +19,20 @@ from pathlib import Path, PurePosixPath
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from autograder.core.processes import cpu_time, descendants, memory
+from autograder.core.errors import KitError
+from autograder.core.processes import cpu_time, descendants, memory, wants_cpu
 from autograder.core.results import Isolation
 from autograder.sandbox.environment import INSIDE, python_environment
 from autograder.sandbox.limits import MIB
-from autograder.sandbox.outer import OuterRun, exchange
+from autograder.sandbox.outer import OUTPUT_LIMIT, OuterRun, exchange
 from autograder.sandbox.scratch import Scratch
 from autograder.sandbox.walls import bubblewrap, seccomp
 
-BUILD_SECONDS = 400.0
-"""Seconds that a build may take. Interfaces take 10 on a quiet machine, and many times that on one that is crowded."""
+BUILD_SECONDS = 800.0
+"""Seconds that a build may take at all. Interfaces take 10 on a quiet machine, and many times that on a crowded one.
+
+A build that gets this far has had too little of the machine: `_CPU` and `_IDLE` end all others before.
+"""
 _INSTALLED = 32 * MIB
 """Bytes of all files together that a build may install."""
 _FILES = 3000
@@ -37,8 +41,10 @@ _MEMORY = 1536 * MIB
 """Bytes of all processes of a build together; two compilers take 400 MiB."""
 _PROCESSES = 64
 """Processes of a build at the same time; about 15 are usual."""
-_CPU = 120.0
-"""Seconds of CPU of all processes of a build together; interfaces take 13."""
+_CPU = 300.0
+"""Seconds of CPU of all processes of a build together; interfaces take 13, and 50 on a machine four times slower."""
+_IDLE = 60.0
+"""Seconds, in all, in which nothing of a build wants to compute: it waits for something that does not come."""
 _LOOK = 0.2
 """Seconds between two looks at them."""
 
@@ -52,9 +58,15 @@ class BuildRun(BaseModel):
     """Of colcon: 0 if every package was built."""
     log: str
     """All that colcon and what it started have printed."""
-    timed_out: bool
+    over: str = ""
+    """What it took too much of, and was ended for: `time` of its own, `processes`, `memory` or `output`."""
     installed: dict[str, bytes] = Field(default_factory=dict)
     """Content by path, such as `car_sensors/lib/car_sensors/speed_sensor`."""
+
+    @property
+    def killed_from_outside(self) -> bool:
+        """Whether a signal that the kit did not send ended the sandbox itself, which nothing inside it can do."""
+        return self.status < 0 and not self.over
 
 
 def build_packages(source: Path, packages: Sequence[str], isolation: Isolation) -> BuildRun:
@@ -67,9 +79,10 @@ def build_packages(source: Path, packages: Sequence[str], isolation: Isolation) 
 
     Raises:
         OSError: the sandbox cannot be started.
+        KitError: the machine had too little time for the build.
     """
     if isolation is Isolation.FULL:
-        return _finished(_in_sandbox(source, packages))
+        return _in_sandbox(source, packages)
     with Scratch() as work:
         command = _command(INSIDE, source, str(work), packages)
         environment = {**python_environment(), "TMPDIR": str(work)}
@@ -77,14 +90,14 @@ def build_packages(source: Path, packages: Sequence[str], isolation: Isolation) 
             command, env=environment, start_new_session=True, cwd=work,
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
         )  # fmt: skip
-        with _watched(process):
+        with _watched(process) as over:
             try:
-                return _finished(exchange(process, b"", BUILD_SECONDS))
+                return _finished(exchange(process, b"", BUILD_SECONDS), over)
             finally:
                 _end_session(process)
 
 
-def _in_sandbox(source: Path, packages: Sequence[str]) -> OuterRun:
+def _in_sandbox(source: Path, packages: Sequence[str]) -> BuildRun:
     rules = bubblewrap.memory_file("filter", seccomp.filter_program())
     options = [*bubblewrap.build_options(source, python_environment()), "--add-seccomp-fd", str(rules)]
     command = _command(Path(bubblewrap.KIT_FOLDER), Path(bubblewrap.STUDENT_FOLDER), _WORK, packages)
@@ -93,32 +106,47 @@ def _in_sandbox(source: Path, packages: Sequence[str]) -> OuterRun:
         process = bubblewrap.start_bwrap(options, command, (rules,), stdin=pipe, stdout=pipe, stderr=pipe)
     finally:
         os.close(rules)
-    with _watched(process):
+    with _watched(process) as over:
         try:
-            return exchange(process, b"", BUILD_SECONDS)
+            return _finished(exchange(process, b"", BUILD_SECONDS), over)
         finally:
             process.kill()  # in a PID namespace, everything with it
             process.wait()
 
 
 @contextlib.contextmanager
-def _watched(process: subprocess.Popen[bytes]) -> Iterator[None]:
-    """Hold a build to what all its processes may use together, which no limit of a single one does."""
-    over = threading.Event()
+def _watched(process: subprocess.Popen[bytes]) -> Iterator[list[str]]:
+    """Hold a build to what all its processes may use together, which no limit of a single one does.
+
+    Gives what is filled with what it took too much of, before it is ended. Of time only its own counts: what it
+    computes, and what it waits for while nobody keeps it from computing.
+    """
+    ended = threading.Event()
+    over: list[str] = []
 
     def watch() -> None:
-        while not over.wait(_LOOK):
+        idle = used_before = 0.0
+        while not ended.wait(_LOOK):
             family = descendants(process.pid)
-            if len(family) > _PROCESSES or sum(map(cpu_time, family)) > _CPU or sum(map(memory, family)) > _MEMORY:
+            used = sum(map(cpu_time, family))
+            idle += _LOOK * (used == used_before and not any(map(wants_cpu, family)))
+            used_before = used
+            if used > _CPU or idle > _IDLE:
+                over.append("time")
+            if len(family) > _PROCESSES:
+                over.append("processes")
+            if sum(map(memory, family)) > _MEMORY:
+                over.append("memory")
+            if over:
                 process.kill()
                 _end_all(family)
 
     watcher = threading.Thread(target=watch, name="build", daemon=True)
     watcher.start()
     try:
-        yield
+        yield over
     finally:
-        over.set()
+        ended.set()
         watcher.join()
 
 
@@ -140,12 +168,23 @@ def _end_session(process: subprocess.Popen[bytes]) -> None:
     process.wait()
 
 
-def _finished(run: OuterRun) -> BuildRun:
+def _finished(run: OuterRun, over: Sequence[str]) -> BuildRun:
+    if run.timed_out and not over:
+        raise KitError(
+            f"This machine was too busy to build a package: that did not end within {BUILD_SECONDS:.0f} s.",
+            "Run it again when the machine has less to do.",
+        )
+    too_much = [*over, *["output"] * (len(run.stdout) > OUTPUT_LIMIT)]
     try:
         installed = dict(_files(run.stdout))
     except (tarfile.TarError, ValueError, EOFError):
         installed = {}
-    return BuildRun(status=run.status, log=run.stderr, timed_out=run.timed_out, installed=installed)
+    return BuildRun(status=run.status, log=run.stderr, over="".join(too_much[:1]), installed=installed)
+
+
+def _is_name(name: str) -> bool:
+    """Whether a file can have this name here, and a result can say it: Linux takes any bytes, and UTF-8 does not."""
+    return "\0" not in name and name.encode("utf-8", "replace").decode("utf-8") == name
 
 
 def _files(archive: bytes) -> Iterator[tuple[str, bytes]]:
@@ -161,7 +200,7 @@ def _files(archive: bytes) -> Iterator[tuple[str, bytes]]:
             number, size = number + 1, size + member.size
             if number > _FILES or size > _INSTALLED:
                 raise ValueError("too much was installed")
-            if not member.isreg() or path.is_absolute() or ".." in path.parts or "\0" in member.name:
+            if not member.isreg() or path.is_absolute() or ".." in path.parts or not _is_name(member.name):
                 continue
             content = tar.extractfile(member)
             if content is not None:

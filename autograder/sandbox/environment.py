@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import os
+import random
+import stat
 import sys
 import sysconfig
 import tempfile
@@ -14,6 +17,8 @@ HERE = Path(__file__).resolve().parent
 INSIDE = HERE / "inside"
 """What the launcher consists of, which stands alone: a sandbox shows it and nothing else of the kit."""
 FASTDDS_PROFILE = INSIDE / "fastdds.xml"
+GROUP = "AUTOGRADER_GROUP"
+"""The variable from which the profile takes the multicast group in which participants find each other."""
 
 
 def profile_environment() -> dict[str, str]:
@@ -23,14 +28,41 @@ def profile_environment() -> dict[str, str]:
     """
     return {
         "RMW_IMPLEMENTATION": "rmw_fastrtps_cpp",
-        "FASTRTPS_DEFAULT_PROFILES_FILE": str(FASTDDS_PROFILE),
+        **group_environment(_group()),
         "ROS_LOG_DIR": str(_log_folder()),
         "RCUTILS_COLORIZED_OUTPUT": "0",
     }
 
 
+def group_environment(group: str) -> dict[str, str]:
+    """Return the variables with which a program takes part in a multicast group, and in no other.
+
+    Args:
+        group: its address.
+    """
+    return {"FASTRTPS_DEFAULT_PROFILES_FILE": str(FASTDDS_PROFILE), GROUP: group}
+
+
+@functools.cache
+def _group() -> str:
+    """The multicast group of this process, drawn by lot: whoever takes the same domain id does not hear it.
+
+    It is one of those that are for private use (RFC 2365). ROS itself uses 239.255.0.1.
+    """
+    return f"239.{'.'.join(str(random.SystemRandom().randrange(1, 255)) for _ in range(3))}"
+
+
+@functools.cache
 def _log_folder() -> Path:
-    return Path(tempfile.gettempdir()) / f"autograder-log-{os.getuid()}"
+    """Where ROS writes its logs: a folder that nobody but its owner can read, even if another user made it first."""
+    folder = Path(tempfile.gettempdir()) / f"autograder-log-{os.getuid()}"
+    with contextlib.suppress(OSError):  # where nothing can be written, ROS says so
+        folder.mkdir(mode=0o700, exist_ok=True)
+        found = folder.lstat()
+        if not stat.S_ISDIR(found.st_mode) or found.st_uid != os.getuid():
+            return Path(tempfile.mkdtemp(prefix=f"{folder.name}-"))
+        folder.chmod(0o700)
+    return folder
 
 
 def remove_logs() -> None:
@@ -121,4 +153,5 @@ def _is_system(path: Path) -> bool:
 
 
 SYSTEM_FOLDERS = ("/usr", "/bin", "/sbin", "/lib", "/lib64", "/lib32")
-SYSTEM_FILES = ("/etc/ld.so.cache", "/etc/localtime", "/etc/nsswitch.conf", "/etc/alternatives")
+SYSTEM_FILES = ("/etc/ld.so.cache", "/etc/alternatives")
+"""Where libraries are, and which compiler is `cc`. Time zone and user are told by the environment."""

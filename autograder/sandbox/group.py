@@ -15,7 +15,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from autograder.core.errors import KitError
-from autograder.core.processes import cpu_time, memory, pid_of
+from autograder.core.processes import memory, pid_of
 from autograder.sandbox import watch
 from autograder.sandbox.limits import Limits
 from autograder.sandbox.loop import Loop
@@ -71,8 +71,6 @@ class ProgramGroup:
         """The first process as this process sees it."""
         self._base = 0
         """Bytes of memory that it had before it started anything."""
-        self.cpu = 0.0
-        """Seconds of CPU that all its programs have had, once it has ended."""
         self._ready = False
         self._broken = ""
         self._over = False
@@ -153,9 +151,9 @@ class ProgramGroup:
             programs = [program for program in self._programs.values() if program.pid > 0]
             if self._over or not programs:
                 return
+            self._pipes.go_on()
             for program in programs:
-                if time.monotonic() - program.began > self._limits.wall_seconds:
-                    program._kill("time limit")
+                watch.put_behind(program)
             if not watch.enforce(self.pid, self._base, programs, self._limits):
                 signal.pidfd_send_signal(self._first, signal.SIGKILL)
             self.changed.notify_all()
@@ -231,7 +229,7 @@ class ProgramGroup:
     def _forget(self, number: int, status: int) -> None:
         program = self._programs.pop(number, None)
         if program is not None:
-            self._pipes.drain(program)
+            self._pipes.take_rest(program)
             program._ended(status)
             self._pipes.close(program)
 
@@ -239,7 +237,6 @@ class ProgramGroup:
         if self._over:
             return
         self._over = True
-        self.cpu = sum(cpu_time(pid) for pid in (self.pid, *(one.pid for one in self._programs.values())) if pid > 0)
         try:
             self._kill()
         finally:

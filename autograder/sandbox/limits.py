@@ -1,4 +1,10 @@
-"""What a student's programs may use."""
+"""What a student's programs may use.
+
+Nothing here is a statement about the machine. How long a program runs, how much it computes and how much it prints
+depends on how fast that is and on what else it does, so none of these ends a program: it runs until the end of its
+launch, one that computes on and on gives way to others (`watch.py`), and one that prints without end is read no faster
+than a terminal would (`program_pipes.py`).
+"""
 
 from __future__ import annotations
 
@@ -9,7 +15,7 @@ MIB = 1024 * 1024
 
 @dataclass(frozen=True)
 class Limits:
-    """Limits of a launch. Sizes are in bytes, times in seconds."""
+    """Limits of a launch. Sizes are in bytes."""
 
     memory: int = 512 * MIB
     """Sum over all programs of what they do not share with each other."""
@@ -25,16 +31,7 @@ class Limits:
     """What may lie in /tmp, and again in /dev/shm."""
     inodes: int = 1024
     """Files and folders there, again in each: an empty file costs the kernel a kilobyte that no limit counts."""
-    cpu_seconds: int = 10
-    """Of one process. A whole node takes a third of a second."""
-    cpu_together: int = 100
-    """Of all launches of a submission: what it has left when that is used up is `cpu_last`."""
-    cpu_last: int = 2
-    wall_seconds: float = 180.0
-    """Of one program."""
     output_kept: int = 256 * 1024
     """How much of a program's output is kept: the first half and the last half of it."""
-    output_bytes: int = 1 * MIB
-    """A program that writes more is ended. A flood gets here before a check is over on a crowded machine, too."""
     events: int = 2000
     """How many lines of the probe are kept."""

@@ -50,8 +50,6 @@ class NodeSandbox:
         self.limits = limits or Limits()
         self._lock = threading.Lock()
         self._groups: list[ProgramGroup] = []
-        self._cpu = 0.0
-        """Seconds of CPU that ended groups have had."""
         self._launcher: subprocess.Popen[bytes] | None = None
         self._channel: socket.socket | None = None
         self._said = -1
@@ -66,11 +64,8 @@ class NodeSandbox:
             self.close()
             raise
 
-    def group(self, limits: Limits | None = None) -> ProgramGroup:
+    def group(self) -> ProgramGroup:
         """Begin a launch: programs that are started in it find a fresh /tmp, and end with it and with no other.
-
-        Args:
-            limits: of this launch, if others than those of the sandbox; only where nobody is isolated.
 
         Raises:
             KitError: it cannot be begun.
@@ -78,7 +73,7 @@ class NodeSandbox:
         why = ""
         for _ in range(2):
             try:
-                group = self._new_group(limits or self.limits)
+                group = self._new_group()
                 group.wait_ready(_READY_WITHIN)
             except (OSError, GroupLost) as error:
                 why = self._last_words() or str(error)
@@ -110,16 +105,20 @@ class NodeSandbox:
         """Close it."""
         self.close()
 
-    def _new_group(self, limits: Limits) -> ProgramGroup:
+    def _new_group(self) -> ProgramGroup:
         with self._lock:
             if self._closed or self._channel is None:
                 raise KitError("The node sandbox is closed.")
             full = self.isolation is Isolation.FULL
+            limits = bubblewrap.rlimits(self.limits)
+            if self.isolation is Isolation.NONE:
+                # The kernel counts all that a user runs: with a browser, or a few notebooks, nothing would start.
+                del limits["RLIMIT_NPROC"]  # what a launch has too many of, `watch` counts and ends
             request = {
                 "namespaces": full,
-                "disk": limits.disk,
-                "inodes": limits.inodes,
-                "limits": bubblewrap.rlimits(limits, self._cpu_seconds(limits)),
+                "disk": self.limits.disk,
+                "inodes": self.limits.inodes,
+                "limits": limits,
                 # With reduced isolation the launcher is under this filter already; nobody is kept from himself.
                 "filter": seccomp.filter_program().hex() if full else "",
                 "program_filter": seccomp.no_processes().hex(),
@@ -128,23 +127,14 @@ class NodeSandbox:
             try:
                 socket.send_fds(self._channel, [json.dumps(request).encode()], [theirs.fileno()])
                 inside = bubblewrap.STUDENT_FOLDER if full else str(self.folder)
-                group = ProgramGroup(self.folder, inside, self._environment(), limits, self._loop, ours)
+                group = ProgramGroup(self.folder, inside, self._environment(), self.limits, self._loop, ours)
             except BaseException:
                 ours.close()
                 raise
             finally:
                 theirs.close()
-            self._groups.append(group)
+            self._groups = [*(one for one in self._groups if not one.over), group]
             return group
-
-    def _cpu_seconds(self, limits: Limits) -> int:
-        """What a program may still use. A submission full of programs that only compute must not take the machine."""
-        self._cpu += sum(group.cpu for group in self._groups if group.over)
-        self._groups = [group for group in self._groups if not group.over]
-        if self.isolation is Isolation.NONE:
-            return limits.cpu_seconds
-        left = int(limits.cpu_together - self._cpu)
-        return max(limits.cpu_last, min(limits.cpu_seconds, left))
 
     def _environment(self) -> dict[str, str]:
         variables = python_environment()

@@ -14,6 +14,8 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from autograder.core import interrupts
+from autograder.core.cpu_use import cpus_environment
 from autograder.core.results import Isolation
 from autograder.sandbox.environment import python_environment
 from autograder.sandbox.forks import Fork, ForkServer
@@ -120,6 +122,7 @@ def _run(
 def _environment() -> dict[str, str]:
     return {
         **python_environment(),
+        **cpus_environment(),
         "PYTHONPATH": str(bubblewrap.PACKAGE.parent),
         "PYTHONSAFEPATH": "1",
         "HOME": "/tmp",
@@ -149,9 +152,13 @@ def start_fork_server(channel: int, stderr: int, idle: float = 60.0) -> subproce
         # Namespaces nest only for an ordinary user, and only root may read below /root: give up root inside a mount
         # tree of our own, in which this Python lies under folders that everyone may enter.
         around = (bubblewrap.options_for_root(), [sys.executable, "-I", "-S", "-c", _GIVE_UP_ROOT])
-    return bubblewrap.start_bwrap(
-        bubblewrap.outer_options(_environment()), command, (channel,), stderr=stderr, around=around
-    )
+    copies = bubblewrap.copies_of_files()
+    options = bubblewrap.outer_options(_environment(), copies)
+    try:
+        return bubblewrap.start_bwrap(options, command, (channel, *copies.values()), stderr=stderr, around=around)
+    finally:
+        for descriptor in copies.values():
+            os.close(descriptor)
 
 
 _forks = ForkServer(start_fork_server)
@@ -210,6 +217,7 @@ def exchange(
                 break
             if stop is not None and stop.is_set():
                 raise Stopped
+            interrupts.here()
             for key, _ in selector.select(min(left, _STOP_POLL)):
                 name, stream = key.data
                 if name == "stdin":

@@ -1,4 +1,8 @@
-"""The pipes from a program: its output, its probe's notes, its threads' stacks."""
+"""The pipes from a program: its output, its probe's notes, its threads' stacks.
+
+One that writes without end is read no faster than a terminal would read it. Then it has to wait when it prints, as it
+would there, and neither it nor the reading takes the machine from others.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +17,9 @@ from autograder.sandbox.running_program import RunningProgram
 _PIECE = 1 << 16
 """Bytes read at once."""
 _MOST_PIECES = 64
-"""Of one pipe before others have their turn: more than a program may write."""
+"""Of one pipe before others have their turn: more than is read at once."""
+_AT_ONCE = 1 << 18
+"""Bytes of one pipe that are read between two looks at the launch: some megabytes a second, a book a second."""
 
 
 class ProgramPipes:
@@ -28,6 +34,10 @@ class ProgramPipes:
         """Begin with no program."""
         self._loop = loop
         self._changed = changed
+        self._read: dict[int, int] = {}
+        """Bytes that were read of a pipe since the last look."""
+        self._paused: dict[int, Callable[[], None]] = {}
+        """What reads a pipe that was full of more than may be read at once."""
 
     def open(self, program: RunningProgram) -> list[int]:
         """Make a program's pipes, and read them from now on; return the ends to write to, closed by the caller."""
@@ -49,10 +59,21 @@ class ProgramPipes:
     def catch_up(self, program: RunningProgram) -> None:
         """Take what lies in a running program's pipes: its answer may have come by DDS before its notes were read."""
         if program.readers:
-            self._loop.do(lambda: self.drain(program))
+            self._loop.do(lambda: self._drain(program))
 
-    def drain(self, program: RunningProgram) -> None:
-        """Take what a program has left in its pipes, at most one limit's worth; only from the sandbox's thread."""
+    def go_on(self) -> None:
+        """Read on where more was written than is read at once; only from the sandbox's thread."""
+        self._read.clear()
+        for descriptor, read in self._paused.items():
+            self._loop.when_readable(descriptor, read)
+        self._paused.clear()
+
+    def take_rest(self, program: RunningProgram) -> None:
+        """Take what a program that has ended has left in its pipes; only from the sandbox's thread."""
+        self.go_on()
+        self._drain(program)
+
+    def _drain(self, program: RunningProgram) -> None:
         for descriptor in list(program.readers):
             for _ in range(_MOST_PIECES):
                 before = program._written + program._noted
@@ -78,6 +99,10 @@ class ProgramPipes:
                     self._close(program, descriptor)
                     return
             if data:
+                self._read[descriptor] = self._read.get(descriptor, 0) + len(data)
+                if self._read[descriptor] >= _AT_ONCE:
+                    self._loop.forget(descriptor)
+                    self._paused[descriptor] = read
                 with self._changed:
                     taker(data)
                     self._changed.notify_all()
@@ -87,5 +112,7 @@ class ProgramPipes:
     def _close(self, program: RunningProgram, descriptor: int) -> None:
         if descriptor in program.readers:
             program.readers.remove(descriptor)
-            self._loop.forget(descriptor)
+            if self._paused.pop(descriptor, None) is None:
+                self._loop.forget(descriptor)
+            self._read.pop(descriptor, None)
             os.close(descriptor)

@@ -72,8 +72,6 @@ class RunningProgram:
         self._tail += data[room:] if room < len(data) else b""
         if len(self._tail) > 2 * half:
             del self._tail[:-half]
-        if self._written > self._limits.output_bytes:
-            self._kill("output limit")
 
     def _take_events(self, data: bytes) -> None:
         self._noted += len(data)
@@ -105,8 +103,6 @@ class RunningProgram:
         if self._status is not None:
             return
         self._status = status
-        if not self._stopped_by and status == -signal.SIGXCPU:
-            self._stopped_by = "CPU time limit"
         if not self._stopped_by and status != 0 and any(event.get("e") == "memory_error" for event in self._events):
             self._stopped_by = "memory limit"
         if self._handle >= 0:
@@ -130,7 +126,7 @@ class RunningProgram:
         return self._status
 
     def stopped_by(self) -> str:
-        """Return which limit ended it (`memory`, `process`, `output`, `time` or `CPU time limit`), or "" for none."""
+        """Return which limit ended it (`memory limit` or `process limit`), or "" for none."""
         return self._stopped_by
 
     def output(self) -> str:

@@ -1,6 +1,6 @@
 """Prints without end.
 
-Must: output limit.
+Must: goes on.
 """
 
 import os

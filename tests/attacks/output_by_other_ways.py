@@ -1,6 +1,6 @@
 """Floods its output by standard error and by a second way to the same pipe.
 
-Must: output limit.
+Must: goes on.
 """
 
 import os

@@ -12,7 +12,6 @@ for name in (
     "NPROC",
     "NOFILE",
     "FSIZE",
-    "CPU",
     "CORE",
     "MSGQUEUE",
     "MEMLOCK",

@@ -18,6 +18,6 @@ while time.monotonic() < end:
         kind = random.choice([0x06, 0x07, 0x08, 0x09, 0x0C, 0x0E, 0x13, 0x15, 0x16])
         body = os.urandom(random.randrange(400))
         packet += struct.pack("<BBH", kind, random.randrange(16), random.choice([len(body), 0, 65535])) + body
-    for port in range(7400 + 250 * domain, 7400 + 250 * domain + 40):
+    for port in range(7528 + 250 * domain, 7528 + 250 * domain + 40):
         out.sendto(packet, ("127.0.0.1", port))
 print("done")

@@ -2,6 +2,7 @@
 
 import contextlib
 import os
+import resource
 import shutil
 import signal
 import socket
@@ -63,9 +64,11 @@ def _fork_first_process(launch: Launch) -> None:
             fresh_places.make(launch.disk, launch.inodes)
             fresh_places.close_settings()
             give_up_privileges()
+        _, most = resource.getrlimit(resource.RLIMIT_NOFILE)
+        if resource.RLIM_INFINITY != most < launch.limits["RLIMIT_NOFILE"]:  # right programs would lack them
+            raise OSError(f"this machine allows a process only {most} open files")
         for name, value in launch.limits.items():
-            if name != "RLIMIT_CPU":
-                limit(name, value)
+            limit(name, value)
         if launch.filter:
             filter_calls(launch.filter)
     except OSError as error:

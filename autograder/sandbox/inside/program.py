@@ -9,8 +9,10 @@ import linecache
 import os
 import signal
 import sys
+import threading
 import traceback
 import types
+from typing import Any
 
 from .interrupt import interrupt
 from .kernel import PR_SET_DUMPABLE, filter_calls, limit, prctl
@@ -71,6 +73,8 @@ def run(start: Start) -> None:
     linecache.clearcache()
     importlib.invalidate_caches()
     sys.excepthook = _print_own_frames
+    threading.excepthook = _print_own_frames_of_thread
+    _leave_out_of_tracebacks()
     main = types.ModuleType("__main__")
     main.__file__ = start.path
     main.__builtins__ = builtins  # type: ignore[attr-defined]
@@ -116,6 +120,25 @@ def _print_own_frames(kind: type[BaseException], error: BaseException, trace: ty
         link.__traceback__ = _without_kit(link.__traceback__)
         link = link.__cause__ or link.__context__
     traceback.print_exception(kind, error, error.__traceback__)
+
+
+def _print_own_frames_of_thread(args: threading.ExceptHookArgs) -> None:
+    if args.exc_value is None or args.exc_type is SystemExit:
+        return
+    print(f"Exception in thread {args.thread.name if args.thread else '?'}:", file=sys.stderr)
+    _print_own_frames(args.exc_type, args.exc_value, args.exc_traceback)
+
+
+def _leave_out_of_tracebacks() -> None:
+    """Whoever prints or logs a traceback, such as rclpy's action server: no frame of the probe is in it."""
+    as_before = traceback.TracebackException.__init__
+
+    def without_kit(self: Any, kind: Any, error: Any, trace: Any, *args: Any, **kwargs: Any) -> None:
+        with contextlib.suppress(Exception):
+            trace = _without_kit(trace)
+        as_before(self, kind, error, trace, *args, **kwargs)
+
+    traceback.TracebackException.__init__ = without_kit  # type: ignore[method-assign, assignment]
 
 
 def _without_kit(trace: types.TracebackType | None) -> types.TracebackType | None:

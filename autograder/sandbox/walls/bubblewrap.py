@@ -19,7 +19,10 @@ KIT_FOLDER = "/run/kit"
 BUILD_DISK = 128 * MIB
 """Bytes that a build may write; interfaces take 15 MiB."""
 
-_NAMESPACES = ["--unshare-user", "--unshare-pid", "--unshare-ipc", "--unshare-uts", "--cap-drop", "ALL"]
+_NAMESPACES = [
+    *("--unshare-user", "--unshare-pid", "--unshare-ipc", "--unshare-uts", "--cap-drop", "ALL"),
+    *("--hostname", "robot"),  # not the machine's own name
+]
 _LIFE = ["--die-with-parent", "--new-session"]
 
 
@@ -39,8 +42,12 @@ def bwrap() -> str:
     return str(path)
 
 
-def system_options() -> list[str]:
-    """Show the system's programs and libraries read-only, and the little of /etc that they need."""
+def system_options(copies: Mapping[str, int] | None = None) -> list[str]:
+    """Show the system's programs and libraries read-only, and the little of /etc that they need.
+
+    Args:
+        copies: descriptors of copies, by the names of files, which are shown in place of these.
+    """
     options: list[str] = []
     for name in SYSTEM_FOLDERS:
         folder = Path(name)
@@ -49,8 +56,18 @@ def system_options() -> list[str]:
         elif folder.is_dir():
             options += ["--ro-bind", name, name]
     for name in SYSTEM_FILES:
-        options += ["--ro-bind-try", name, name]
+        copy = (copies or {}).get(name)
+        options += ["--ro-bind-try", name, name] if copy is None else ["--perms", "0444", "--file", str(copy), name]
     return options
+
+
+def copies_of_files() -> dict[str, int]:
+    """Descriptors, closed by the caller, of copies of what the sandboxes show of /etc, by the names of the files.
+
+    A package manager may replace such a file while a sandbox lives. What is shown of the old one can then not be shown
+    to the sandboxes within it, and none of them would start any more.
+    """
+    return {name: memory_file("copy", Path(name).read_bytes()) for name in SYSTEM_FILES if Path(name).is_file()}
 
 
 def _read_only(paths: Iterable[Path]) -> list[str]:
@@ -84,11 +101,16 @@ def options_for_root() -> list[str]:
     ]  # fmt: skip
 
 
-def outer_options(variables: Mapping[str, str]) -> list[str]:
-    """The grading sandbox: trusted code, its own network, nothing of the course but this package."""
+def outer_options(variables: Mapping[str, str], copies: Mapping[str, int]) -> list[str]:
+    """The grading sandbox: trusted code, its own network, nothing of the course but this package.
+
+    Args:
+        variables: its environment.
+        copies: as `copies_of_files` returned them.
+    """
     return [
         *_NAMESPACES, "--unshare-net", *_LIFE, "--uid", "1000", "--gid", "1000",
-        "--perms", "1777", "--tmpfs", "/tmp", *system_options(), *_python(), *_read_only([PACKAGE]),
+        "--perms", "1777", "--tmpfs", "/tmp", *system_options(copies), *_python(), *_read_only([PACKAGE]),
         "--proc", "/proc", "--dev", "/dev", "--remount-ro", "/dev", "--remount-ro", "/", "--chdir", "/tmp",
         *_environment(variables),
     ]  # fmt: skip
@@ -119,7 +141,7 @@ def build_options(source: Path, variables: Mapping[str, str]) -> list[str]:
     A /tmp of its own of limited size is all that can be written to.
     """
     return [
-        *_NAMESPACES, "--unshare-net", "--disable-userns", *_LIFE,
+        *_NAMESPACES, "--unshare-net", "--disable-userns", "--as-pid-1", *_LIFE,
         "--size", str(BUILD_DISK), "--perms", "1777", "--tmpfs", "/tmp",
         *system_options(), *_python(), "--ro-bind", str(INSIDE), KIT_FOLDER, "--ro-bind", str(source), STUDENT_FOLDER,
         "--proc", "/proc", "--dev", "/dev", "--remount-ro", "/dev", "--remount-ro", "/", "--chdir", "/tmp",
@@ -170,7 +192,7 @@ def start_bwrap(
             os.close(descriptor)
 
 
-def rlimits(limits: Limits, cpu_seconds: int) -> dict[str, int]:
+def rlimits(limits: Limits) -> dict[str, int]:
     """Return the limits of one program by the names of the `resource` module."""
     return {
         "RLIMIT_AS": limits.address_space,
@@ -178,7 +200,6 @@ def rlimits(limits: Limits, cpu_seconds: int) -> dict[str, int]:
         "RLIMIT_NPROC": limits.processes,
         "RLIMIT_NOFILE": limits.open_files,
         "RLIMIT_FSIZE": limits.file_size,
-        "RLIMIT_CPU": cpu_seconds,
         "RLIMIT_SIGPENDING": limits.signals,
         "RLIMIT_CORE": 0,
         "RLIMIT_MSGQUEUE": 0,

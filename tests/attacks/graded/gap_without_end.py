@@ -25,7 +25,7 @@ while True:
         gap = bytes([0, 0, entity, 0xC7, 0, 0, entity, 0xC2])
         gap += struct.pack("<iIiII", 0, 1, 1 << 30, 0, 0)
         packet = b"RTPS" + bytes([2, 3, 1, 15]) + prefix + struct.pack("<BBH", 8, 1, len(gap)) + gap
-        for port in range(7400 + 250 * domain, 7400 + 250 * domain + 16):
+        for port in range(7528 + 250 * domain, 7528 + 250 * domain + 16):
             out.sendto(packet, ("127.0.0.1", port))
     rclpy.spin_once(node, timeout_sec=0.1)
     time.sleep(0.1)

@@ -1,0 +1,201 @@
+"""Known answers that run unseen among a class, to notice where a verdict depends on the machine or the executor.
+
+They are jobs like all others, at the beginning, in the middle and at the end of the class. Where one gets other points
+than it must, it flips: what ran at about that time is doubtful. They are recorded nowhere.
+"""
+
+from __future__ import annotations
+
+import json
+import tempfile
+import uuid
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from autograder.core.errors import KitError
+from autograder.core.results import CheckResult, SubmissionResult
+from autograder.course.lab import Lab
+from autograder.course.paths import CoursePaths
+from autograder.grading.job import Job
+from autograder.grading.known_answers import KnownAnswers
+from autograder.grading.runner import Settings, job_of
+from autograder.submission.reader import read_submission
+
+JOBS_PER_PAIR = 20
+"""A class has a pair of canaries for each so many jobs, which is a tenth of them: at least one pair, at most three."""
+_SAME = 0.01
+"""Points that differ by less are the same, for a part of a table may give a third of a point."""
+_LISTED = 12
+"""As many flips are listed."""
+_MOMENTS = {2: ("at the beginning", "at the end"), 3: ("at the beginning", "in the middle", "at the end")}
+
+
+@dataclass(frozen=True)
+class Flip:
+    """A known answer that got other points than it must."""
+
+    moment: str
+    check: str
+    right: bool
+    """Whether the answer is the right one."""
+    expected: str
+    """The points that it must get, in words."""
+    seen: CheckResult
+
+    @property
+    def why(self) -> str:
+        """The reason that the check gave for taking points; empty if it took none."""
+        failure = self.seen.first_failure
+        return f"Its reason: {failure.title}: {failure.because or failure.observed}" if failure is not None else ""
+
+    def __str__(self) -> str:
+        """Return it as a sentence."""
+        answer = "right" if self.right else "wrong"
+        got = f"{self.seen.points:g} of {self.seen.max_points:g}. {self.why}".rstrip()
+        return f"`{self.check}` {self.moment}: a {answer} answer must get {self.expected}, and got {got}"
+
+
+def known_jobs(known: Sequence[KnownAnswers], lab: Lab, settings: Settings, names: Sequence[str]) -> list[Job]:
+    """Return the notebooks as jobs, read as if somebody had handed them in under these names."""
+    jobs = []
+    with tempfile.TemporaryDirectory(prefix="class-") as folder:
+        for number, (one, name) in enumerate(zip(known, names, strict=True)):
+            path = Path(folder, str(number), f"{lab.name}.ipynb")
+            path.parent.mkdir()
+            path.write_text(json.dumps(lab.clean_notebook(one.sources)), encoding="utf-8")
+            jobs.append(job_of(read_submission(path, lab), name, lab, settings))
+    return jobs
+
+
+def otherwise(known: KnownAnswers, lab: Lab, result: SubmissionResult, moment: str = "") -> list[Flip]:
+    """Return the checks that gave a notebook other points than it must get; what nobody could find out is none."""
+    full = {check.grade_id: check.points or 0.0 for check in lab.checks}
+    flips = []
+    for check in result.checks:
+        must, most = known.points[check.grade_id], full[check.grade_id]
+        if check.points is None or (check.points < most if must is None else abs(check.points - must) < _SAME):
+            continue
+        expected = f"fewer than {most:g} points" if must is None else f"{must:g} point{'s' * (must != 1)}"
+        flips.append(Flip(moment, check.grade_id, must == most, expected, check))
+    return flips
+
+
+@dataclass(frozen=True)
+class _Placed:
+    known: KnownAnswers
+    moment: str
+    beside: frozenset[str]
+    """The students who run at about the same time."""
+
+
+@dataclass
+class Canaries:
+    """The known answers of one run of a class, and what came of them."""
+
+    lab: Lab
+    known: list[KnownAnswers]
+    """A pair that complements each other, or none."""
+    settings: Settings
+    flips: list[Flip] = field(default_factory=list)
+    undecided: int = 0
+    """Checks of known answers of which nobody could find out what they come to."""
+    doubtful: set[str] = field(default_factory=set)
+    """The students who ran beside one that flipped."""
+    ran: int = 0
+    """Canaries whose result is there."""
+    seconds: float = 0.0
+    """How long they ran in all, as if one had run after the other."""
+    class_seconds: float = 0.0
+    """The same of the submissions that they ran among."""
+    _placed: dict[str, _Placed] = field(default_factory=dict)
+
+    def among(self, jobs: Mapping[str, Job]) -> list[Job]:
+        """Return the jobs of a class, by student, in their order and with the known answers among them."""
+        students, class_ = list(jobs), list(jobs.values())
+        if not self.known:
+            return class_
+        pairs = max(1, min(3, len(class_) // JOBS_PER_PAIR))
+        groups = [self.known[:1], self.known[1:]] if pairs == 1 else [self.known] * pairs
+        length = -(-len(class_) // (len(groups) - 1))
+        parts = [slice(n * length, (n + 1) * length) for n in range(len(groups) - 1)]
+        mixed: list[Job] = []
+        for number, (group, moment) in enumerate(zip(groups, _MOMENTS[len(groups)], strict=True)):
+            neighbours = parts[max(0, number - 1) : number + 1]
+            beside = frozenset(student for part in neighbours for student in students[part])
+            names = [self._new_name(jobs) for _ in group]
+            self._placed |= {name: _Placed(one, moment, beside) for name, one in zip(names, group, strict=True)}
+            mixed += known_jobs(group, self.lab, self.settings, names)
+            mixed += class_[parts[number]] if number < len(parts) else []
+        return mixed
+
+    def _new_name(self, taken: Collection[str]) -> str:
+        """A name like no student's of the class; what a name looks like is nobody's business."""
+        name = uuid.uuid4().hex[:12]
+        return self._new_name(taken) if name in taken else name
+
+    def has(self, name: str) -> bool:
+        """Whether a job of this name is a known answer."""
+        return name in self._placed
+
+    def take(self, result: SubmissionResult) -> None:
+        """Compare the result of a known answer with what it must be."""
+        placed = self._placed[result.student]
+        self.ran += 1
+        self.seconds += result.seconds.get("total", 0.0)
+        self.undecided += sum(check.points is None for check in result.checks)
+        flips = otherwise(placed.known, self.lab, result, placed.moment)
+        self.flips += flips
+        if flips:
+            self.doubtful |= placed.beside
+
+    def told(self, root: Path) -> list[str]:
+        """Say what came of them and what they cost, as sentences for the end of a run; none if none ran."""
+        if not self.ran:
+            return []
+        name = CoursePaths(root).canaries(self.lab.name)
+        whole = self.seconds + self.class_seconds
+        share = f" They took {100 * self.seconds / whole:.0f} % of the running time." if whole else ""
+        sentences = [
+            f"Canaries: {self.ran} notebooks with known answers ran among the class. {self._verdicts()}{share}"
+        ]
+        checks = self.lab.checks
+        without = sum(all(one.points[check.grade_id] == check.points for one in self.known) for check in checks)
+        if any(None in one.points.values() for one in self.known):
+            sentences.append(
+                f"There is no {name}, so their wrong answers are the notebook as students receive it: they show little."
+            )
+        elif without:
+            sentences.append(f"{name} has no wrong answer for {without} of {len(checks)} checks.")
+        return sentences
+
+    def _verdicts(self) -> str:
+        checks = self.ran * len(self.lab.checks)
+        sentences = []
+        if self.flips:
+            sentences.append(f"{len(self.flips)} of their {checks} checks gave other points than they must.")
+        if self.undecided:
+            sentences.append(f"The grader could not find out about {self.undecided} of their {checks} checks.")
+        return " ".join(sentences) or "Each check gave them the points that it must."
+
+    def refusal(self, root: Path, believed: int) -> KitError:
+        """Return why nothing is recorded after a flip, and what a person should do.
+
+        Args:
+            root: of the course.
+            believed: as many results of the class are kept.
+        """
+        lines = [f"\n  {flip}" for flip in self.flips[:_LISTED]]
+        lines += [f"\n  and {len(self.flips) - _LISTED} more"] if len(self.flips) > _LISTED else []
+        name = self.lab.name
+        return KitError(
+            f"No grade was written, because answers with known points got other points in this run:{''.join(lines)}",
+            "Points must not depend on the machine, so the results of whoever ran beside such an answer are doubtful.\n"
+            "  1. See what else runs on this machine (`top`), and what it lacks (`autograder doctor`).\n"
+            "  2. Grade again with fewer runs at once, such as --jobs"
+            f" {max(1, self.settings.at_once // 2)}. Of this class {believed} can be believed and"
+            f" will not be run again; {len(self.doubtful)} will be.\n"
+            "  3. If the same check does it on a quiet machine, too, then the check or its entry in\n"
+            f"     {CoursePaths(root).canaries(name)} is wrong: autograder lint {name}\n"
+            "  With --despite-canaries all results count as they are, and nothing is run again.",
+        )
