@@ -28,14 +28,14 @@ from rclpy.qos import (
 )
 from std_msgs.msg import Int64
 
-from autograder.checks import runtime
 from autograder.checks.concurrency import Concurrency
 from autograder.checks.program import Program
-from autograder.core.cpu_use import CpuUse, cpu_uses, kept_waiting
+from autograder.core.cpu_use import CpuUse, CpuWait, cpu_uses, kept_waiting
 from autograder.core.errors import KitError
-from autograder.graph import domains
+from autograder.graph.domains import claim_domain
 from autograder.graph.names import nearest
 from autograder.graph.observer import Observer
+from autograder.graph.patience import Patience
 from autograder.graph.qos import first_mismatch
 from autograder.graph.recording import Received
 from autograder.sandbox.environment import profile_environment
@@ -96,13 +96,6 @@ def test_the_order_of_publication_decides_not_the_order_of_arrival() -> None:
     assert Concurrency([messages[i] for i in (0, 2, 1, 3)]).overlap("ab") == 1
 
 
-def test_where_idle_kernels_claim_every_domain_one_without_programs_is_taken(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A hundred kernels are too many for a test: that all domains are claimed, and one is free, is said for them."""
-    monkeypatch.setattr(domains, "_claimed", lambda _domain: None)
-    monkeypatch.setattr(domains, "is_free", lambda domain: domain == 42)
-    assert next(domains.free_domains()) == 42
-
-
 @pytest.mark.parametrize(
     ("wanted", "names", "meant"),
     [
@@ -142,7 +135,8 @@ def test_a_parameter_keeps_its_type_on_the_command_line(value: bool | int | floa
 @pytest.fixture
 def observer() -> Iterator[Observer]:
     os.environ.update(profile_environment())
-    watching = Observer(runtime.current.next_domain())
+    domain = claim_domain()
+    watching = Observer(domain.id, left=domain.release)
     yield watching
     watching.close()
 
@@ -188,17 +182,17 @@ def test_time_in_which_a_program_got_no_cpu_does_not_count_against_it(
     observer: Observer, programs: Callable[[str], int]
 ) -> None:
     programs(WORKS_NOW_AND_THEN)
-    patience, took, deadline = observer.patience, 0.0, time.monotonic() + 60
+    patience, took, deadline = observer.patience.left, 0.0, time.monotonic() + 60
     while took <= 2.2 and time.monotonic() < deadline:  # until the strangers kept it from working meanwhile
         began = time.monotonic()
         assert not observer.wait(lambda: False, within=2.0)
         took = time.monotonic() - began
     assert took > 2.2
-    assert observer.patience < patience
-    observer.patience = 0.0
+    assert observer.patience.left < patience
+    observer.patience.left = 0.0
     began = time.monotonic()
     assert not observer.wait(lambda: False, within=2.0)
-    assert observer.patience <= 0.0
+    assert observer.patience.left <= 0.0
 
 
 @pytest.mark.usefixtures("crowded_cpu")
@@ -206,25 +200,47 @@ def test_a_program_that_waits_for_a_cpu_has_waited_as_long_as_strangers_ran(prog
     programs(WORKS_NOW_AND_THEN)
     before = cpu_uses()
     deadline = time.monotonic() + 60
-    while (kept := kept_waiting(before, cpu_uses())) < 0.5 and time.monotonic() < deadline:
+    while (kept := sum(kept_waiting(before, cpu_uses()).values())) < 0.5 and time.monotonic() < deadline:
         time.sleep(0.05)
     assert kept >= 0.5
 
 
-def test_a_program_that_only_computes_gains_no_time_by_it(programs: Callable[[str], int]) -> None:
-    hogs = {programs(COMPUTES), programs(COMPUTES)}  # each waits while the other runs
+def had(seconds: float, *threads: tuple[float, float]) -> CpuUse:
+    """What a process of that age has had: of each of its threads for how long it ran, and how long it waited to."""
+    waits = {number: CpuWait(seconds, used, waited, 1, ready=False) for number, (used, waited) in enumerate(threads)}
+    return CpuUse(sum(used for used, _ in threads), seconds, waits)
 
-    def uses() -> dict[int, CpuUse]:
-        return {pid: use for pid, use in cpu_uses().items() if pid in hogs}
 
-    deadline = time.monotonic() + 60
-    while min((use.cpu for use in uses().values()), default=0.0) < 1.2 and time.monotonic() < deadline:
-        time.sleep(0.05)
-    before = uses()
-    while sum(use.cpu for use in uses().values()) < sum(use.cpu for use in before.values()) + 1.0:
-        assert time.monotonic() < deadline, "they got no CPU"
-        time.sleep(0.05)
-    assert kept_waiting(before, uses()) == 0.0
+NOTHING_YET = {1: had(0.0, (0.0, 0.0)), 2: had(0.0, (0.0, 0.0), (0.0, 0.0))}
+HOG, NODE = 1, 2
+
+
+def test_a_program_that_only_computes_gains_no_time_by_it() -> None:
+    threads = [(2.5, 7.5)] * 4  # of one CPU, which they share
+    assert kept_waiting({}, {HOG: had(10.0, *threads)})[HOG] == 0.0
+    quota = {HOG: had(10.0, (2.5, 7.5)), NODE: had(10.0, (0.1, 2.5), (0.0, 0.0))}  # a quarter of a CPU, all used up
+    assert kept_waiting(NOTHING_YET, quota, share=0.25) == {HOG: 0.0, NODE: 0.0}
+
+
+def test_what_others_took_was_withheld_from_who_computes_too() -> None:
+    crowded = {HOG: had(10.0, (1.0, 9.0)), NODE: had(10.0, (0.1, 4.0), (0.0, 0.2))}  # ten share the one CPU
+    kept = kept_waiting(NOTHING_YET, crowded)
+    assert kept[HOG] == pytest.approx(8.9) and kept[NODE] == pytest.approx(3.0)
+
+
+def test_what_a_quota_withholds_from_who_rests_now_and_then_is_withheld() -> None:
+    after = {NODE: had(10.0, (0.4, 1.2), (0.1, 0.3))}
+    assert kept_waiting(NOTHING_YET, after, share=0.25)[NODE] == pytest.approx(1.1)
+
+
+def test_a_wait_that_lacks_its_time_is_told_and_one_that_had_it_is_not(monkeypatch: pytest.MonkeyPatch) -> None:
+    patience, now = Patience(), time.monotonic()
+    monkeypatch.setattr(patience, "kept", lambda when: 7.0)
+    patience.waited(began=now - 6.0, within=2.0, came=False)
+    assert patience.decided() == pytest.approx(3.0, abs=0.5)
+    patience.waited(began=now - 10.0, within=2.0, came=False)
+    monkeypatch.setattr(patience, "kept", lambda when: 0.0)
+    assert patience.decided() == 0.0
 
 
 @pytest.fixture

@@ -143,6 +143,7 @@ class Goal:
     def _ended(self, future: Future) -> None:
         self.status = STATUS_WORDS.get(future.result().status, "unknown")
         self.result = future.result().result
+        self._observer.answers.append((self.name, self.result))
         self._observer.notify()
 
     @property

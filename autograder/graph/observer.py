@@ -8,10 +8,12 @@ from __future__ import annotations
 import contextlib
 import threading
 import time
+from collections import deque
 from collections.abc import Callable
 from typing import Any
 
 import rclpy
+from rclpy.action import ActionClient
 from rclpy.context import Context
 from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
@@ -20,9 +22,10 @@ from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
-from autograder.core.cpu_use import CpuUse, cpu_uses, kept_waiting
+from autograder.core import interrupts
 from autograder.core.errors import KitError
 from autograder.graph.names import full_name
+from autograder.graph.patience import Patience
 from autograder.graph.recording import Recording, quiet_profile
 
 POLL = 0.02
@@ -32,17 +35,11 @@ _LONGEST_POLL = 0.1
 _POLLS_A_WAIT = 10
 """A wait that goes on looks less often: it ends late by a tenth of what it has taken at the most."""
 
-_CPU_ASKED_AFTER = 0.25
-"""Seconds of waiting after which it pays to ask what the machine keeps the programs from."""
-
-_STRETCH = 3.0
-"""How often its own length a wait may take on a busy machine."""
-
-PATIENCE = 60.0
-"""Seconds that all waits of a check together may take longer on a busy machine."""
-
 RECORDED = 128 * 1024 * 1024
 """Bytes of messages that one observer keeps; what comes later is let go by."""
+
+_ANSWERS = 20
+"""Answers that an observer keeps, for a check that breaks over one of them."""
 
 OBSERVER_NAME = "grading_observer"
 
@@ -56,17 +53,27 @@ class Observer:
 
     Args:
         domain_id: the domain of the launch, 0 to 101.
-        patience: seconds that its waits together may take longer than they were asked to; its attribute of that name
-            is what is left of them.
+        patience: how much longer its waits may take than they were asked to; by default, what one check has.
+        left: called when it has left the domain, also if it could not begin.
     """
 
-    def __init__(self, domain_id: int, patience: float = PATIENCE) -> None:
+    def __init__(
+        self, domain_id: int, patience: Patience | None = None, left: Callable[[], None] | None = None
+    ) -> None:
         """Join the domain and start to spin in a thread of its own."""
+        with contextlib.ExitStack() as leaving:  # nothing stays, wherever a beginning is broken off
+            if left is not None:
+                leaving.callback(left)
+            self._join(leaving, domain_id, patience)
+            self._leaving = leaving.pop_all()
+
+    def _join(self, leaving: contextlib.ExitStack, domain_id: int, patience: Patience | None) -> None:
         self.domain_id = domain_id
-        self.patience = patience
+        self.patience = patience or Patience()
         self.changed = threading.Condition()
         self._context = Context()
         rclpy.init(context=self._context, domain_id=domain_id, args=[])
+        leaving.callback(rclpy.try_shutdown, context=self._context)
         # The random end keeps a student's node from having this name by chance; what is the observer's own is told by
         # its participant, for a name can be read off the graph and taken.
         self.name = f"{OBSERVER_NAME}_{time.monotonic_ns() % 0xFFFFFF:06x}"
@@ -79,6 +86,7 @@ class Observer:
             use_global_arguments=False,
             parameter_overrides=[Parameter("start_type_description_service", value=False)],
         )
+        leaving.callback(leave_graph, self.node)
         self._participant = self._own_participant()
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self.node)
@@ -86,6 +94,8 @@ class Observer:
         self._quiet = quiet_profile()
         self._quiet_text = str(self._quiet)
         self._room = RECORDED
+        self.answers: deque[tuple[str, Any]] = deque(maxlen=_ANSWERS)
+        """What services and actions have answered last: of each its name and its answer."""
         self.meanwhile: Callable[[], None] | None = None
         """Called now and then in the thread of whoever waits."""
         self._closing = False
@@ -117,10 +127,10 @@ class Observer:
     def close(self) -> None:
         """Leave the domain. The thread is joined: a daemon thread that still spins at exit aborts the process."""
         self._closing = True
-        self._executor.shutdown(timeout_sec=2.0)
-        rclpy.try_shutdown(context=self._context)
-        self._thread.join(timeout=5.0)
-        self.node.destroy_node()
+        with self._leaving:
+            self._executor.shutdown(timeout_sec=2.0)
+            rclpy.try_shutdown(context=self._context)
+            self._thread.join(timeout=5.0)
 
     def room_for(self, size: int, kept: int) -> bool:
         """Take room for one more message of `size` bytes, for a recording that keeps `kept` bytes; False if none.
@@ -140,29 +150,29 @@ class Observer:
     def wait(self, ready: Callable[[], object], within: float, give_up: Callable[[], bool] | None = None) -> bool:
         """Wait until `ready()` is true; at most `within` seconds, less if `give_up()` says that nothing can change.
 
-        Time in which the grader or a program wanted to run and got no CPU because of others does not count (up to
-        three times `within`, and as long as there is patience): a verdict must not depend on what else the machine
-        does. The last look comes after the deadline.
+        Time in which the grader or a program wanted to run and got no CPU because of others does not count, as long as
+        there is patience: a verdict must not depend on what else the machine does. The last look comes after the
+        deadline.
 
         Raises:
             KitError: the observer hears nothing any more.
         """
-        began = time.monotonic()
+        began, came, within = time.monotonic(), False, max(0.0, within)
+        self.patience.withheld.measure()
         try:
-            return self._wait(ready, began, within, give_up or (lambda: False))
+            came = self._wait(ready, began, within, give_up or (lambda: False))
         finally:
-            self.patience -= max(0.0, time.monotonic() - began - within)
+            self.patience.waited(began, within, came)
+        return came
 
     def _wait(self, ready: Callable[[], object], began: float, within: float, give_up: Callable[[], bool]) -> bool:
         deadline = began + within
-        before: dict[int, CpuUse] | None = None
         while True:
             now = time.monotonic()
-            if before is None and now - began > _CPU_ASKED_AFTER:
-                before = cpu_uses()
-            elif before is not None and now >= deadline:
-                more = min(kept_waiting(before, cpu_uses()), (_STRETCH - 1) * within, self.patience)
-                deadline = began + within + max(0.0, more)
+            if now >= deadline:
+                deadline = began + within + self.patience.more(began, within)
+            else:
+                self.patience.withheld.measure()
             if self._error is not None:  # silence would be held against the program
                 raise KitError(f"The observer hears nothing any more: {self._error!r}.", "Run it again.")
             late = now >= deadline or give_up()
@@ -170,6 +180,7 @@ class Observer:
                 return True
             if late:
                 return False
+            interrupts.here()
             if self.meanwhile is not None:
                 self.meanwhile()
             poll = min(max(POLL, (now - began) / _POLLS_A_WAIT), _LONGEST_POLL)
@@ -180,10 +191,12 @@ class Observer:
         """Let time go by, exactly as much as is said: for experiments in which its length matters."""
         deadline = time.monotonic() + seconds
         while (left := deadline - time.monotonic()) > 0:
+            interrupts.here()
             if self.meanwhile is not None:
                 self.meanwhile()
+            self.patience.withheld.measure()
             with self.changed:
-                self.changed.wait(left if self.meanwhile is None else min(left, 5 * POLL))
+                self.changed.wait(min(left, 5 * POLL))
 
     def nodes(self) -> list[str]:
         """Full names of all nodes but the observer, one entry per node: two nodes of one name are listed twice."""
@@ -256,10 +269,9 @@ class Observer:
             self._recordings[key] = Recording(self, topic, msg_type, profile)
         return self._recordings[key]
 
-    @property
-    def recorded(self) -> int:
-        """Number of recordings."""
-        return len(self._recordings)
+    def recordings(self) -> list[Recording]:
+        """All recordings so far."""
+        return list(self._recordings.values())
 
     def hears_all(self) -> bool:
         """Whether every recording that accepts any QoS has matched all publishers that are on its topic by now."""
@@ -273,6 +285,17 @@ class Observer:
         """Make a publisher of the observer's; rclpy's own warnings about subscriptions that do not match are off."""
         quiet = PublisherEventCallbacks(use_default_callbacks=False)
         return self.node.create_publisher(msg_type, topic, qos, event_callbacks=quiet)
+
+
+def leave_graph(node: Node) -> None:
+    """Destroy a node with all that was made on it.
+
+    rclpy leaves action clients to whoever made them; as long as one is there, so are the node and its participant.
+    """
+    for waitable in list(node.waitables):
+        if isinstance(waitable, ActionClient):
+            waitable.destroy()
+    node.destroy_node()
 
 
 def _read(ask: Callable[..., Any], *about: str) -> Any:

@@ -59,8 +59,10 @@ def call_all(
         for number, request in enumerate(requests):
             future = client.call_async(request)
 
-            def note(_: Future, number: int = number) -> None:
+            def note(done: Future, number: int = number) -> None:
                 ended[number] = time.monotonic()
+                if done.exception() is None:
+                    observer.answers.append((name, done.result()))
                 observer.notify()
 
             future.add_done_callback(note)

@@ -1,0 +1,283 @@
+"""Launches that run at the same time on one machine: none hears another one's, and nothing of one outlives it."""
+
+from __future__ import annotations
+
+import os
+import socket
+import stat
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from side_by_side import run_all
+from std_msgs.msg import Int64
+from test_msgs.action import Fibonacci
+
+from autograder.core.errors import KitError
+from autograder.graph import domains
+from autograder.graph.actions import ActionSeen
+from autograder.graph.domains import LAST, Domain, claim_domain, group_of, is_free
+from autograder.graph.observer import Observer
+from autograder.ros2.main import TimeIsUp, run
+from autograder.sandbox import environment
+from autograder.sandbox.environment import GROUP, profile_environment
+
+WITHIN = 120
+"""Far beyond what a start takes on a busy machine, in seconds."""
+SOMEBODY = """
+import sys
+import rclpy
+from std_msgs.msg import Int64
+
+rclpy.init()
+node = rclpy.create_node(sys.argv[1])
+publisher = node.create_publisher(Int64, "/" + sys.argv[1], 10)
+node.create_timer(0.05, lambda: publisher.publish(Int64(data=1)))
+print("up", flush=True)
+rclpy.spin(node)
+"""
+
+
+@pytest.fixture(autouse=True)
+def profile(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name, value in profile_environment().items():
+        monkeypatch.setenv(name, value)
+
+
+@pytest.fixture
+def domain() -> Iterator[Domain]:
+    claimed = claim_domain()
+    yield claimed
+    claimed.release()
+
+
+@pytest.fixture
+def started() -> Iterator[list[subprocess.Popen[str]]]:
+    processes: list[subprocess.Popen[str]] = []
+    yield processes
+    for process in processes:
+        process.kill()
+        process.communicate()
+
+
+def start(
+    started: list[subprocess.Popen[str]], name: str, number: int, settings: dict[str, str]
+) -> subprocess.Popen[str]:
+    """Start a program with a node in a domain, and wait until it has one."""
+    plain = {key: value for key, value in os.environ.items() if not key.startswith(("FASTRTPS", "ROS_", GROUP))}
+    process = subprocess.Popen(
+        [sys.executable, "-c", SOMEBODY, name],
+        env=plain | {"ROS_LOG_DIR": os.environ["ROS_LOG_DIR"]} | settings | {"ROS_DOMAIN_ID": str(number)},
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    started.append(process)
+    assert process.stdout is not None and process.stdout.readline() == "up\n"
+    return process
+
+
+def in_time(done: Any) -> bool:
+    deadline = time.monotonic() + WITHIN
+    while not done() and time.monotonic() < deadline:
+        time.sleep(0.05)
+    return bool(done())
+
+
+# Nothing outlives it.
+
+
+def test_an_observer_that_has_an_action_client_leaves_its_domain_all_the_same(domain: Domain) -> None:
+    observer = Observer(domain.id)
+    action = ActionSeen(observer, "/fibonacci", Fibonacci)  # as a goal that a notebook keeps in a variable
+    assert not is_free(domain.id)
+    observer.close()
+    assert is_free(domain.id) and action.name == "/fibonacci"
+
+
+def test_a_command_that_asked_an_action_leaves_its_domain(domain: Domain) -> None:
+    with pytest.raises(TimeIsUp):
+        run(["action", "send_goal", "/nobody", "test_msgs/action/Fibonacci", "{order: 1}"], domain.id, None, 1.0)
+    assert is_free(domain.id)
+
+
+def test_an_observer_that_cannot_begin_leaves_its_domain(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(_: Observer) -> bytes:
+        raise KitError("The observer does not find itself.")
+
+    monkeypatch.setattr(Observer, "_own_participant", fail)
+    claimed = claim_domain()
+    with pytest.raises(KitError):
+        Observer(claimed.id, left=claimed.release)
+    assert is_free(claimed.id)
+    again = domains._claimed(claimed.id)
+    assert again is not None, "it is still claimed"
+    again.close()
+
+
+# Domains are claimed.
+
+
+def test_a_domain_is_in_use_as_long_as_any_participant_lives_in_it(domain: Domain) -> None:
+    """The first participant takes the lowest ports; when it has ended, the second keeps its own."""
+    first, second = Observer(domain.id), Observer(domain.id)
+    first.close()
+    assert not is_free(domain.id)
+    second.close()
+    assert is_free(domain.id)
+
+
+def test_a_program_with_settings_of_its_own_keeps_launches_out_of_its_domain(
+    domain: Domain, started: list[subprocess.Popen[str]]
+) -> None:
+    start(started, "somebody", domain.id, {})
+    assert not is_free(domain.id)
+
+
+def test_no_two_launches_get_one_domain_and_what_is_given_back_is_given_again() -> None:
+    claimed = [claim_domain() for _ in range(20)]
+    assert len({each.id for each in claimed}) == 20
+    for each in claimed:
+        each.release()
+    again = [domains._claimed(each.id) for each in claimed]
+    assert all(again)
+    for each in again:
+        assert each is not None
+        each.close()
+
+
+def test_the_domain_of_a_process_that_was_killed_is_given_again() -> None:
+    source = (
+        "from autograder.graph.domains import claim_domain; held = claim_domain(); print(held.id, flush=True); input()"
+    )
+    with subprocess.Popen(
+        [sys.executable, "-c", source], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stdout is not None
+        number = int(process.stdout.readline())
+        assert domains._claimed(number) is None
+        process.kill()
+    again = domains._claimed(number)
+    assert again is not None
+    again.close()
+
+
+def test_where_every_domain_is_claimed_one_in_which_nobody_lives_is_shared(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Who claims them all, and be it out of malice, keeps nobody from working."""
+    claims = [domains._claimed(number) for number in range(1, LAST + 1)]
+    try:
+        monkeypatch.setattr(domains, "is_free", lambda number: number == 42)
+        assert claim_domain().id == 42
+        monkeypatch.setattr(domains, "is_free", lambda _: False)
+        assert 1 <= claim_domain().id <= LAST
+    finally:
+        for claim in claims:
+            if claim is not None:
+                claim.close()
+
+
+# Who hears whom.
+
+
+def test_launches_of_one_domain_do_not_hear_each_other_if_they_are_of_two_kernels(
+    domain: Domain, started: list[subprocess.Popen[str]]
+) -> None:
+    """As when there are more launches than domains, or a program is started in domain 0 by two notebooks."""
+    other = {**profile_environment(), GROUP: "239.1.2.3"}
+    start(started, "stranger", domain.id, other)
+    observer = Observer(domain.id)
+    try:
+        heard = observer.record("/stranger", Int64)
+        start(started, "own", domain.id, profile_environment())
+        assert observer.wait(lambda: observer.nodes() == ["/own"], WITHIN)
+        start(started, "late_stranger", domain.id, other)
+        observer.pause(2.0)  # ten rounds of announcements
+        assert observer.nodes() == ["/own"]
+        assert "/stranger" not in observer.topics() and not heard.messages
+    finally:
+        observer.close()
+
+
+@pytest.mark.parametrize("reach", ["SUBNET", "LOCALHOST"])
+def test_a_launch_hears_no_program_with_settings_of_its_own(
+    reach: str, domain: Domain, started: list[subprocess.Popen[str]]
+) -> None:
+    """Such as one in a terminal, whose number a launch has claimed before."""
+    observer = Observer(domain.id)
+    try:
+        strangers = [
+            start(started, f"stranger{number}", domain.id, {"ROS_AUTOMATIC_DISCOVERY_RANGE": reach})
+            for number in range(2)
+        ]
+        start(started, "own", domain.id, profile_environment())
+        assert observer.wait(lambda: "/own" in observer.nodes(), WITHIN)
+        observer.pause(4.0)  # they announce themselves every 3 s
+        assert observer.nodes() == ["/own"]
+        assert all(stranger.poll() is None for stranger in strangers)
+    finally:
+        observer.close()
+
+
+def test_a_terminal_finds_the_group_of_the_users_own_launch_and_of_nobody_else(domain: Domain) -> None:
+    assert group_of(domain.id) is None
+    observer = Observer(domain.id)
+    assert group_of(domain.id) == os.environ[GROUP]
+    if os.getuid() == 0:
+        ask = (
+            f"import os; from autograder.graph.domains import group_of; os.setuid(12001); print(group_of({domain.id}))"
+        )
+        assert subprocess.run([sys.executable, "-c", ask], stdout=subprocess.PIPE, check=True).stdout == b"None\n"
+    observer.close()
+    assert in_time(lambda: group_of(domain.id) is None)
+
+
+# What others on the machine can see, and take away.
+
+
+@pytest.fixture
+def temporary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    monkeypatch.setattr(environment.tempfile, "tempdir", str(tmp_path))
+    environment._log_folder.cache_clear()
+    yield tmp_path / f"autograder-log-{os.getuid()}"
+    environment._log_folder.cache_clear()
+
+
+def test_nobody_else_reads_the_logs(temporary: Path) -> None:
+    temporary.mkdir(mode=0o755)  # as an earlier version made it
+    assert Path(profile_environment()["ROS_LOG_DIR"]) == temporary
+    assert stat.S_IMODE(temporary.stat().st_mode) == 0o700
+
+
+def test_a_folder_of_logs_that_leads_elsewhere_is_not_used(temporary: Path, tmp_path: Path) -> None:
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    temporary.symlink_to(elsewhere)
+    logs = Path(profile_environment()["ROS_LOG_DIR"])
+    assert logs.resolve() != elsewhere and stat.S_IMODE(logs.stat().st_mode) == 0o700
+
+
+@pytest.mark.skipif(os.getuid() != 0, reason="only root makes files of others")
+def test_a_folder_of_logs_that_is_somebody_elses_is_not_used(temporary: Path) -> None:
+    temporary.mkdir()
+    os.chown(temporary, 12001, 12001)
+    assert Path(profile_environment()["ROS_LOG_DIR"]) != temporary
+
+
+def test_a_port_below_is_not_taken_for_a_participant(domain: Domain) -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as neighbour:
+        neighbour.bind(("127.0.0.1", 7400 + 250 * domain.id - 1))
+        assert is_free(domain.id)
+
+
+# In real kernels.
+
+
+def test_notebooks_of_two_users_do_not_hear_each_other_even_in_one_domain() -> None:
+    """As when there are more launches than domains: here the machine has one of them."""
+    cells = "^(setup|given-fibonacci|fibonacci|check-fibonacci)$"
+    for seen in run_all(["lab6_actions"], 2, 2, domains=1, only=cells, disturbed=False):
+        assert (seen.foreign, seen.wrong, seen.cells) == ([], [], 4)
+        assert seen.launches >= 2
