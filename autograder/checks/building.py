@@ -12,11 +12,11 @@ from autograder.checks.parts import part
 from autograder.checks.scoring import Score, score
 from autograder.diagnosis import Diagnosis
 from autograder.graph.names import nearest
+from autograder.packages.built import Built
 from autograder.packages.executables import why_no_executable, why_other_target
 from autograder.packages.explain import needed_packages, not_described, why_not_built
 from autograder.packages.imports import imported_interfaces
 from autograder.packages.interfaces import InterfaceError, interface_parts
-from autograder.packages.workspace import Built
 
 _RECORDS = re.compile(r"(egg-info|dist-info|__pycache__|/colcon-core/|/hook/)|(^|/)package\.(d?sv|sh|ps1|bash|zsh)$")
 """Files that colcon, setuptools and Python write for themselves."""

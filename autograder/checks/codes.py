@@ -56,17 +56,16 @@ GROUPS: dict[str, dict[str, str]] = {
         "exit-status": "the program ended with another status",
         "signal-ignored": "the program was told to end by a signal, and still ran when the time for that was over",
         "unclean-end": "told to end by a signal, the program ended with another status than 0 or printed an error",
+        "unusable-data": "the check broke, and the programs had sent what no check can use: a NaN, a stamp below 0 s, a"
+        " text or a list without measure",
         "no-log": "no such line was logged, or not that often",
         "required": "a fact that the check established does not hold; the check gave no code of its own",
         "failed": "an expectation does not hold; nothing more is known",
         "hidden": "a check that students do not see failed; they are told no more than that",
     },
     "Limits of the sandbox": {
-        "time-limit": "a program ran longer than one launch may",
-        "CPU-time-limit": "the programs have used up the CPU time of the submission",
         "memory-limit": "the programs of a launch held more memory than they may together",
         "process-limit": "the programs of a launch had more processes and threads than they may together",
-        "output-limit": "a program printed more than it may",
     },
     "Files of answers, parameters and launches": {
         "file-missing": "no cell has written this file",
@@ -116,6 +115,7 @@ GROUPS: dict[str, dict[str, str]] = {
         "absolute-rule": "one side of a rule is absolute, and the name lies in a namespace",
         "private-rule": "one side of a rule is private to the node, and the other name is not",
         "rule-without-match": "no name in the code is the left side",
+        "rule-takes-name": "a rule gives another name to what has the wanted one",
     },
     "The notebook that was handed in": {
         "no-notebook": "there is no file of the lab's name, or it is empty",
@@ -123,7 +123,7 @@ GROUPS: dict[str, dict[str, str]] = {
         "not-a-notebook": "the file is JSON and no notebook, or a cell holds no text",
         "oversized-notebook": "the notebook is larger than is read",
         "oversized-cell": "a cell is larger than is read",
-        "wrong-notebook": "no cell of it belongs to the lab",
+        "wrong-notebook": "it is another notebook, or hardly a cell of the lab is left in it",
         "missing-cell": "an answer's cell was deleted",
         "duplicated-cell": "a cell with a grading mark is there more than once",
         "forged-cell": "a cell has a grading mark that the lab does not know",
@@ -143,6 +143,7 @@ GROUPS: dict[str, dict[str, str]] = {
         "forged-graph": "what is on the ROS graph cannot be read, which no program made with rclpy brings about",
         "stuck": "the grader did not come on at this check; an instructor decides",
         "died": "the grader died at this check, twice; an instructor decides",
+        "too-busy": "the machine was too busy, also when the check was run again alone; an instructor decides",
         "no-result": "the grader said nothing about this check; an instructor decides",
     },
 }

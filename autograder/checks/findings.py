@@ -10,7 +10,7 @@ import time
 from dataclasses import dataclass
 
 from autograder.core.results import NodeLog, Outcome
-from autograder.graph.observer import PATIENCE
+from autograder.graph.patience import Patience
 
 
 @dataclass(frozen=True)
@@ -30,6 +30,8 @@ class Findings:
 
     def __init__(self) -> None:
         """Begin with none."""
+        self.alone = False
+        """Whether these checks are run again, with nothing else of this kit beside them."""
         self.reset()
 
     def reset(self) -> None:
@@ -50,8 +52,10 @@ class Findings:
         self.flags: list[str] = []
         """Contradictions between what the graph showed and what was seen inside the programs."""
         self.logs: list[NodeLog] = []
-        self.patience = PATIENCE
-        """Seconds that the waits of this check may still take longer on a busy machine."""
+        self.patience = Patience(self.alone)
+        """How much longer the waits of this check may still take on a busy machine."""
+        self.starved = 0.0
+        """Seconds that others withheld from the programs when something was decided against them."""
         self._began = time.monotonic()
 
     def begin_block(self) -> None:

@@ -27,19 +27,19 @@ from autograder.checks.launched_file import LaunchedFile
 from autograder.checks.misuse import Misuse, refuse_text
 from autograder.checks.parts import part
 from autograder.checks.program import Program
-from autograder.checks.robot import LIMITS, Robot, make_room
+from autograder.checks.robot import Robot, make_room
 from autograder.checks.scoring import Score, score
-from autograder.checks.starting import file_of, words_of
+from autograder.checks.starting import file_of, refuse_to_start, why_missing, words_of
 from autograder.checks.try_out import Log, log_of, try_out
 from autograder.checks.waiting import NotLaunchedError, watched
 from autograder.core.front_end import Watcher
 from autograder.diagnosis import Diagnosis
+from autograder.graph.domains import claim_domain
 from autograder.graph.observer import ForgedGraph, Observer
 from autograder.launch_files import LaunchFileError, remove_written
 from autograder.packages.workspace import INSTALLED
 from autograder.sandbox.environment import profile_environment, remove_logs
 from autograder.sandbox.group import ProgramGroup
-from autograder.sandbox.limits import Limits
 
 
 @watched
@@ -83,27 +83,27 @@ class Launch(
     def __enter__(self) -> Launch:
         if runtime.current.block is not None:
             raise Misuse("A launch begins inside another one; let the first block end before.")
-        runtime.current.block = self._enter(None)
+        runtime.current.block = self._enter()
         return self
 
-    def _enter(self, limits: Limits | None) -> Robot:
+    def _enter(self) -> Robot:
         """Begin to watch, and start the programs."""
         if self._entered:
             raise Misuse("This launch has run already; call launch(…) again for another one.")
         here = runtime.current.front_end
         if here is not None:
             here.ready()
-        self._domain_id = runtime.current.next_domain()
+        domain = claim_domain()
         # The middleware reads its profile once, before the first participant of the process.
         os.environ.update(profile_environment())
         os.environ.pop("ROS_AUTOMATIC_DISCOVERY_RANGE", None)
-        self._running.observer = Observer(self._domain_id, findings.current.patience)
+        self._running.observer = Observer(domain.id, findings.current.patience, domain.release)
         self._entered = True
         findings.current.begin_block()
         try:
             if here is not None:
                 self._watch = here.watch(self._observer, lambda: [program for _, program in self._running.programs])
-            self._begin(limits)
+            self._begin()
             trouble = self._running.trouble
             if here is not None and trouble and not here.scored:  # what only listens would never say so
                 raise NotLaunchedError(trouble[0])
@@ -113,11 +113,11 @@ class Launch(
         self._robot = Robot(self._running, self._end)
         return self._robot
 
-    def _begin(self, limits: Limits | None) -> None:
+    def _begin(self) -> None:
         """Listen, and then start the programs."""
         if not self._build():
             return
-        self._group = runtime.current.sandbox.group(limits)
+        self._group = runtime.current.sandbox.group()
         for topic, msg_type in self._listen:
             self._observer.record(topic, msg_type)
         for offer in self._serve:
@@ -151,8 +151,9 @@ class Launch(
             `ros.start(Program("listener", name="late"))`
         """
         if node is None:
+            refuse_to_start(self._running.described)
             make_room()
-            runtime.current.robot = robot = self._enter(LIMITS)
+            runtime.current.robot = robot = self._enter()
             robot.wait_for_nodes()
             print(robot)
         elif self._group is not None:
@@ -179,7 +180,7 @@ class Launch(
         if isinstance(words, Diagnosis):
             self._running.trouble.append(words)
             return
-        environment = {"ROS_DOMAIN_ID": str(self._domain_id), **launched.environment, **profile_environment()}
+        environment = {"ROS_DOMAIN_ID": str(self._observer.domain_id), **launched.environment, **profile_environment()}
         assert self._group is not None  # begun on entering
         prefixes = [f"{INSTALLED}/{package}" for package in self._packages]
         program = self._group.start(
@@ -189,12 +190,10 @@ class Launch(
 
     def _miss(self, program: str) -> None:
         """No cell has written this program."""
-        here = runtime.current.front_end
-        if here is None:
+        if runtime.current.front_end is None:
             self._running.missing.append(program)
-            return
-        because, hint = here.why_missing("node", program)
-        self._running.trouble.append(Diagnosis(because, "program-missing", hint))
+        else:
+            self._running.trouble.append(why_missing(program))
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
@@ -265,9 +264,9 @@ class Launch(
         if self._over:
             return
         self._over = True
-        # What still runs is ended here: how is no fact about the program.
-        ended = {id(program): program.exit_status() for _, program in self._running.programs}
         try:
+            # What still runs is ended here: how is no fact about the program.
+            ended = {id(program): program.exit_status() for _, program in self._running.programs}
             self._look_back()
         finally:
             self._close()
@@ -294,7 +293,6 @@ class Launch(
                 runtime.current.block = None
             if runtime.current.robot is self._robot:
                 runtime.current.robot = None
-            findings.current.patience = self._observer.patience
             self._observer.close()
             remove_written(runtime.current.folder)
             remove_logs()

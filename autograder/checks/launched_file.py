@@ -9,7 +9,7 @@ from pathlib import Path
 from autograder.checks import runtime
 from autograder.checks.program import Program
 from autograder.launch_files import declared_arguments, read_launch_file
-from autograder.packages.workspace import Built
+from autograder.packages.built import Built
 
 
 @dataclass(frozen=True)

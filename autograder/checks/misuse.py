@@ -14,6 +14,11 @@ _TIMES = ("within", "for_seconds")
 class Misuse(Exception):
     """A check asks for something that makes no sense. The message says what, and what to write instead."""
 
+    def _render_traceback_(self) -> list[str]:
+        """What IPython shows: where in the cell, and no line of the kit."""
+        place = place_of(self, lambda name: "ipykernel_" in name or name.startswith("<ipython"))
+        return [f"{self} ({place})" if place else str(self)]
+
 
 def place_of(error: BaseException, is_cells: Callable[[str], bool]) -> str:
     """Where in the check cell an error arose, as `line 3: ros.expect_node("/talker")`; empty if it was not there.

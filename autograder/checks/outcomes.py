@@ -12,7 +12,7 @@ from pathlib import Path
 from types import FrameType
 from typing import NoReturn
 
-from autograder.checks import findings, runtime
+from autograder.checks import findings, runtime, unusable
 from autograder.checks.misuse import place_of
 from autograder.core.errors import KitError
 from autograder.core.picture import Picture
@@ -25,6 +25,8 @@ _PACKAGE = str(Path(__file__).resolve().parent.parent)
 
 _NOT_CELLS = (_PACKAGE, sys.prefix, sys.base_prefix, "<frozen", "<string>")
 """How the names of files begin that are the kit's, an installed package's, the standard library's or generated."""
+
+_USABLE = "The check can go on with what the programs send"
 
 _FORGED = "A program has announced a node or a topic whose name is no text, below ROS, which allows no such name."
 
@@ -54,13 +56,40 @@ def ends_block(error: BaseException | None) -> bool:
             failed_as_a_whole("The ROS graph can be read", because=_FORGED, code="forged-graph")
         return True
     if isinstance(error, KitError):  # such as a machine without a compiler
+        if runtime.current.block is not None:  # its programs run, and may have brought it about
+            _flag(error)
         unknown("This can be found out on this machine", " ".join(part for part in (error.what, error.do) if part))
+        return True
+    if because := unusable.reason(error):
+        _flag(error)
+        _record(_failure(_USABLE, because=because, code="unusable-data"))
+        _void_parts()
         return True
     if runtime.current.front_end is not None or not isinstance(error, Exception):
         return False
-    place = place_of(error, lambda name: not name.startswith(_NOT_CELLS))
+    place = place_of(error, _is_cells)
+    _flag(error)
     unknown("The check itself broke", f"{type(error).__name__}: {error}" + (f" ({place})" if place else ""))
     return True
+
+
+def ends_part(error: Exception) -> bool:
+    """Fail the part in which a check broke over something that no check can use; whether it was that."""
+    because = unusable.reason(error)
+    if because:
+        _flag(error)
+        _record(_failure(_USABLE, because=because, code="unusable-data"))
+    return bool(because)
+
+
+def _flag(error: BaseException) -> None:
+    if runtime.current.front_end is None:
+        unusable.broke(error, place_of(error, _is_cells))
+
+
+def _is_cells(file: str) -> bool:
+    """Whether a file name is that of a check cell."""
+    return not file.startswith(_NOT_CELLS)
 
 
 def passed(title: str, *, expected: str = "", observed: str = "") -> None:
@@ -123,7 +152,9 @@ def failed_as_a_whole(
     raise LaunchEnded(title)
 
 
-def _failure(title: str, expected: str, observed: str, because: str, hint: str, code: str) -> Outcome:
+def _failure(
+    title: str, expected: str = "", observed: str = "", because: str = "", hint: str = "", code: str = ""
+) -> Outcome:
     return Outcome(
         status=Status.FAILED,
         title=title,
@@ -146,6 +177,11 @@ def unknown(title: str, because: str) -> None:
 
 
 def _record(outcome: Outcome) -> None:
+    patience = findings.current.patience
+    if outcome.status is Status.PASSED:
+        patience.passed()
+    else:
+        findings.current.starved = max(findings.current.starved, patience.decided())
     outcome.part = findings.current.part
     frame = _check_frame()
     # A cell's own helper function records for the line that called it: hidden there is hidden here.

@@ -39,6 +39,9 @@ def part(title: str) -> Iterator[None]:
         raise
     except outcomes.CheckEnded:
         pass
+    except Exception as error:
+        if not outcomes.ends_part(error):
+            raise
     finally:
         findings.current.part = ""
     findings.current.finished.add(title)

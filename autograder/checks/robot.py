@@ -10,10 +10,6 @@ from autograder.checks import runtime
 from autograder.checks.misuse import Misuse
 from autograder.checks.running import Running
 from autograder.graph.observer import Observer
-from autograder.sandbox.limits import MIB, Limits
-
-LIMITS = Limits(cpu_seconds=3600, wall_seconds=12 * 3600, output_bytes=256 * MIB)
-"""A day in a notebook is longer than a check; memory, processes and disk are the same."""
 
 _THERE_WITHIN = 5.0
 """Seconds that its nodes may take to be on the graph, before the cell goes on without them."""

@@ -80,7 +80,8 @@ class Running:
             return False
         if self._ended is None:
             self._ended = time.monotonic()
-        return time.monotonic() - self._ended > AFTER_EXIT
+        over = time.monotonic() - self._ended
+        return over > AFTER_EXIT and over - self.observer.patience.kept(self._ended) > AFTER_EXIT
 
     def hopeless_without(self, needs: Callable[[], object]) -> Callable[[], bool]:
         """Return a question to ask while waiting: whether what needs this on the graph cannot come any more."""

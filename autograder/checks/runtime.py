@@ -16,7 +16,6 @@ from autograder.checks import findings
 from autograder.core import front_end
 from autograder.core.front_end import FrontEnd
 from autograder.core.results import Isolation
-from autograder.graph.domains import free_domains
 from autograder.graph.observer import Observer
 from autograder.packages.workspace import SOURCES, Workspace
 from autograder.sandbox.build import BuildRun
@@ -49,7 +48,6 @@ class Runtime:
         self.random = random.Random()
         self._sandbox: NodeSandbox | None = None
         self._workspace: Workspace | None = None
-        self._domains = free_domains()
         self.block: Launched | None = None
         """The launch whose block runs: one at a time."""
         self.robot: Launched | None = None
@@ -143,10 +141,6 @@ class Runtime:
         if self._sandbox is not None:
             self._sandbox.close()
             self._sandbox = None
-
-    def next_domain(self) -> int:
-        """A domain id that no launch used lately and nobody on this machine seems to use."""
-        return next(self._domains)
 
 
 current = Runtime()

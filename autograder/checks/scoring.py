@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from autograder.checks import findings, outcomes, runtime
+from autograder.core import interrupts
 from autograder.core.results import CellResult, Outcome, Part, Status
 
 
@@ -35,7 +36,9 @@ def score(points: float | Mapping[str, float]) -> Score:
 
     Raises:
         ValueError: an expectation names a part that has no points here.
+        Interrupted: somebody has interrupted the cell, which then has no verdict.
     """
+    interrupts.here()
     more = outcomes.parts_with_more_at_grading()
     blank = runtime.current.blank_answers()
     cell = findings.current
@@ -57,6 +60,7 @@ def score(points: float | Mapping[str, float]) -> Score:
         max_points=full,
         points=earned,
         seconds=cell.seconds,
+        starved=round(cell.starved, 2),
         outcomes=found,
         parts=parts,
         flags=list(dict.fromkeys(cell.flags)),

@@ -2,7 +2,8 @@
 
 What decides is not that time went by. Each program must have said, through its probe, that its main thread has come to
 spinning; all that it said it made must be on the observer's graph; and then nothing new may come for as long as its
-slowest timer takes, and a while more. Where that evidence is missing, the deadline decides as ever.
+slowest timer takes, and a while more; time in which others kept the programs from the CPUs does not count. Where that
+evidence is missing, the deadline decides as ever.
 """
 
 from __future__ import annotations
@@ -46,7 +47,9 @@ class Settling:
         if now - self._looked >= _LOOK_EVERY:
             self._looked = now
             self._look(now)
-        return self._complete and now - self._since > self._pause
+        if not self._complete or now - self._since <= self._pause:
+            return False
+        return now - self._since - self._observer.patience.kept(self._since) > self._pause
 
     def _look(self, now: float) -> None:
         told = [read(program.events()) for program in self._programs]

@@ -8,6 +8,7 @@ from autograder.arguments import params_file, remap_rules
 from autograder.checks import runtime
 from autograder.checks.command_line import CommandLineError
 from autograder.checks.program import Program
+from autograder.checks.waiting import NotLaunchedError
 from autograder.diagnosis import Diagnosis
 from autograder.packages.workspace import INSTALLED
 
@@ -38,3 +39,24 @@ def refused_words(words: Sequence[str]) -> Diagnosis | None:
         hint = "Look at the indentation there, and at brackets and quotation marks."
         return Diagnosis(unreadable.because, "params-file", hint)
     return None
+
+
+def why_missing(program: str) -> Diagnosis:
+    """Why no cell has written a program."""
+    here = runtime.current.front_end
+    because, hint = here.why_missing("node", program) if here is not None else (f"There is no `{program}`.", "")
+    return Diagnosis(because, "program-missing", hint)
+
+
+def refuse_to_start(programs: Sequence[Program]) -> None:
+    """Look for what would keep a launch from beginning, before what runs now is ended for it.
+
+    Raises:
+        NotLaunchedError: there is something.
+    """
+    for node in programs:
+        if not node.package and not runtime.current.has(file_of(node)):
+            raise NotLaunchedError(why_missing(node.program))
+        words = words_of(node)
+        if isinstance(words, Diagnosis):
+            raise NotLaunchedError(words)

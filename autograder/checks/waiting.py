@@ -65,14 +65,6 @@ class NotLaunchedError(Exception):
         return [str(self)]
 
 
-class Interrupted(KeyboardInterrupt):
-    """Somebody has interrupted a wait. In a notebook it reads as a sentence."""
-
-    def _render_traceback_(self) -> list[str]:
-        """What IPython shows in place of a traceback through the kit."""
-        return [str(self)]
-
-
 def watched(launch: type) -> type:
     """Make the methods of `launch` that wait say what for."""
     for name, sentence in _WAITS_FOR.items():
@@ -92,8 +84,6 @@ def _says(method: Any, sentence: str) -> Any:
             return method(self, *args, **kwargs)
         try:
             return method(self, *args, **kwargs)
-        except KeyboardInterrupt:
-            raise Interrupted(f"Interrupted while it waited for {awaited}.") from None
         finally:
             self._watch.end()
 

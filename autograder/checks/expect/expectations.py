@@ -89,6 +89,11 @@ class Expectations:
         """
         return self.wait(ready, within, needs=ready)
 
+    def _sure_if(self, quicker: bool) -> None:
+        """Note that what is decided next does not depend on the machine: nothing is quicker where others compute."""
+        if quicker:
+            self._observer.patience.passed()
+
     def _fail(
         self, title: str, reason: Diagnosis | None, *, expected: str = "", observed: str = "", hint: str = ""
     ) -> NoReturn:

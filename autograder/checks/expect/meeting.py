@@ -9,11 +9,12 @@ from functools import cached_property
 from rcl_interfaces.srv import ListParameters
 
 from autograder.checks.expect.expectations import Expectations
-from autograder.checks.running import SETTLE
 from autograder.checks.settling import shows_all
 from autograder.diagnosis.events import Event, NodeSeen, ProbeFailed, read
 from autograder.graph.services import ServiceMissing, call_all
 
+_ANSWERS_WITHIN = 3.0
+"""Seconds in which a node answers that spins: callbacks of a second may run before it gets to the question."""
 MATCHES_WITHIN = 1.0
 """Seconds to wait for the check's recordings before it sends something that may be answered at once."""
 
@@ -42,14 +43,14 @@ class Meeting(Expectations):
         The answer also says that the node knows all ends that the observer had when it asked: a program learns of
         them in the order in which they were made, and the question's own end is the last.
         """
-        self._met[name] = self._observer.recorded
+        self._met[name] = len(self._observer.recordings())
         with contextlib.suppress(ServiceMissing):
             call_all(
                 self._observer,
                 f"{name}/list_parameters",
                 ListParameters,
                 [ListParameters.Request()],
-                SETTLE / 2,
+                _ANSWERS_WITHIN,
                 lambda: self._running.gone_program() is not None,
             )
 
@@ -65,7 +66,7 @@ class Meeting(Expectations):
             ready: whether that is on the graph which is sent to.
             within: seconds until it must be there; what is missing is left to whoever sends.
         """
-        recorded, started = self._observer.recorded, len(self._running.programs)
+        recorded, started = len(self._observer.recordings()), len(self._running.programs)
         if not recorded or not self.wait_for_graph(ready, within):
             return
         if self._introduced == (recorded, started):

@@ -17,7 +17,6 @@ from autograder.checks.expect.meeting import MATCHES_WITHIN
 from autograder.checks.expect.sources import SourceExpectations
 from autograder.checks.message_text import in_words, int_in_float, shorten
 from autograder.checks.misuse import Misuse
-from autograder.core.cpu_use import cpu_uses, kept_waiting
 from autograder.diagnosis import Diagnosis
 from autograder.graph.names import node_of
 from autograder.graph.recording import Received, Recording, quiet_profile
@@ -215,12 +214,13 @@ class MessageExpectations(SourceExpectations):
         self.wait(lambda: right() or len(wanted.counted()) >= enough, within)
         until = time.monotonic() + within
         while not right() and rates.too_slow(wanted.counted()[-need:], rate, every) and time.monotonic() < until:
-            known, began, before = wanted.recording.count, time.monotonic(), cpu_uses()
+            known, began = wanted.recording.count, time.monotonic()
             self.wait(lambda: right() or wanted.recording.count >= known + need, within)  # noqa: B023
-            if kept_waiting(before, cpu_uses()) < _HELD_UP * (time.monotonic() - began):
+            if self._observer.patience.kept(began) < _HELD_UP * (time.monotonic() - began):
                 break  # nobody else slowed it down
         last = wanted.counted()[-need:]
         if not right():
+            self._sure_if(not rates.too_slow(last, rate, every))
             measured = rates.in_words(last, every)
             self._fail(
                 wanted.title,

@@ -126,7 +126,7 @@ class ParameterExpectations(Meeting):
             abs(have[name] - value) < 1e-9 if isinstance(value, float) else have[name] == value
         )
         if not isinstance(value, (bool, int, float, str)):
-            same = list(have[name]) == list(value)
+            same = not isinstance(have[name], (bool, int, float, str)) and list(have[name] or ()) == list(value)
         self._expect_that(
             same,
             title,

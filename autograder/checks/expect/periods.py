@@ -63,6 +63,7 @@ class PeriodExpectations(ConcurrencyExpectations):
         if late and all(len(found) < runs for found in late.values()):
             self._wait_for_runs(topic, names, runs + 1, title, 0.0, hint)  # so many gaps lie between one run more
         told = ", ".join(f"{name} every {statistics.median(found):.2f} s" for name, found in late.items() if found)
+        self._sure_if(all(found and statistics.median(found) < period for found in late.values()))
         self._expect_that(
             not late,
             title,

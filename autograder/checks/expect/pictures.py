@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 from autograder import pictures
 from autograder.checks import seen
 from autograder.checks.expect.lifecycle import LifecycleExpectations
+from autograder.checks.misuse import Misuse
 from autograder.pictures import Picture, Runs
 
 
@@ -46,39 +49,57 @@ class Pictures(LifecycleExpectations):
         found = self._graph or seen.graph(self._observer)
         return pictures.graph(found.nodes, found.endpoints, seen.mismatch)
 
-    def qos(self, topic: str) -> Picture:
+    def qos(self, topic: str = "") -> Picture:
         """A picture of which publishers and subscriptions of a topic match, and over which policy they do not.
 
         Args:
-            topic: full name.
+            topic: full name; without it, the sentence of the refusal names the topics that there are.
 
         Example:
             `ros.qos("/frames")`
         """
         found = self._graph or seen.graph(self._observer)
+        _refuse_unnamed("qos", topic, [end.topic for end in found.endpoints])
         return pictures.qos(topic, [end for end in found.endpoints if end.topic == topic], seen.mismatch)
 
     def lifecycle(self, node: str) -> Picture:
         """A picture of the state machine, with the way that a node took through it.
 
         Args:
-            node: full name; the launch must have watched it, as `launch(..., lifecycle=[node])` does from the start.
+            node: full name of a lifecycle node; the launch must have watched it for the way that it took, as
+                `launch(..., lifecycle=[node])` does from the start.
 
         Example:
             `ros.lifecycle("/camera")`
         """
         client = self._lifecycle_clients.get(node)
+        if client is None and self._graph is None and f"{node}/get_state" not in self._observer.services():
+            raise Misuse(f"lifecycle: `{node}` is no lifecycle node; it offers no service `{node}/get_state`.")
         changes = [change.step for change in client.changes] if client else []
         return pictures.lifecycle(node, pictures.steps(changes))
 
-    def arrivals(self, topic: str, *, seconds: float | None = None) -> Picture:
+    def arrivals(self, topic: str = "", *, seconds: float | None = None) -> Picture:
         """A picture of when each message of a topic was published, and when each subscription's callback got one.
 
         Args:
-            topic: full name.
+            topic: full name; without it, the sentence of the refusal names the topics that there are.
             seconds: how much of it; by default all.
 
         Example:
             `ros.arrivals("/frames")`
         """
+        if not topic:  # only then is the graph asked, of which an ended launch of grading keeps nothing
+            found = self._graph or seen.graph(self._observer)
+            _refuse_unnamed("arrivals", topic, [end.topic for end in found.endpoints])
         return pictures.arrivals(topic, seen.traffic(self._insides(), topic), seconds=seconds)
+
+
+def _refuse_unnamed(picture: str, topic: str, there: Iterable[str]) -> None:
+    """Ask for the topic of a picture that is about one.
+
+    Raises:
+        Misuse: none was named.
+    """
+    if not topic:
+        known = ", ".join(f'"{name}"' for name in sorted(set(there))) or "none so far"
+        raise Misuse(f'{picture}: it is about one topic, such as ros.{picture}("/chatter"). Topics here: {known}.')
