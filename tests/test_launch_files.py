@@ -40,6 +40,56 @@ def refusal(folder: Path, text: str, **arguments: str) -> str:
     return str(caught.value)
 
 
+@pytest.mark.parametrize("written", ["010", "0x10", "12:30", "on", "1_000", "Yes", "+5", "true", "1.50"])
+@pytest.mark.parametrize("text", ["- arg:\n    name: rate\n    default: {}\n", "- let: {{name: rate, value: {}}}\n"])
+def test_the_hint_to_put_a_value_in_quotes_keeps_what_was_written(tmp_path: Path, text: str, written: str) -> None:
+    with pytest.raises(LaunchFileError) as caught:
+        read(tmp_path, "launch:\n" + text.format(written))
+    assert f'"{written}"`' in caught.value.hint and f"`{written}` is a" in caught.value.because
+    quoted = caught.value.hint.partition("`")[2].partition("`")[0].partition(": ")[2]
+    read(tmp_path, "launch:\n" + text.format(quoted))
+
+
+IN_PYTHON = """from launch import LaunchDescription
+from launch.actions import DeclareLaunchArgument
+from launch.substitutions import LaunchConfiguration
+from launch_ros.actions import Node
+
+
+def generate_launch_description():
+    return LaunchDescription([
+        DeclareLaunchArgument("side", default_value="front"),
+        Node(package="camera_lab", executable="camera_demo", name=LaunchConfiguration("side"),
+             remappings=[("image", "front/image")]),
+    ])
+"""
+
+
+@pytest.mark.parametrize(
+    "text",
+    [IN_PYTHON, IN_PYTHON.partition("def ")[0] + "x = 1\n", "# a car\nimport launch\n" + IN_PYTHON,
+     "import launch_ros.actions as a\nfrom launch import LaunchDescription as D\n", "x: 1\nLaunchDescription([])\n"],
+)  # fmt: skip
+def test_a_launch_file_in_python_is_called_so_and_its_words_are_translated(tmp_path: Path, text: str) -> None:
+    with pytest.raises(LaunchFileError) as caught:
+        read(tmp_path, text)
+    assert "a launch file in Python" in caught.value.because and "YAML" in caught.value.because
+    assert "`launch:`" in caught.value.hint and "`- node:`" in caught.value.hint
+    if "remappings" in text:
+        for words in ("`$(var NAME)`", "`remap:`", "`- arg:`"):
+            assert words in caught.value.hint
+    assert "indentation" not in str(caught.value) + caught.value.hint
+
+
+@pytest.mark.parametrize("text", [
+    "- node: {pkg: camera_lab, exec: camera_demo, name: $(optenv NAME x)}", "- lifecycle_node: {pkg: a, exec: b}",
+    "- log_info: {message: a}", "- log: {message: a, level: INFO}",
+])  # fmt: skip
+def test_what_jazzy_does_not_have_is_not_said_to_be_missing_here(tmp_path: Path, text: str) -> None:
+    said = refusal(tmp_path, f"launch:\n{text}\n")
+    assert "not covered here" not in said.replace("is unknown or not covered here", "")
+
+
 def test_a_node_gets_its_name_namespace_rules_and_parameters_in_order(tmp_path: Path) -> None:
     (tmp_path / "camera.params.yaml").write_text("")
     [node] = read(

@@ -93,7 +93,7 @@ def test_a_rule_that_rcl_takes_is_not_blamed(rule: str) -> None:
         (["__ns:=/x", "camera/image_color:=/image"], "/x/image", "absolute-rule"),
         (["__ns:=/x", "camera/image_color:=x/image"], "/x/image", "topic-name"),
         (["__ns:=/x", "camera/image_color:=~/image"], "/x/image", "private-rule"),
-        (["front/image:=camera/image_color"], "/front/image", "rule-without-match"),
+        (["front/image:=camera/image_color"], "/front/image", "rule-takes-name"),
     ],
 )
 def test_a_rule_without_effect_is_explained(rules: list[str], wanted: str, code: str) -> None:
@@ -106,9 +106,23 @@ def test_a_rule_without_effect_is_explained(rules: list[str], wanted: str, code:
 
 def test_a_swapped_rule_is_told_from_one_that_is_misspelt() -> None:
     node, topics = names(["front/image:=camera/image_color"])
+    in_code = {f"/{name}": [node] for name in ("camera/image_color", "camera_demo/status")}
     for rule, said in (("front/image:=camera/image_color", True), ("camera/image_colour:=front/image", False)):
-        reason = remap_rules.without_effect([rule], "/front/image", [node], topics)
+        reason = remap_rules.without_effect([rule], "/front/image", [node], topics, in_code)
         assert reason is not None and ("swapped" in reason[0]) == said
+
+
+@pytest.mark.parametrize(("space", "wanted"), [("", "/camera/image_color"), ("/car", "/car/camera/image_color")])
+@pytest.mark.parametrize("known", [True, False])
+def test_a_rule_that_worked_is_not_said_to_have_changed_nothing(space: str, wanted: str, known: bool) -> None:
+    rules = [*([f"__ns:={space}"] if space else []), "camera/image_color:=/front/image"]
+    node, topics = names(rules)
+    assert "/front/image" in topics and wanted not in topics
+    in_code = {wanted: [node], f"{node}/status": [node]} if known else None
+    reason = remap_rules.without_effect(rules, wanted, [node], topics, in_code)
+    assert reason is not None and reason[1] == "rule-takes-name" and "leave the rule out" in reason[2].lower()
+    assert "changed nothing" not in reason[0] and "swapped" not in reason[0]
+    assert ("swapped" in reason[2]) != known
 
 
 def test_what_renames_no_node_is_told() -> None:
@@ -338,15 +352,45 @@ def test_a_parameter_file_that_grows_has_no_keys() -> None:
         f"a{n}: &a{n} {{{', '.join(f'k{i}: *a{n - 1}' for i in range(9))}}}\n" for n in range(1, 9)
     )
     assert params_file.node_keys(tree) == []
-    # rcl refuses the whole file, and that is what a student is told; as YAML it can be read.
-    assert params_file.node_keys("a: &a {ros__parameters: {b: 1}}\nc: {<<: *a}\n") == ["/a", "/c"]
+    # rcl refuses the whole file, and that is what a student is told.
+    assert params_file.node_keys("a: &a {ros__parameters: {b: 1}}\nc: {<<: *a}\n") == []
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "/a:\n  ros__parameters:\n    b: &x 1\n    c: &x 2\n",
+        "/a:\n  ros__parameters:\n    b: 1\n    c: 1\n    b: 2\n",
+        "/a:\n  ros__parameters:\n    b: 1\n---\n/a:\n  ros__parameters:\n    c: 2\n",
+        "/a:\n  ros__parameters:\n    b:\t1\n    c: 2\n",
+        "/a:\n  ros__parameters:\n    b: !car 1\n    c: !!python/name 2\n",
+        "/a: !car\n  ros__parameters: !car\n    b: 1\n    c: 2020-13-45\n",
+        "/a:\n  ros__parameters:\n    b: [1, 2]\n/a:\n  ros__parameters:\n    c: 2\n",
+        "a:\n  ros__parameters:\n    b: {d: 1}\n    c: 2\n",
+    ],
+)
+def test_a_parameter_file_that_rcl_reads_is_read_as_rcl_reads_it(tmp_path: Path, text: str) -> None:
+    file = tmp_path / "a.yaml"
+    file.write_text(text)
+    context = rclpy.Context()
+    rclpy.init(context=context, args=["x", "--ros-args", "--params-file", str(file)])
+    node = Node("a", context=context, automatically_declare_parameters_from_overrides=True)
+    try:
+        given = {name.partition(".")[0] for name in node.get_parameters_by_prefix("") if name[0] in "bc"}
+    finally:
+        node.destroy_node()
+        rclpy.try_shutdown(context=context)
+    assert params_file.unreadable(["--params-file", "a.yaml"], tmp_path) is None
+    assert given == set(params_file.names_for(text, "/a")) == {"b", "c"}
+    reason = params_file.why_not_reached(text, "/other")
+    assert reason is not None and "`/a`" in reason
 
 
 @pytest.mark.parametrize(
     ("rule", "wanted", "nodes", "says"),
     [
         ("rigth_eye:__node:=starboard_eye", "/starboard_eye", ["/port_eye", "/right_eye"], "`rigth_eye` in its code"),
-        ("port_eye:__node:=left_eye", "/port_eye", ["/left_eye", "/right_eye"], "old and new are swapped"),
+        ("port_eye:__node:=left_eye", "/port_eye", ["/left_eye", "/right_eye"], "gives the node `port_eye` the name"),
         ("old:__ns:=/rear", "/rear/new", ["/new"], "a node named `old`"),
         ("left_eye:__node:=port_eye", "/starboard_eye", ["/port_eye", "/right_eye"], ""),
         ("right_eye:__node:=starboard_eye", "/area/starboard_eye", ["/starboard_eye"], ""),

@@ -9,17 +9,24 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import redirect_stderr, redirect_stdout
+from dataclasses import replace
 from io import StringIO
 from pathlib import Path
 
 import pytest
-from test_notebook import SET_UP, TALKER, Notebook
+from kernels import Notebook
+from rcl_interfaces.msg import ListParametersResult
+from std_msgs.msg import String
+from test_msgs.msg import BoundedSequences, UnboundedSequences
+from test_notebook import SET_UP, TALKER
 
-from autograder.graph.domains import free_domains
+from autograder.graph.domains import claim_domain
 from autograder.graph.observer import Observer
+from autograder.ros2 import discovery
 from autograder.ros2.main import COMMANDS, TimeIsUp, run
+from autograder.ros2.messages import Shape, to_csv, to_yaml
 from autograder.sandbox.environment import profile_environment
 
 ROBOT = Path(__file__).parent / "ros2_robot"
@@ -38,24 +45,28 @@ class Robot:
     """The three nodes, running; and an observer, such as a notebook has."""
 
     def __init__(self, environment: dict[str, str]) -> None:
-        self.domains = free_domains()  # the domain is claimed as long as this is there
-        self.domain = next(self.domains)
+        self.claim = claim_domain()
+        self.domain = self.claim.id
         plain = {name: value for name, value in os.environ.items() if not name.startswith("FASTRTPS")}
         self.environment = {**plain, **environment, "ROS_DOMAIN_ID": str(self.domain)}
         self.process = subprocess.Popen([sys.executable, ROBOT / "robot.py"], env=self.environment)
         os.environ.update(profile_environment())
         self.observer = Observer(self.domain)
+
+    def wait(self) -> None:
         assert self.observer.wait(lambda: self.observer.nodes() == NODES, WITHIN)
 
     def close(self) -> None:
         self.observer.close()
         self.process.terminate()
         self.process.wait(WITHIN)
+        self.claim.release()
 
 
 @pytest.fixture(scope="module")
 def robot() -> Iterator[Robot]:
     made = Robot(profile_environment())
+    made.wait()
     yield made
     made.close()
 
@@ -119,11 +130,58 @@ def test_it_prints_what_the_real_tool_prints(
         ("topic echo /chatter --filter m.nothing", "Invalid filter 'm.nothing'"),
         ("topic hz /chatter --filter m.nothing", "Invalid filter 'm.nothing'"),
         ("topic pub '/no name' std_msgs/msg/String", "no name"),
+        (
+            "topic pub /x test_msgs/BoundedSequences '{uint8_values: [1, 2, 3, 4]}'",
+            "takes 3 elements at most, and not 4",
+        ),
+        ("topic pub /x test_msgs/Arrays '{uint8_values: [1]}'", "takes exactly 3 elements, and not 1"),
+        ("topic pub /x test_msgs/BasicTypes '{uint8_value: x}'", "Failed to populate field"),
+        ("service call /x test_msgs/Arrays '{string_values: [a]}'", "takes exactly 3 elements, and not 1"),
+        ("action info 'no name'", "no name"),
+        ("topic pub /x std_msgs/String '{data: \"'", "needs to be a dictionary"),
+        ("service call /switch std_srvs/SetBool '{'", "Failed to populate field"),
     ],
 )
 def test_what_cannot_be_done_is_told_in_words(robot: Robot, command: str, told: str) -> None:
     said, status = say(robot, command)
     assert told in said and "Traceback" not in said and status == 1
+
+
+def test_a_regular_expression_that_is_none_is_told(robot: Robot) -> None:
+    said, status = say(robot, "param list --filter '[' /demo")
+    assert status == 2 and "'[' is no regular expression" in said
+
+
+def test_values_come_on_standard_input(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> None:
+    for command, given, told in (
+        ("service call --stdin /switch std_srvs/SetBool", "{data: true}", "message='now True'"),
+        ("topic pub --once --stdin /in std_msgs/String", "data: hello", "data='hello'"),
+        ("action send_goal --stdin /fibonacci test_msgs/Fibonacci", "order: 200", "rejected"),
+    ):
+        monkeypatch.setattr(sys, "stdin", StringIO(given))
+        said, status = say(robot, command)
+        assert told in said and status == 0
+
+
+def test_what_failed_stands_on_standard_error(robot: Robot) -> None:
+    for command in ("param set /demo rate 99", "param delete /demo frame"):
+        said, error = StringIO(), StringIO()
+        with redirect_stdout(said), redirect_stderr(error):
+            assert run(shlex.split(command), robot.domain, robot.observer) == 0
+        assert said.getvalue() == "" and "parameter failed: " in error.getvalue()
+
+
+def test_messages_are_written_as_the_real_tool_writes_them() -> None:
+    """Measured with rosidl_runtime_py 0.13."""
+    text, arrays, bounded = String(data="weit ü"), UnboundedSequences(), BoundedSequences()
+    assert to_yaml(text) == "data: weit ü\n"
+    arrays.bool_values, arrays.string_values = [True, False], ["a"]
+    flow = to_yaml(arrays, flow=True).splitlines()
+    assert flow[0] == "bool_values: [true, false]" and "string_values: [a]" in flow
+    for names, prefixes, line in (([], ["b"], "b"), (["a"], [], "a,"), (["", "a"], ["b"], "a,b"), ([], [], "")):
+        assert to_csv(ListParametersResult(names=names, prefixes=prefixes), Shape()) == line
+    assert "uint8_values: '<sequence type: uint8[3], length: 0>'" in to_yaml(bounded, Shape(arrays=False))
+    assert to_csv(text, Shape(strings=False)) == "<string length: <6>>"
 
 
 def terminal(robot: Robot, *words: str) -> subprocess.Popen[str]:
@@ -141,6 +199,13 @@ def terminal(robot: Robot, *words: str) -> subprocess.Popen[str]:
 def test_a_terminal_sees_programs_of_a_notebook_and_of_another_terminal(settings: dict[str, str]) -> None:
     made = Robot(settings)
     try:
+        if settings:
+            made.wait()
+        else:  # a notebook does not hear it, and is not there
+            made.observer.close()
+            deadline = time.monotonic() + WITHIN
+            while "/demo" not in terminal(made, "node", "list").communicate(timeout=WITHIN)[0]:
+                assert time.monotonic() < deadline
         listed = terminal(made, "node", "list")
         unknown = terminal(made, "node", "info", "/nope")
         wrong = terminal(made, "node", "nonsense")
@@ -153,6 +218,93 @@ def test_a_terminal_sees_programs_of_a_notebook_and_of_another_terminal(settings
         assert (heard.communicate(timeout=WITHIN)[1], heard.returncode) == ("", 2)
     finally:
         made.close()
+
+
+TEN_NODES = """
+import rclpy
+from std_msgs.msg import String
+rclpy.init()
+nodes = [rclpy.create_node(f"node_{number}") for number in range(10)]
+topics = [nodes[number % 10].create_publisher(String, f"topic_{number}", 10) for number in range(19)]
+executor = rclpy.executors.SingleThreadedExecutor()
+for node in nodes:
+    executor.add_node(node)
+print("ready", flush=True)
+executor.spin()
+"""
+
+
+@pytest.fixture
+def ten_nodes() -> Iterator[tuple[subprocess.Popen[str], int]]:
+    """A process with ten nodes and 21 topics, and its domain."""
+    claim = claim_domain()
+    os.environ.update(profile_environment())
+    environment = {**os.environ, "ROS_DOMAIN_ID": str(claim.id)}
+    made = subprocess.Popen([sys.executable, "-c", TEN_NODES], env=environment, stdout=subprocess.PIPE, text=True)
+    assert made.stdout is not None and made.stdout.readline() == "ready\n"
+    yield made, claim.id
+    made.kill()
+    made.communicate()
+    claim.release()
+
+
+def test_what_a_newcomer_has_not_heard_of_yet_is_known_to_be_missing(
+    ten_nodes: tuple[subprocess.Popen[str], int],
+) -> None:
+    observer = Observer(ten_nodes[1])
+    try:
+        assert observer.wait(lambda: len(discovery.look(observer.node).ends) == 181, WITHIN)
+        assert observer.wait(lambda: discovery.look(observer.node).is_complete(), WITHIN)
+        seen = discovery.look(observer.node)
+        assert len(seen.nodes) == 10 and seen.participants == discovery.participants_here(ten_nodes[1]) == 2
+        # Writers come in the order of their numbers, readers in that of theirs: the end of a list is what is missing.
+        readers = sorted(end.number for end in seen.ends.values() if not end.writes)
+        for heard in readers[:-1]:
+            fewer = {gid: end for gid, end in seen.ends.items() if end.writes or end.number <= heard}
+            assert not replace(seen, ends=fewer).is_complete()
+            fewer = {gid: end for gid, end in seen.ends.items() if not end.writes or end.number <= heard}
+            assert not replace(seen, ends=fewer).is_complete()
+        # What was destroyed long ago is no gap.
+        gone = {gid: end for gid, end in seen.ends.items() if end.number not in (20, 21)}
+        assert replace(seen, ends=gone).is_complete()
+        one = next(gid for gid, end in seen.ends.items() if end.node == "/node_3")
+        unknown = {**seen.ends, one: replace(seen.ends[one], node="/_NODE_NAME_UNKNOWN_")}
+        assert not replace(seen, ends=unknown).is_complete()
+    finally:
+        observer.close()
+
+
+def test_a_command_waits_for_a_program_that_is_slow_to_answer(ten_nodes: tuple[subprocess.Popen[str], int]) -> None:
+    made, domain = ten_nodes
+    made.send_signal(signal.SIGSTOP)  # as one that gets no turn on a busy machine
+    environment = {name: value for name, value in os.environ.items() if not name.startswith("FASTRTPS")}
+    command = [Path(sys.executable).with_name("autograder"), "ros2", "topic", "list"]
+    listed = subprocess.Popen(
+        command, env={**environment, "ROS_DOMAIN_ID": str(domain)}, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+        text=True,
+    )  # fmt: skip
+    assert until(lambda: discovery.participants_here(domain) == 2)
+    time.sleep(4)  # longer than a command waits where there is nothing
+    made.send_signal(signal.SIGCONT)
+    said, warned = listed.communicate(timeout=WITHIN)
+    assert (len(said.splitlines()), warned) == (21, "")
+
+
+def test_a_program_that_does_not_answer_at_all_is_told(ten_nodes: tuple[subprocess.Popen[str], int]) -> None:
+    made, domain = ten_nodes
+    made.send_signal(signal.SIGSTOP)
+    said = StringIO()
+    with redirect_stdout(said), redirect_stderr(said):
+        assert run(["node", "list"], domain) == 0
+    assert said.getvalue() == "WARNING: a program here does not answer: what follows may not be all there is.\n"
+
+
+def until(done: Callable[[], bool]) -> bool:
+    """Whether it came."""
+    deadline = time.monotonic() + WITHIN
+    while not done() and time.monotonic() < deadline:
+        time.sleep(0.01)
+    return done()
 
 
 def test_what_a_shell_has_made_deaf_to_ctrl_c_goes_on(robot: Robot) -> None:
@@ -294,6 +446,19 @@ def test_an_installed_ros2_goes_first(tmp_path: Path) -> None:
         command = [str(ours), "interface", "proto", "std_msgs/msg/Bool"]
         ran = subprocess.run(command, env={**os.environ, "PATH": path}, capture_output=True, text=True)
         assert (ran.stdout, ran.stderr, ran.returncode) == (said, "", status)
+
+
+@pytest.mark.parametrize("start", ["exec ", ""])
+def test_a_script_that_starts_the_kits_ros2_does_not_start_itself_again(tmp_path: Path, start: str) -> None:
+    ours = Path(sys.executable).with_name("ros2")
+    for name in ("a", "b"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "ros2").write_text(f'#!/bin/sh\n{start}"{ours}" "$@"\n')
+        (tmp_path / name / "ros2").chmod(0o755)
+    path = f"{tmp_path}/a:{tmp_path}/b:{os.environ['PATH']}"
+    command = [tmp_path / "a" / "ros2", "interface", "proto", "std_msgs/msg/Bool"]
+    ran = subprocess.run(command, env={**os.environ, "PATH": path}, capture_output=True, text=True, timeout=WITHIN)
+    assert (ran.stdout, ran.stderr, ran.returncode) == ('"data: false\n"\n', "", 0)
 
 
 def test_what_is_not_here_is_said(capsys: pytest.CaptureFixture[str]) -> None:

@@ -6,9 +6,11 @@ import itertools
 import re
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
-from autograder.core.student_yaml import FILE_BYTES, StudentFileError, load, read
+import yaml
+
+from autograder.arguments.rule_values import LIBYAML
+from autograder.core.student_yaml import DEPTH, FILE_BYTES, StudentFileError, read
 
 _REFUSED = re.compile(
     r"parse params file: '--params-file (?P<file>[^']{1,300})'\. Error: (?P<what>.{0,400}?)"
@@ -64,30 +66,53 @@ def node_keys(text: str) -> list[str]:
 
 def names_for(text: str, node: str) -> list[str]:
     """The names of the parameters that the file has values for, as far as they are for this node."""
-    return [
-        str(name)
-        for key, values in _sections(text)
-        if is_for(key, node) and isinstance(values, dict)
-        for name in values
-    ]
+    return [str(name) for key, values in _sections(text) if is_for(key, node) for name in values]
 
 
-def _sections(text: str) -> list[tuple[str, Any]]:
-    """Each `ros__parameters` of a file: the full name of the node that it is for, and what stands below it."""
+def _sections(text: str) -> list[tuple[str, list[str]]]:
+    """Each `ros__parameters` of a file: the full name of the node that it is for, and the names below it.
+
+    Read as rcl reads it: several documents, keys that stand twice, anchors and tags are all the same to it. It refuses
+    a file with an alias, and then there are none.
+    """
+    found: list[tuple[str, list[str]]] = []
+    path: list[str | None] = []  # for each collection that is open: the key in it that is being read
+    lists = 0
+
+    def end_value() -> None:
+        if path:
+            path[-1] = None
+
     try:
-        content = load(text)
-    except StudentFileError:
+        for event in yaml.parse(text, Loader=LIBYAML):
+            match event:
+                case yaml.AliasEvent():
+                    return []
+                case yaml.MappingStartEvent() if not lists:
+                    if path and path[-1] == "ros__parameters":
+                        parts = [part.strip("/") for part in path[:-1] if part]
+                        found.append(("/" + "/".join(parts), []))
+                    path.append(None)
+                case yaml.MappingEndEvent() if not lists:
+                    path.pop()
+                    end_value()
+                case yaml.SequenceStartEvent():
+                    lists += 1
+                case yaml.SequenceEndEvent():
+                    lists -= 1
+                    if not lists:
+                        end_value()
+                case yaml.ScalarEvent() if not lists and path:
+                    if path[-1] is not None:
+                        end_value()
+                        continue
+                    path[-1] = event.value
+                    if path[-2:-1] == ["ros__parameters"] and found:
+                        found[-1][1].append(event.value)
+            if len(path) > DEPTH:
+                return []
+    except (yaml.YAMLError, RecursionError):
         return []
-    found: list[tuple[str, Any]] = []
-
-    def walk(part: Any, path: str, depth: int) -> None:
-        for key, below in part.items() if isinstance(part, dict) and depth <= 10 else ():
-            if key == "ros__parameters":
-                found.append((path or "/", below))
-            else:
-                walk(below, f"{path}/{str(key).strip('/')}", depth + 1)
-
-    walk(content, "", 0)
     return found
 
 

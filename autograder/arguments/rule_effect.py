@@ -5,12 +5,14 @@ are settled. The first rule that matches a name wins, and its result is not look
 node-specific rule is the name that the node has after `__node`; only for `__node` itself it is the name in the code.
 
 A reason is given only if what the graph shows establishes it: the rule is for the node in question, or would be but
-for what the reason says, and after the advice the wanted name is there. One thing cannot be seen on the graph and is
-taken for granted: that the code has no name of its own that a rule makes as well.
+for what the reason says, and after the advice the wanted name is there. One thing cannot be seen on the graph: which
+names the code gives. Whoever knows them says so; otherwise it is taken for granted that the code has no name of its
+own that a rule makes as well.
 """
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -30,6 +32,8 @@ class _Case:
     """Names of topics that the node uses."""
     nodes: Sequence[str]
     wanted: str
+    given: Collection[str] | None
+    """Full names, before any rule, of the topics that the node's code makes; None if that is not known."""
 
     @property
     def said(self) -> str:
@@ -38,6 +42,10 @@ class _Case:
     @property
     def left(self) -> str:
         return full_name(self.rule.left, self.node)
+
+    @property
+    def right(self) -> str:
+        return full_name(self.rule.right, self.node)
 
     def is_for(self, rule: Rule) -> bool:
         """Whether a rule is for the node."""
@@ -48,7 +56,9 @@ class _Case:
         return [rule for rule in self.rules if self.is_for(rule) and full_name(rule.right, self.node) == name]
 
     def in_code(self, name: str) -> bool:
-        """Whether the node uses a name that no rule has made: then its code gives it."""
+        """Whether the node's code gives a name; where nothing says so, it gives those that no rule can have made."""
+        if self.given is not None:
+            return name in self.given
         return name in self.used and not self.makes(name)
 
 
@@ -62,7 +72,11 @@ def full_name(name: str, node: str) -> str:
 
 
 def without_effect(
-    rules: Sequence[str], wanted: str, nodes: Sequence[str], topics: Sequence[str] | Mapping[str, Collection[str]]
+    rules: Sequence[str],
+    wanted: str,
+    nodes: Sequence[str],
+    topics: Sequence[str] | Mapping[str, Collection[str]],
+    in_code: Mapping[str, Collection[str]] | None = None,
 ) -> Reason | None:
     """Why no rule made the topic or service `wanted`, although one was meant to.
 
@@ -71,37 +85,30 @@ def without_effect(
         wanted: the full name that should be there.
         nodes: full names of the nodes on the graph.
         topics: full names of topics, with the nodes that use each; a sequence stands for topics of all nodes.
+        in_code: full names that topics have in the code, before any rule, with the nodes that make them; None if that
+            is not known. The graph does not tell a name that a rule has made from one that the code gives.
     """
     users = topics if isinstance(topics, Mapping) else dict.fromkeys(topics, nodes)
     read = [rule for rule in map(parse, rules) if rule and rule.renames_topics]
+
+    def of(node: str, known: Mapping[str, Collection[str]]) -> list[str]:
+        return [name for name, by in known.items() if node in by]
+
     cases = [
-        _Case(rule, number, node, read, [name for name, of in users.items() if node in of], nodes, wanted)
+        _Case(rule, number, node, read, of(node, users), nodes, wanted, None if in_code is None else of(node, in_code))
         for number, rule in enumerate(read)
         for node in _own_nodes(rules, nodes)
-        if full_name(rule.right, node) == wanted and node not in users.get(wanted, ())
     ]
-    for why in _REASONS:
-        for case in cases:
-            reason = why(case)
-            if reason:
-                return reason
-    for rule in read:
-        for node in _own_nodes(rules, nodes):
-            reason = _swapped(_Case(rule, 0, node, read, [n for n, of in users.items() if node in of], nodes, wanted))
-            if reason:
-                return reason
-    for rule in read:
-        for node in _own_nodes(rules, nodes):
-            reason = _beside(_Case(rule, 0, node, read, [n for n, of in users.items() if node in of], nodes, wanted))
-            if reason:
-                return reason
-    return None
+    meant = [case for case in cases if case.right == wanted and case.node not in users.get(wanted, ())]
+    reasons = itertools.chain((why(case) for why in _REASONS for case in meant), map(_away, cases), map(_beside, cases))
+    return next(filter(None, reasons), None)
 
 
 def _beside(case: _Case) -> Reason | None:
     """The rule made a name, and it is the wanted one but for what the right side begins with."""
-    right, space = case.rule.right, case.node.rsplit("/", 1)[0]
-    made = full_name(right, case.node)
+    right, made, space = case.rule.right, case.right, case.node.rsplit("/", 1)[0]
+    if case.given is not None and case.left not in case.given:
+        return None
     if not case.is_for(case.rule) or case.left in case.used or made not in case.used:
         return None
     if case.rule.kind == "service" or case.makes(made) != [case.rule]:
@@ -128,18 +135,33 @@ def _beside(case: _Case) -> Reason | None:
     return None
 
 
-def _swapped(case: _Case) -> Reason | None:
-    old = full_name(case.rule.right, case.node)
-    if not case.is_for(case.rule) or case.left != case.wanted or case.left in case.used or old not in case.used:
+def _away(case: _Case) -> Reason | None:
+    """The wanted name is on the rule's left side: either the rule took it away, or old and new are swapped."""
+    left, right, rule = case.left, case.right, case.rule
+    if not case.is_for(rule) or left != case.wanted or left in case.used or right not in case.used:
         return None
-    if any(rule is not case.rule for rule in case.makes(old)):
+    if any(other is not rule for other in case.makes(right)):
+        return None
+    if case.given is None:
+        return (
+            f"The rule `{rule.text}` makes `{right}` of the name `{left}`: `{right}` is there, and `{left}` is not.",
+            "rule-takes-name",
+            f"If the code gives the name `{left}`, leave the rule out. If it gives `{right}`, old and new are swapped: "
+            f"`{rule.right}:={rule.left}`.",
+        )
+    if case.in_code(left):
+        return (
+            f"The rule `{rule.text}` took the name away: the code gives `{left}`, and the rule made `{right}` of it.",
+            "rule-takes-name",
+            f"Leave the rule out, or give the right side (in a launch file, `to`) the name that is expected: `{left}`.",
+        )
+    if not case.in_code(right):
         return None
     return (
-        f"{case.said} nothing is called `{case.left}`, the name on its left side, and `{old}`, the one on its right, "
+        f"{case.said} nothing is called `{left}`, the name on its left side, and `{right}`, the one on its right, "
         "is there: old and new are swapped.",
         "rule-without-match",
-        "The name in the code stands on the left (in a launch file, in `from`): "
-        f"`{case.rule.right}:={case.rule.left}`.",
+        f"The name in the code stands on the left (in a launch file, in `from`): `{rule.right}:={rule.left}`.",
     )
 
 
@@ -184,7 +206,9 @@ def _order(case: _Case) -> Reason | None:
     for earlier in case.rules[: case.number]:
         same = case.is_for(earlier) and full_name(earlier.left, case.node) == case.left
         if same and earlier.kind != "service":
-            if full_name(earlier.right, case.node) not in case.used:
+            made = full_name(earlier.right, case.node)
+            matched = case.makes(made) == [earlier] if case.given is None else case.in_code(case.left)
+            if made not in case.used or not matched:
                 return None
             return (
                 f"{case.said} `{earlier.text}` stands before it and matches the same name, and the first rule wins.",
@@ -198,7 +222,7 @@ def _chain(case: _Case) -> Reason | None:
     if not case.is_for(case.rule) or case.left not in case.used or case.rule.kind == "service":
         return None
     others = [rule for rule in case.makes(case.left) if rule is not case.rule and rule.kind != "service"]
-    if not others:
+    if not others or (case.given is not None and case.in_code(case.left)):
         return None
     return (
         f"{case.said} no entity has the name `{case.left}` in its code; `{others[0].text}` made it. Rules do not "
@@ -258,7 +282,12 @@ def _no_match(case: _Case) -> Reason | None:
 
 def _idle(case: _Case) -> bool:
     """Whether the rule is for topics of the node and finds nothing there, and no rule before it takes its name."""
-    if case.rule.kind == "service" or not case.is_for(case.rule) or case.left in case.used:
+    if (
+        case.rule.kind == "service"
+        or not case.is_for(case.rule)
+        or case.left in case.used
+        or case.left in (case.given or ())
+    ):
         return False
     before = [rule for rule in case.rules[: case.number] if case.is_for(rule) and rule.kind != "service"]
     return all(full_name(rule.left, case.node) != case.left for rule in before)

@@ -34,9 +34,11 @@ def node_without_effect(rules: Sequence[str], wanted: str, nodes: Sequence[str])
         said = f"The rule `{rule.text}` changed nothing:"
         if rule.left in ("__node", "__name") and rule.prefix == base and rule.right in names:
             return (
-                f"{said} no node is called `{base}` in its code, but `{rule.right}` is there: old and new are swapped.",
-                "rule-prefix",
-                f"The name in the code stands on the left, the new one on the right: `{rule.right}:__node:={base}`.",
+                f"The rule `{rule.text}` gives the node `{base}` the name `{rule.right}`: `{rule.right}` is there, and "
+                f"`{base}` is not.",
+                "rule-takes-name",
+                f"If the code calls the node `{base}`, leave the rule out. If it calls it `{rule.right}`, old and new "
+                f"are swapped: `{rule.right}:__node:={base}`.",
             )
         if rule.left in ("__node", "__name") and rule.right == base and base not in names:
             return (

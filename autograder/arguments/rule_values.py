@@ -25,8 +25,8 @@ _LONGEST_INTEGER = 1000
 
 # A comma behind a tag belongs to the tag for rcl.
 _TAG = re.compile(r"(![\w-]*),")
-# The library that rcl reads YAML with; it differs from PyYAML's own reader in tabs and colons.
-_LIBYAML = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+LIBYAML = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+"""The library that rcl reads YAML with; it differs from PyYAML's own reader in tabs and colons."""
 
 
 def why_refused(value: str) -> str | None:
@@ -37,7 +37,7 @@ def why_refused(value: str) -> str | None:
     kinds: list[str] = []
     depth = 0
     try:
-        for event in yaml.parse(_TAG.sub(r"\1", value), Loader=_LIBYAML):
+        for event in yaml.parse(_TAG.sub(r"\1", value), Loader=LIBYAML):
             match event:
                 case yaml.AliasEvent() | yaml.MappingStartEvent():
                     what = "an alias" if isinstance(event, yaml.AliasEvent) else "`key: value`"

@@ -43,10 +43,12 @@ class Place:
     file: str
     folder: Path
     where: str = ""
+    written: str = ""
+    """The text that stands there, if it is one value, before YAML makes a number or a truth value of it."""
 
-    def at(self, more: str) -> Place:
+    def at(self, more: str, written: str = "") -> Place:
         """A place further inside."""
-        return Place(self.file, self.folder, f"{self.where} > {more}" if self.where else more)
+        return Place(self.file, self.folder, f"{self.where} > {more}" if self.where else more, written)
 
     def error(self, because: str, hint: str = "") -> LaunchFileError:
         """The error to raise for this place."""

@@ -12,18 +12,18 @@ from pathlib import Path
 from typing import Any
 
 from autograder.core import student_yaml
-from autograder.launch_files import substitutions, values, words
-from autograder.launch_files.errors import LaunchFileError, Place, ValueRefused
+from autograder.launch_files import opening, substitutions, values, words
+from autograder.launch_files.errors import Place, ValueRefused
 from autograder.launch_files.texts import Text, parse, unescaped
 
 _ELSEWHERE = {
-    "append_env", "composable_node", "emit_event", "executable", "for_each", "for_loop", "keep", "lifecycle_node",
-    "load_composable_node", "log_debug", "log_error", "log_info", "log_warning", "node_container", "pop_environment",
-    "pop_launch_configurations", "push_environment", "push_launch_configurations", "reset", "reset_environment",
-    "set_ros_log_dir", "set_use_sim_time", "shutdown", "test", "timer",
+    "append_env", "composable_node", "emit_event", "executable", "for_each", "for_loop", "keep",
+    "load_composable_node", "node_container", "pop_environment", "pop_launch_configurations", "push_environment",
+    "push_launch_configurations", "reset", "reset_environment", "set_ros_log_dir", "set_use_sim_time", "shutdown",
+    "test", "timer",
 }  # fmt: skip
 """Actions that `ros2 launch` has and that are not covered here."""
-_KEYS_ELSEWHERE = {"cwd", "forwarding", "keep", "launch-prefix", "level", "on_exit", "respawn_max_retries"}
+_KEYS_ELSEWHERE = {"cwd", "forwarding", "keep", "launch-prefix", "on_exit", "respawn_max_retries"}
 _WHY_NOT = {
     "executable": "only the lab's own programs can be started in the sandbox.",
     "timer": "what is started later is not covered here.",
@@ -48,24 +48,7 @@ def read_file(path: Path) -> list[Action]:
         LaunchFileError: it is missing, is no launch file, or has what `ros2 launch` refuses or what is not covered.
     """
     place = Place(path.name, path.resolve().parent)
-    if not path.is_file():
-        hint = "Its name is the one after `%%file` in the first line of its cell."
-        if "share" in path.parts:
-            hint = "It is started from where the package installs it: `data_files` in setup.py has to name it."
-        raise place.error("there is no such file.", hint)
-    try:
-        content = student_yaml.read(path)
-    except student_yaml.StudentFileError as error:
-        where = f"line {error.line} of the cell" if error.line else ""
-        because = error.because.removeprefix(f"`{path.name}`").lstrip(", ").removeprefix(where).lstrip(" :")
-        because = f"it {because}" if because.startswith("is ") else because
-        hint = "Look at the indentation and the `-` there." if "not YAML" in because else ""
-        raise LaunchFileError(path.name, where, because, hint) from None
-    if not isinstance(content, dict) or list(content) != ["launch"]:
-        xml = "XML is not covered here; in YAML " if str(content).startswith("<") else ""
-        because = f"{xml}a launch file has one key at the top, `launch:`, with a list below it."
-        raise place.error(because, "Begin with `launch:` and `- node:`.")
-    body = content["launch"]
+    body = opening.content(path, place)
     if isinstance(body, dict) and set(body) <= {"children", "deprecated"} and "children" in body:
         if not isinstance(body.get("deprecated", ""), str):
             raise place.at("deprecated").error("a text is expected here.")
@@ -136,7 +119,12 @@ def _keys(body: Any, schema: dict[str, Key], place: Place, ignored: bool = False
         known = ", ".join(f"`{key}`" for key in sorted(schema))
         what = "is not covered here" if unknown[0] in _KEYS_ELSEWHERE else "is unknown or not covered here"
         raise place.error(f"the key `{unknown[0]}` {what}.", f"Known here: {known}.")
-    return {key: schema[key].read(value, place.at(key)) for key, value in body.items() if key in schema}
+    written = body.written if isinstance(body, student_yaml.Written) else {}
+    return {
+        key: schema[key].read(value, place.at(key, written.get(key, "")))
+        for key, value in body.items()
+        if key in schema
+    }
 
 
 def refusing(place: Place, what: Callable[[], Any]) -> Any:
@@ -151,7 +139,7 @@ def _string(value: Any, place: Place) -> str:
     if isinstance(value, str):
         return value
     if isinstance(value, (bool, int, float)):
-        written = str(value).lower() if isinstance(value, bool) else str(value)
+        written = place.written or str(value)
         key = place.where.rsplit(" > ", 1)[-1]
         what = "a truth value" if isinstance(value, bool) else "a number"
         raise place.error(

@@ -21,8 +21,14 @@ _VALUES = {
 """How many values each substitution takes."""
 _NOT_COVERED = {
     "all", "anon", "any", "command", "exec-in-pkg", "file-content", "filename", "find-exec", "find-pkg-prefix",
-    "launch_log_dir", "log_dir", "optenv", "param",
+    "launch_log_dir", "log_dir", "param",
 }  # fmt: skip
+_IN_ROS_2 = {
+    "arg": "In ROS 2 it is `$(var NAME)`.",
+    "optenv": "In ROS 2 it is `$(env NAME DEFAULT)`.",
+    "find": "In ROS 2 it is `$(find-pkg-share PACKAGE)`.",
+}
+"""What ROS 1 had, and what it is now."""
 _OF_THE_MACHINE = {
     "COLUMNS", "DISPLAY", "EDITOR", "HOME", "HOST", "HOSTNAME", "LANG", "LANGUAGE", "LINES", "LOGNAME", "MAIL",
     "OLDPWD", "PATH", "PWD", "SHELL", "SHLVL", "SUDO_USER", "TERM", "TMPDIR", "TZ", "USER", "USERNAME", "VIRTUAL_ENV",
@@ -61,7 +67,7 @@ def check(text: Text) -> None:
         if call.name in _NOT_COVERED:
             raise ValueRefused(f"the substitution `{call.written}` is not covered here.", f"Covered are {covered}.")
         if call.name not in _VALUES:
-            hint = "In ROS 2 it is `$(var NAME)`." if call.name == "arg" else f"Covered here are {covered}."
+            hint = _IN_ROS_2.get(call.name, f"Covered here are {covered}.")
             raise ValueRefused(f"there is no substitution `{call.name}`.", hint)
         least, most = _VALUES[call.name]
         if not least <= len(call.values) <= most:

@@ -17,8 +17,9 @@ from autograder.graph.names import full_name
 from autograder.ros2 import messages
 from autograder.ros2.failure import Failure
 from autograder.ros2.interfaces import interface
-from autograder.ros2.options import joins
+from autograder.ros2.options import joins, values, yaml_text
 from autograder.ros2.session import Session
+from autograder.ros2.topic_listen import full_topic
 
 _STATUS = {
     GoalStatus.STATUS_SUCCEEDED: "SUCCEEDED",
@@ -46,7 +47,7 @@ def add_verbs(verbs: Any) -> None:
     parser = joins(verbs.add_parser("send_goal", help="Send an action goal"))
     parser.add_argument("action_name", help="Name of the ROS action (e.g. '/fibonacci')")
     parser.add_argument("action_type", help="Type of the ROS action (e.g. 'test_msgs/action/Fibonacci')")
-    parser.add_argument("goal", nargs="?", default="{}", help="Goal in YAML format (e.g. '{order: 10}')")
+    values(parser, "goal", "Goal in YAML format (e.g. '{order: 10}')")
     parser.add_argument("-f", "--feedback", action="store_true", help="Echo feedback messages for the goal")
     parser.set_defaults(run=_send_goal)
 
@@ -61,6 +62,7 @@ def _list(session: Session, options: Any) -> None:
 
 
 def _info(session: Session, options: Any) -> None:
+    wanted = full_topic(session, options.action_name)
     print(f"Action: {options.action_name}")
     for heading, ask in (
         ("clients", get_action_client_names_and_types_by_node),
@@ -70,7 +72,7 @@ def _info(session: Session, options: Any) -> None:
             (full_name(space, name), types)
             for space, name in session.nodes(hidden=True)
             for action, types in ask(session.graph, name, space)
-            if action == options.action_name
+            if action == wanted
         ]
         print(f"Action {heading}: {len(found)}")
         for node, types in () if options.count else found:
@@ -91,7 +93,7 @@ def _send_goal(session: Session, options: Any) -> None:
         raise Failure("The passed action type is invalid") from None
     goal = action_type.Goal()
     try:
-        messages.fill(goal, yaml.safe_load(options.goal))
+        messages.fill(goal, yaml.safe_load(yaml_text(options, "goal")))
     except Exception as error:
         raise Failure(f"Failed to populate message fields: {error!r}") from None
     client = ActionClient(session.node, action_type, options.action_name)

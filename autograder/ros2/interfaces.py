@@ -16,12 +16,14 @@ def interface(name: str, kind: str = "") -> Any:
 
     Args:
         name: of the interface.
-        kind: `msg`, `srv` or `action`, if it must be one.
+        kind: `msg`, `srv` or `action`, if it must be one; the name may leave it out then, as `std_msgs/String`.
 
     Raises:
         LookupError: it is not installed, is of another kind, or has no such name.
     """
     parts = name.split("/")
+    if kind and len(parts) == 2:
+        parts.insert(1, kind)
     if len(parts) != 3 or not all(parts) or parts[1] not in ((kind,) if kind else KINDS):
         raise LookupError(name)
     try:

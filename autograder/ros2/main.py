@@ -32,8 +32,14 @@ ELSEWHERE = {
     "launch": 'A launch file is started in a notebook by launch_file("NAME.launch.yaml", package=…), and after '
     "`autograder package` by an installed Jazzy.",
     "doctor": "What this machine offers says `autograder doctor`.",
+    "wtf": "What this machine offers says `autograder doctor`.",
     "daemon": "There is no daemon: each command joins the graph itself.",
     "bag": "Recording needs rosbag2, which only an installed Jazzy has.",
+    "component": "Components are C++ libraries, which only an installed Jazzy loads.",
+    "multicast": "Whether multicast works on this machine is nothing that the course relies on.",
+    "security": "Keys and certificates need SROS 2, which only an installed Jazzy has.",
+    "extension_points": "The kit's commands are fixed: nothing extends them.",
+    "extensions": "The kit's commands are fixed: nothing extends them.",
     "pkg": "Packages are made by `autograder package`; their interfaces are shown by `ros2 interface packages`.",
 }
 """What the real tool has besides, and what there is here."""

@@ -4,17 +4,21 @@ from __future__ import annotations
 
 import array
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy
 import yaml
+from rclpy.serialization import serialize_message
 from rosidl_parser.definition import (
     AbstractNestedType,
     AbstractString,
+    AbstractWString,
     Array,
     BasicType,
     BoundedSequence,
+    BoundedString,
+    BoundedWString,
     NamedType,
     NamespacedType,
 )
@@ -37,10 +41,17 @@ class Shape:
 
 
 class _Dumper(yaml.SafeDumper):
-    """YAML's own, which repeats what occurs twice and names nothing."""
+    """YAML's own, which repeats what occurs twice and names nothing. The flow style is that of lists alone."""
 
     def ignore_aliases(self, data: object) -> bool:
         return True
+
+    def represent_message(self, fields: dict[str, Any]) -> yaml.MappingNode:
+        pairs = [(self.represent_data(name), self.represent_data(value)) for name, value in fields.items()]
+        return yaml.MappingNode("tag:yaml.org,2002:map", pairs)
+
+
+_Dumper.add_representer(dict, _Dumper.represent_message)
 
 
 def is_message(value: object) -> bool:
@@ -52,22 +63,32 @@ def to_yaml(message: Any, shape: Shape | None = None, flow: bool = False) -> str
     """A message as a YAML mapping, its fields in the order of their definition."""
     plain = _plain(message, None, shape or Shape())
     # Python's float knows inf and nan, and so does YAML.
-    return yaml.dump(plain, Dumper=_Dumper, sort_keys=False, width=sys.maxsize, default_flow_style=flow)
+    return yaml.dump(plain, Dumper=_Dumper, width=sys.maxsize, default_flow_style=flow, allow_unicode=True)
 
 
-def to_csv(value: Any, shape: Shape) -> str:
-    """All plain values of a message, separated by commas."""
+def to_csv(value: Any, shape: Shape, kind: Any = None) -> str:
+    """All plain values of a message, separated by commas. What is empty at the beginning has none behind it."""
     if is_message(value):
-        return ",".join(to_csv(getattr(value, name), shape) for name in value.get_fields_and_field_types())
+        kinds = dict(zip(value.get_fields_and_field_types(), value.SLOT_TYPES, strict=False))
+        return _joined(to_csv(getattr(value, name), shape, of) for name, of in kinds.items())
     if isinstance(value, _SEQUENCES):
-        if not shape.arrays:
-            return "..."
+        if not shape.arrays and kind is not None:
+            return _what_it_is(kind, len(value))
         written = [to_csv(one, shape) for one in value[: shape.longest]]
-        return ",".join(written + ["..."] * (shape.longest is not None and len(value) > shape.longest))
+        return _joined(written + ["..."] * (shape.longest is not None and len(value) > shape.longest))
+    if isinstance(value, str) and not shape.strings:
+        return f"<string length: <{len(value)}>>"
     if isinstance(value, (bytes, str)) and shape.longest is not None and len(value) > shape.longest:
         cut = value[: shape.longest]
         value = cut + b"..." if isinstance(cut, bytes) else cut + "..."
     return str(value)
+
+
+def _joined(texts: Iterable[str]) -> str:
+    line = ""
+    for text in texts:
+        line += f",{text}" if line else text
+    return line
 
 
 def _plain(value: Any, kind: Any, shape: Shape) -> Any:
@@ -97,6 +118,8 @@ def _what_it_is(kind: AbstractNestedType, length: int) -> str:
         name = element.typename
     elif isinstance(element, AbstractString):
         name = "string"
+    elif isinstance(element, AbstractWString):
+        name = "wstring"
     elif isinstance(element, NamespacedType):
         name = "/".join(element.namespaced_name())
     else:
@@ -104,7 +127,7 @@ def _what_it_is(kind: AbstractNestedType, length: int) -> str:
     if isinstance(kind, Array):
         return f"<array type: {name}[{kind.size}]>"
     if isinstance(kind, BoundedSequence):
-        return f"<bounded sequence type: {name}[{kind.maximum_size}], length: {length}>"
+        return f"<sequence type: {name}[{kind.maximum_size}], length: {length}>"
     return f"<sequence type: {name}, length: {length}>"
 
 
@@ -119,6 +142,14 @@ def fill(message: Any, values: Any, stamps: list[Any] | None = None) -> None:
     Raises:
         Exception: of the kind that Python gives, where a field is missing or a value does not fit.
     """
+    _fill(message, values, stamps)
+    try:
+        serialize_message(message)  # what a field takes is not asked before
+    except Exception:
+        raise ValueError("a value is out of the range of its field, or of another type") from None
+
+
+def _fill(message: Any, values: Any, stamps: list[Any] | None) -> None:
     if not isinstance(values, Mapping):
         raise TypeError(f"Value '{values}' is expected to be a dictionary but is a {type(values).__name__}")
     kinds = dict(zip(message.get_fields_and_field_types(), message.SLOT_TYPES, strict=False))
@@ -127,12 +158,22 @@ def fill(message: Any, values: Any, stamps: list[Any] | None = None) -> None:
         if stamps is not None and _is_stamp(now, given):
             stamps.append(now.stamp if given == "auto" else now)
             continue
-        setattr(message, name, _made(now, given, kinds[name], stamps))
+        made = _made(now, given, kinds[name], stamps)
+        _check_length(name, made, kinds[name])
+        setattr(message, name, made)
 
 
 def _is_stamp(field: Any, given: Any) -> bool:
     name = type(field).__name__
     return is_message(field) and (name, given) in (("Header", "auto"), ("Time", "now"))
+
+
+def _check_length(name: str, value: Any, kind: Any) -> None:
+    most = kind.maximum_size if isinstance(kind, (BoundedSequence, BoundedString, BoundedWString)) else None
+    if most is not None and len(value) > most:
+        raise ValueError(f"'{name}' takes {most} elements at most, and not {len(value)}")
+    if isinstance(kind, Array) and len(value) != kind.size:
+        raise ValueError(f"'{name}' takes exactly {kind.size} elements, and not {len(value)}")
 
 
 def _made(now: Any, given: Any, kind: Any, stamps: list[Any] | None) -> Any:
@@ -142,7 +183,7 @@ def _made(now: Any, given: Any, kind: Any, stamps: list[Any] | None) -> Any:
     if isinstance(now, numpy.ndarray):
         return numpy.array(given, dtype=now.dtype)
     if is_message(now):
-        fill(now, given, stamps)
+        _fill(now, given, stamps)
         return now
     if isinstance(kind, AbstractNestedType) and isinstance(kind.value_type, NamespacedType):
         element = kind.value_type
@@ -150,6 +191,6 @@ def _made(now: Any, given: Any, kind: Any, stamps: list[Any] | None) -> Any:
         for one in given:
             module = __import__(".".join(element.namespaces), fromlist=[element.name])
             made.append(getattr(module, element.name)())
-            fill(made[-1], one, stamps)
+            _fill(made[-1], one, stamps)
         return made
     return given if type(given) is type(now) else type(now)(given)

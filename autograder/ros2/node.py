@@ -19,14 +19,16 @@ def absolute(name: str) -> str:
     return name if name.startswith("/") else f"/{name}"
 
 
-def find_node(session: Session, name: str, hidden: bool, otherwise: str) -> tuple[str, str]:
-    """Namespace and name of a node.
+def find_node(
+    session: Session, name: str, hidden: bool, otherwise: str, within: float | None = None
+) -> tuple[str, str]:
+    """Namespace and name of a node with this full name; `within` are seconds in which it may yet appear.
 
     Raises:
         Failure: there is none; says `otherwise`.
     """
     found = session.look_for(
-        lambda: next((one for one in session.nodes(hidden) if full_name(*one) == absolute(name)), None)
+        lambda: next((one for one in session.nodes(hidden) if full_name(*one) == name), None), within
     )
     if found is None:
         raise Failure(otherwise)
@@ -61,13 +63,14 @@ def _list(session: Session, options: Any) -> None:
 
 
 def _info(session: Session, options: Any) -> None:
-    wanted = absolute(options.node_name)
-    space, name = find_node(session, wanted, True, f"Unable to find node '{options.node_name}'")
-    count = session.node_names(True).count(wanted)
+    wanted, hidden = options.node_name, options.include_hidden
+    space, name = find_node(session, wanted, hidden, f"Unable to find node '{wanted}'")
+    count = session.node_names(hidden).count(wanted)
     if count > 1:
         print(
-            f"There are {count} nodes in the graph with the exact name '{wanted}'. "
-            "You are seeing information about only one of them."
+            f'There are {count} nodes in the graph with the exact name "{wanted}". '
+            "You are seeing information about only one of them.",
+            file=sys.stderr,
         )
     print(wanted)
     graph = session.graph

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from typing import Any
 
 from rclpy.duration import Duration
@@ -59,6 +60,18 @@ def above_zero(text: str) -> float:
     if (number := float(text)) <= 0:
         raise ValueError(text)
     return number
+
+
+def values(parser: Parser, name: str, text: str) -> None:
+    """Add a YAML mapping, as an argument or on standard input; `yaml_text` gives it."""
+    given = parser.add_mutually_exclusive_group()
+    given.add_argument(name, nargs="?", default="{}", help=text)
+    given.add_argument("--stdin", action="store_true", help="Read values from standard input")
+
+
+def yaml_text(options: Any, name: str) -> str:
+    """The text of what `values` added."""
+    return sys.stdin.read() if options.stdin else str(getattr(options, name))
 
 
 def qos(parser: Parser, default: str) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import argparse
+import re
 import sys
 from pathlib import Path
 from typing import Any
@@ -40,6 +42,7 @@ def add_verbs(verbs: Any) -> None:
     parser.add_argument("node_name", nargs="?", help="Name of the ROS node")
     parser.add_argument("--param-prefixes", nargs="+", default=[], help="Only list parameters with these prefixes")
     parser.add_argument("--param-type", action="store_true", help="Print parameter types with parameter names")
+    parser.add_argument("--filter", metavar="REGEX", type=_regex, help="Only list parameters that begin like this")
     parser = _verb(verbs, "get", "Get parameter", _get)
     parser.add_argument("parameter_name", help="Name of the parameter")
     parser.add_argument("--hide-type", action="store_true", help="Hide the type information")
@@ -61,13 +64,21 @@ def _verb(verbs: Any, name: str, text: str, run: Any, node: bool = True) -> Any:
     if node:
         parser.add_argument("node_name", help="Name of the ROS node")
     parser.add_argument("--include-hidden-nodes", action="store_true", help="Consider hidden nodes as well")
+    parser.add_argument("--timeout", metavar="N", type=int, default=1, help="Wait N seconds for the node (default: 1)")
     parser.set_defaults(run=run)
     return parser
 
 
+def _regex(text: str) -> re.Pattern[str]:
+    try:
+        return re.compile(text)
+    except re.error as error:
+        raise argparse.ArgumentTypeError(f"'{text}' is no regular expression: {error}") from None
+
+
 def _found(session: Session, options: Any) -> str:
     name = absolute(options.node_name)
-    find_node(session, name, options.include_hidden_nodes, "Node not found")
+    find_node(session, name, options.include_hidden_nodes, "Node not found", options.timeout)
     return name
 
 
@@ -100,6 +111,7 @@ def _list(session: Session, options: Any) -> None:
             print(f"{node}:")
         try:
             names = _names(session, node, options.param_prefixes)
+            names = [name for name in names if options.filter is None or options.filter.match(name)]
         except Failure as failure:  # the other nodes may answer
             print(failure, file=sys.stderr)
             continue
@@ -118,8 +130,11 @@ def _plain(value: ParameterValue) -> Any:
 
 def _get(session: Session, options: Any) -> None:
     values = _values(session, _found(session, options), [options.parameter_name])
-    if not values or values[0].type == ParameterType.PARAMETER_NOT_SET:
+    if not values:
         raise Failure("Parameter not set")
+    if values[0].type == ParameterType.PARAMETER_NOT_SET:  # it is declared, and has no value yet
+        print(None if options.hide_type else "Parameter not set.")
+        return
     kind = _KINDS[values[0].type].capitalize()
     label = f"{kind.removesuffix(' array')} values are:" if kind.endswith(" array") else f"{kind} value is:"
     print(*([] if options.hide_type else [label]), _plain(values[0]))
@@ -135,19 +150,19 @@ def _set_one(session: Session, node: str, name: str, value: ParameterValue) -> A
 
 def _say(result: Any, what: str) -> None:
     reason = f": {result.reason}" if result.reason else ""
-    print(f"{what} {'successful' if result.successful else 'failed'}{reason}")
+    print(f"{what}{reason}", file=sys.stdout if result.successful else sys.stderr)
 
 
 def _set(session: Session, options: Any) -> None:
     value = get_parameter_value(options.value)
     result = _set_one(session, _found(session, options), options.parameter_name, value)
-    _say(result, "Set parameter" if result.successful else "Setting parameter")
+    _say(result, "Set parameter successful" if result.successful else "Setting parameter failed")
 
 
 def _delete(session: Session, options: Any) -> None:
     node, name = _found(session, options), options.parameter_name
     result = _set_one(session, node, name, ParameterValue(type=ParameterType.PARAMETER_NOT_SET))
-    _say(result, "Deleted parameter" if result.successful else "Deleting parameter")
+    _say(result, "Deleted parameter successfully" if result.successful else "Deleting parameter failed")
 
 
 def _describe(session: Session, options: Any) -> None:
@@ -191,6 +206,4 @@ def _load(session: Session, options: Any) -> None:
         raise Failure(str(error)) from None
     for name, parameter in found.items():
         result = _set_one(session, node, name, parameter.value)
-        reason = f": {result.reason}" if result.reason else ""
-        end = "successful" if result.successful else "failed"
-        print(f"Set parameter {name} {end}{reason}", file=sys.stdout if result.successful else sys.stderr)
+        _say(result, f"Set parameter {name} {'successful' if result.successful else 'failed'}")

@@ -9,7 +9,7 @@ import yaml
 from autograder.ros2 import messages
 from autograder.ros2.failure import Failure
 from autograder.ros2.interfaces import interface
-from autograder.ros2.options import above_zero, joins
+from autograder.ros2.options import above_zero, joins, values, yaml_text
 from autograder.ros2.session import Session
 
 
@@ -35,7 +35,7 @@ def add_verbs(verbs: Any) -> None:
     parser = joins(verbs.add_parser("call", help="Call a service"))
     parser.add_argument("service_name", help="Name of the ROS service to call to (e.g. '/add_two_ints')")
     parser.add_argument("service_type", help="Type of the ROS service (e.g. 'std_srvs/srv/Empty')")
-    parser.add_argument("values", nargs="?", default="{}", help="Values in YAML format (e.g. '{a: 1, b: 2}')")
+    values(parser, "values", "Values in YAML format (e.g. '{a: 1, b: 2}')")
     parser.add_argument("-r", "--rate", metavar="N", type=above_zero, help="Repeat the call at a specific rate in Hz")
     parser.set_defaults(run=_call)
 
@@ -87,7 +87,7 @@ def _call(session: Session, options: Any) -> None:
         raise Failure("The passed service type is invalid") from None
     request = service_type.Request()
     try:
-        messages.fill(request, yaml.safe_load(options.values))
+        messages.fill(request, yaml.safe_load(yaml_text(options, "values")))
     except Exception as error:
         raise Failure(f"Failed to populate field: {error}") from None
     _ = session.graph  # so that "waiting" is said where the server is missing, and not where nobody has looked yet

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import contextlib
 import os
-import re
 import signal
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -23,23 +23,25 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
-from autograder.graph.names import UNKNOWN_NODE, full_name
-from autograder.graph.observer import OBSERVER_NAME, Observer
+from autograder.core import interrupts
+from autograder.graph.names import full_name
+from autograder.graph.observer import Observer, leave_graph
+from autograder.ros2.discovery import PREFIX, is_observer, look, participants_here
 from autograder.ros2.failure import TimeIsUp
 
-PREFIX = "_ros2cli"
-"""How the real tool's nodes begin: the underscore hides them."""
-
-SPIN_TIME = 0.5
-"""Seconds for which a verb listens at least before it believes what it sees, as the real tool without its daemon."""
-_SETTLED_WITHIN = 3.3
-"""Seconds after which the graph is taken as it is: the middleware repeats a lost packet of discovery after 3 s."""
-_STILL = 0.1
-"""Seconds between two looks that have to be alike."""
-_POLL = 0.02
+_POLL = 0.05
+"""Seconds between two looks at the graph. What follows counts looks: on a busy machine one takes longer, and so does
+what is waited for."""
+_LISTENED = 10
+"""Looks before what is seen is believed: half a second, as long as the real tool listens without its daemon."""
+_STILL = 4
+"""Looks that have to be alike where nothing is known to be missing."""
+_REPEATED = 66
+"""Looks that have to be alike otherwise: the middleware repeats a lost packet of discovery after 3 seconds."""
+_MOST = 300
+"""Looks after which the graph is taken as it is, and this is said."""
 
 _Found = TypeVar("_Found")
-_OWN = re.compile(rf"{OBSERVER_NAME}_[0-9a-f]{{6}}")
 
 
 class Session:
@@ -59,67 +61,83 @@ class Session:
         self.options: Any = None
         """The verb's words, parsed."""
         self.name = f"{PREFIX}_{os.getpid()}"
-        self._joined: tuple[Context, SingleThreadedExecutor] | None = None
-        self._settled_at = 0.0
+        self._joined: SingleThreadedExecutor | None = None
+        self._leaving = contextlib.ExitStack()
+        self._looks_left = 0
 
     @cached_property
     def node(self) -> Node:
         """The node that the verb speaks through."""
         context = Context()
-        rclpy.init(context=context, domain_id=self._domain_id, args=[])
         sim_time = [Parameter("use_sim_time", value=True)] if getattr(self.options, "use_sim_time", False) else []
-        node = rclpy.create_node(
-            self.name,
-            context=context,
-            start_parameter_services=False,
-            use_global_arguments=False,
-            parameter_overrides=sim_time,
-        )
-        executor = SingleThreadedExecutor(context=context)
-        executor.add_node(node)
-        self._joined = (context, executor)
+        with contextlib.ExitStack() as leaving:  # nothing stays of what is interrupted
+            rclpy.init(context=context, domain_id=self._domain_id, args=[])
+            leaving.callback(context.try_shutdown)
+            node = rclpy.create_node(
+                self.name,
+                context=context,
+                start_parameter_services=False,
+                use_global_arguments=False,
+                parameter_overrides=sim_time,
+            )
+            leaving.callback(leave_graph, node)
+            executor = SingleThreadedExecutor(context=context)
+            executor.add_node(node)
+            self._joined = executor
+            self._leaving = leaving.pop_all()
         return node
 
     @cached_property
     def graph(self) -> Node:
         """The same node, once the graph that it sees has settled."""
         node = self.node
-        self._settled_at = time.monotonic() + _SETTLED_WITHIN
         spin_time = getattr(self.options, "spin_time", None)
-        if self._observer is not None and spin_time is None:
-            watching = self._observer.node
-            self._wait_until(lambda: _seen(node) == _seen(watching), _SETTLED_WITHIN)
-            self._settled_at = 0.0
-            return node
-        self._wait_until(lambda: False, SPIN_TIME if spin_time is None else spin_time)
         if spin_time is not None:
-            self._settled_at = 0.0
-            return node
-        before: list[Any] = [None, 0.0]
-
-        def settled() -> bool:
-            now, looked = time.monotonic(), before[1]
-            if now - looked < _STILL:
-                return False
-            seen = _seen(node)
-            still, before[:] = seen == before[0], [seen, now]
-            return still and any(seen) and _complete(node)
-
-        self._wait_until(settled, _SETTLED_WITHIN - SPIN_TIME)
+            deadline = time.monotonic() + spin_time
+            self._look_until(lambda: time.monotonic() >= deadline, sys.maxsize)
+        elif self._observer is not None:
+            watching = self._observer.node
+            self._look_until(lambda: look(node) == look(watching), _REPEATED)
+        else:
+            self._listen(node)
         return node
 
-    def look_for(self, find: Callable[[], _Found | None]) -> _Found | None:
-        """What `find` gives: asked once more as long as something may yet appear on the graph."""
+    def _listen(self, node: Node) -> None:
+        """Look at the graph until nothing more is to come."""
+        domain = node.context.get_domain_id()
+        before, looks, still, silent = None, 0, 0, False
+
+        def settled() -> bool:
+            nonlocal before, looks, still, silent
+            seen = look(node)
+            looks += 1
+            still = still + 1 if seen == before else 0
+            before = seen
+            if looks < _LISTENED or still < _STILL:
+                return False
+            silent = seen.participants < participants_here(domain)
+            return still >= _REPEATED * (1 + silent) or (not silent and bool(seen) and seen.is_complete())
+
+        if not self._look_until(settled, _MOST):
+            print("WARNING: the graph keeps changing: what follows may not be all of it.", file=sys.stderr)
+        elif silent:
+            print("WARNING: a program here does not answer: what follows may not be all there is.", file=sys.stderr)
+        self._looks_left = max(0, _REPEATED - looks)
+
+    def look_for(self, find: Callable[[], _Found | None], within: float | None = None) -> _Found | None:
+        """What `find` gives: asked again as long as something may yet appear on the graph, or for so many seconds."""
         _ = self.graph
-        while (found := find()) is None and (now := time.monotonic()) < self._settled_at:
-            self._go_on(now)
+        deadline = time.monotonic() + (within or 0.0)
+        while (found := find()) is None and (self._looks_left > 0 or time.monotonic() < deadline):
+            self._looks_left -= 1
+            self._go_on(time.monotonic())
             time.sleep(_POLL)
         return found
 
     def nodes(self, hidden: bool = False) -> list[tuple[str, str]]:
         """Namespace and name of every node but the kit's own observers; sorted by full name."""
         found = [(space, name) for name, space in self.graph.get_node_names_and_namespaces()]
-        shown = [one for one in found if not _OWN.fullmatch(one[1]) and (hidden or not one[1].startswith("_"))]
+        shown = [one for one in found if not is_observer(one[1]) and (hidden or not one[1].startswith("_"))]
         return sorted(shown, key=lambda one: full_name(*one))
 
     def node_names(self, hidden: bool = False) -> list[str]:
@@ -136,11 +154,11 @@ class Session:
 
     def publishers(self, topic: str) -> list[TopicEndpointInfo]:
         """Publishers of a topic, without those of the kit's observers."""
-        return [end for end in self.graph.get_publishers_info_by_topic(topic) if not _OWN.fullmatch(end.node_name)]
+        return [end for end in self.graph.get_publishers_info_by_topic(topic) if not is_observer(end.node_name)]
 
     def subscriptions(self, topic: str) -> list[TopicEndpointInfo]:
         """Subscriptions to a topic, without those of the kit's observers."""
-        return [end for end in self.graph.get_subscriptions_info_by_topic(topic) if not _OWN.fullmatch(end.node_name)]
+        return [end for end in self.graph.get_subscriptions_info_by_topic(topic) if not is_observer(end.node_name)]
 
     def services(self, hidden: bool = False) -> list[tuple[str, list[str]]]:
         """Services with their types; sorted."""
@@ -163,7 +181,7 @@ class Session:
             self._go_on(now)
             left = [at - now for at in (deadline, self._ends) if at is not None]
             with _whole_round():
-                self._joined[1].spin_once(timeout_sec=max(0.0, min([0.1, *left])))
+                self._joined.spin_once(timeout_sec=max(0.0, min([0.1, *left])))
         return True
 
     def answer(self, future: Any, within: float | None = None) -> Any:
@@ -175,24 +193,26 @@ class Session:
         if self._ends is not None:
             self._ends = time.monotonic() + seconds
 
-    def _wait_until(self, done: Callable[[], object], within: float) -> None:
-        deadline = time.monotonic() + within
-        while not done() and (now := time.monotonic()) < deadline:
-            self._go_on(now)
-            time.sleep(min(_POLL, deadline - now))
+    def _look_until(self, done: Callable[[], bool], looks: int) -> bool:
+        """Let time go by until `done()`, which looks at the graph; whether it came within so many looks."""
+        for _ in range(looks):
+            if done():
+                return True
+            self._go_on(time.monotonic())
+            time.sleep(_POLL)
+        return False
 
     def _go_on(self, now: float) -> None:
+        interrupts.here()
         if self._ends is not None and now >= self._ends:
             raise TimeIsUp
 
     def close(self) -> None:
         """Leave the graph. Can be called twice."""
-        if self._joined is not None:
-            context, executor = self._joined
-            self._joined = None
-            executor.shutdown(timeout_sec=1.0)
-            self.node.destroy_node()
-            context.try_shutdown()
+        with self._leaving:
+            if self._joined is not None:
+                self._joined.shutdown(timeout_sec=1.0)
+                self._joined = None
 
 
 @contextlib.contextmanager
@@ -203,7 +223,8 @@ def _whole_round() -> Iterator[None]:
     asks for one thing more, as for a goal to be cancelled, would wait in vain.
     """
     # Signals come to the main thread only, and to nobody whom a shell has put into the background.
-    if threading.current_thread() is not threading.main_thread() or signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    elsewhere = threading.current_thread() is not threading.main_thread()
+    if elsewhere or interrupts.held() or signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         yield
         return
     came: list[int] = []
@@ -219,29 +240,3 @@ def _whole_round() -> Iterator[None]:
 def is_hidden(name: str) -> bool:
     """Whether a part of a topic's or service's name begins with an underscore."""
     return any(part.startswith("_") for part in name.split("/"))
-
-
-def _seen(node: Node) -> Any:
-    """All that a node sees of the graph, but what the kit and the verb itself brought."""
-
-    def foreign(name: str) -> bool:
-        return not (_OWN.fullmatch(name) or name.startswith(PREFIX))
-
-    ends: set[bytes] = set()
-    for topic, _ in node.get_topic_names_and_types():
-        for end in [*node.get_publishers_info_by_topic(topic), *node.get_subscriptions_info_by_topic(topic)]:
-            if foreign(end.node_name):
-                ends.add(bytes(end.endpoint_gid))
-    nodes = sorted(one for one in node.get_node_names_and_namespaces() if foreign(one[0]))
-    services = sorted(name for name, _ in node.get_service_names_and_types() if not name.startswith(f"/{PREFIX}"))
-    return nodes, ends, services
-
-
-def _complete(node: Node) -> bool:
-    """Whether every endpoint's node and every node's endpoints are known; a node publishes its parameters' events."""
-    for topic, _ in node.get_topic_names_and_types():
-        ends = [*node.get_publishers_info_by_topic(topic), *node.get_subscriptions_info_by_topic(topic)]
-        if any(end.node_name == UNKNOWN_NODE for end in ends):
-            return False
-    writers = {(end.node_name, end.node_namespace) for end in node.get_publishers_info_by_topic("/parameter_events")}
-    return all(one in writers for one in node.get_node_names_and_namespaces())

@@ -139,6 +139,9 @@ def _echo(session: Session, options: Any) -> None:
         except LookupError:
             raise Failure(f"The message type '{options.message_type}' is invalid") from None
     passes = wanted_messages(options.expression)
+    fields = None if options.field is None else [name for name in options.field.split(".") if name]
+    if fields == []:
+        raise Failure(f"Invalid field value '{options.field}'")
     wanted = 1 if options.once else options.count
     printed = 0
 
@@ -146,10 +149,14 @@ def _echo(session: Session, options: Any) -> None:
         nonlocal printed
         if wanted is not None and printed >= wanted:
             return
-        if passes(message):
-            if options.include_message_info:
-                print(yaml.safe_dump(info), end="---------\n")
-            _print(message, options)
+        value = message
+        for name in fields or ():
+            try:
+                value = getattr(value, name)
+            except AttributeError as error:
+                raise Failure(f"Invalid field '{'.'.join(fields or ())}': {error}") from None
+        if passes(value):
+            _print(value, info if options.include_message_info else None, options)
             printed += 1
 
     lost = None if options.no_lost_messages else _lost
@@ -171,22 +178,19 @@ def _lost(status: Any) -> None:
     )
 
 
-def _print(message: Any, options: Any) -> None:
-    if options.raw:
-        print(message, end="\n---\n")
-        return
-    shape = messages.Shape(
-        None if options.full_length else options.truncate_length, not options.no_arr, not options.no_str
-    )
-    value = message
-    for name in options.field.split(".") if options.field else ():
-        try:
-            value = getattr(value, name)
-        except AttributeError as error:
-            raise Failure(f"Invalid field '{options.field}': {error}") from None
-    if options.csv:
-        print(messages.to_csv(value, shape), flush=True)
-    elif messages.is_message(value):
-        print(messages.to_yaml(value, shape, options.flow_style), end="---\n", flush=True)
-    else:
+def _print(value: Any, info: dict[str, Any] | None, options: Any) -> None:
+    """Print a message, or what a field of one holds, after what the middleware says of it."""
+    if not messages.is_message(value):
+        if info:
+            print(f"---Got new message, message info:---\n{info}\n---Message data:---")
         print(value, end="\n---\n", flush=True)
+        return
+    longest = None if options.full_length else options.truncate_length
+    shape = messages.Shape(longest, not options.no_arr, not options.no_str)
+    if options.csv:
+        before = [*map(str, info.values())] if info else []
+        print(",".join([*before, messages.to_csv(value, shape)]), flush=True)
+        return
+    if info:
+        print(yaml.safe_dump(info), end="---------\n")
+    print(messages.to_yaml(value, shape, options.flow_style), end="---\n", flush=True)

@@ -11,7 +11,7 @@ from rclpy.qos import QoSProfile
 from autograder.ros2 import messages
 from autograder.ros2.failure import Failure
 from autograder.ros2.interfaces import interface
-from autograder.ros2.options import above_zero, joins, profile, qos, unsigned
+from autograder.ros2.options import above_zero, joins, profile, qos, unsigned, values, yaml_text
 from autograder.ros2.session import Session
 
 _SAY_AGAIN = 1.0
@@ -23,7 +23,7 @@ def add_verbs(verbs: Any) -> None:
     parser = joins(verbs.add_parser("pub", help="Publish a message to a topic"))
     parser.add_argument("topic_name", help="Name of the ROS topic to publish to (e.g. '/chatter')")
     parser.add_argument("message_type", help="Type of the ROS message (e.g. 'std_msgs/msg/String')")
-    parser.add_argument("values", nargs="?", default="{}", help="Values in YAML format (e.g. '{data: Hello World}')")
+    values(parser, "values", "Values in YAML format (e.g. '{data: Hello World}')")
     parser.add_argument("-r", "--rate", metavar="N", type=above_zero, default=1.0, help="Rate in Hz (default: 1)")
     parser.add_argument("-p", "--print", metavar="N", type=int, default=1, help="Only print every N-th message")
     count = parser.add_mutually_exclusive_group()
@@ -44,13 +44,13 @@ def _pub(session: Session, options: Any) -> None:
         message_type = interface(options.message_type, "msg")
     except LookupError:
         raise Failure("The passed message type is invalid") from None
-    values = _dictionary(options.values)
+    given = _dictionary(yaml_text(options, "values"))
     if options.node_name:
         session.name = options.node_name
     message = message_type()
     stamps: list[Any] = []
     try:
-        messages.fill(message, values, stamps)
+        messages.fill(message, given, stamps)
     except Exception as error:
         raise Failure(f"Failed to populate field: {error}") from None
     publisher = session.node.create_publisher(message_type, options.topic_name, profile(options, QoSProfile(depth=10)))

@@ -80,6 +80,9 @@ class RightDemo(Node):
     def __init__(self):
         super().__init__("right_demo", namespace="/vehicle")
         self.create_publisher(String, "status", 10)
+        any_type = ParameterDescriptor(dynamic_typing=True)
+        self.declare_parameter("loose", "", any_type)
+        self.declare_parameter("unset", descriptor=any_type)
         self.create_publisher(String, "~/status", 10)
         self.create_subscription(Bool, "/emergency_stop", lambda message: None, 10)
 
