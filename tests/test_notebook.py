@@ -5,29 +5,27 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import random
 import subprocess
 import sys
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import pytest
 from IPython.core.interactiveshell import InteractiveShell
-from jupyter_client.manager import KernelManager
+from kernels import START, Notebook
 
 import autograder.checks
 from autograder.core import front_end
 from autograder.course.cell_file import parse
 from autograder.course.lab import blank_mark
 from autograder.notebook import hints
-from autograder.notebook.kernel import Kernel
+from autograder.notebook.kernel import NO_VERDICT, Kernel
 from autograder.notebook.program_folder import MANIFEST
 from autograder.notebook.saved_notebook import SavedNotebook
-
-START = 180
-"""Far beyond what a kernel, or a cell, takes on a busy machine, in seconds."""
+from autograder.submission.copies import told_of_copies
 
 TALKER = """%%node talker
 import rclpy
@@ -108,6 +106,16 @@ def test_a_program_has_the_lines_of_its_cell_whatever_the_magic_stands_in(
 def test_a_file_cell_becomes_a_file(shell: InteractiveShell, capsys: pytest.CaptureFixture[str]) -> None:
     assert say(shell, "%%file camera.yaml\na: 1\n", capsys) == "file camera.yaml written (nodes/lab/camera.yaml)"
     assert (folder() / "camera.yaml").read_text() == "a: 1\n"
+
+
+@pytest.mark.parametrize("cell", ["%%file src/car/resource/car", "%%file src/car/resource/car\n"])
+def test_a_file_cell_without_a_line_below_is_an_empty_file_as_at_grading(
+    shell: InteractiveShell, capsys: pytest.CaptureFixture[str], cell: str
+) -> None:
+    graded = parse(cell)
+    assert graded is not None
+    assert f"file {graded.name} written" in say(shell, cell, capsys)
+    assert (folder() / graded.name).read_text() == graded.text == graded.text.strip()
 
 
 @pytest.mark.parametrize(
@@ -291,84 +299,6 @@ def test_without_a_notebook_the_kernel_leaves_nothing_behind(
 # Kernels as a front end drives them.
 
 
-@dataclass
-class Shown:
-    """What a cell showed."""
-
-    text: str = ""
-    """Streams and plain text, in order."""
-    html: str = ""
-    result: str = ""
-    """The plain text of the cell's value, which nbgrader reads."""
-    error: str = ""
-    types: list[str] = field(default_factory=list)
-    seconds: float = 0.0
-    number: int = 0
-    """In the brackets beside the cell."""
-
-
-class Notebook:
-    """A notebook on disk and its kernel, started as a Jupyter server starts one."""
-
-    def __init__(self, place: Path, name: str = "lab", **environment: str) -> None:
-        self.path = place / f"{name}.ipynb"
-        self.save()
-        self._manager = KernelManager(kernel_name="python3")
-        self._manager.start_kernel(
-            cwd=str(place), env={**os.environ, "JPY_SESSION_NAME": str(self.path), **environment}
-        )
-        self._client = self._manager.client()
-        self._client.start_channels()
-        self._client.wait_for_ready(timeout=START)
-
-    def save(self, *cells: tuple[str, str, dict[str, Any]]) -> None:
-        """Save cells: id, source, metadata."""
-        made = [
-            {"cell_type": "code", "id": i, "source": s, "metadata": m, "outputs": [], "execution_count": None}
-            for i, s, m in cells
-        ]
-        self.path.write_text(json.dumps({"cells": made, "metadata": {}, "nbformat": 4, "nbformat_minor": 5}))
-
-    def run(self, source: str, cell_id: str = "") -> Shown:
-        began = time.monotonic()
-        content = {"code": source, "silent": False, "store_history": True, "user_expressions": {}}
-        request = self._client.session.msg("execute_request", content | {"allow_stdin": False, "stop_on_error": False})
-        request["metadata"] = {"cellId": cell_id} if cell_id else {}
-        self._client.shell_channel.send(request)
-        shown = Shown()
-        while True:
-            message = self._client.get_iopub_msg(timeout=START)
-            if message["parent_header"].get("msg_id") != request["header"]["msg_id"]:
-                continue
-            content, kind = message["content"], message["msg_type"]
-            if kind == "status" and content["execution_state"] == "idle":
-                shown.seconds = time.monotonic() - began
-                return shown
-            shown.types.append(kind)
-            if kind == "execute_input":
-                shown.number = content["execution_count"]
-            if kind == "stream":
-                shown.text += content["text"]
-            elif kind == "error":
-                shown.error = "\n".join(content["traceback"])
-            elif "data" in content:
-                shown.text += content["data"].get("text/plain", "") + "\n"
-                shown.html += content["data"].get("text/html", "")
-                if kind == "execute_result":
-                    shown.result = content["data"]["text/plain"]
-
-    def restart(self) -> None:
-        self._client.stop_channels()
-        self._manager.restart_kernel(now=True)
-        self._client = self._manager.client()
-        self._client.start_channels()
-        self._client.wait_for_ready(timeout=START)
-
-    def close(self) -> None:
-        self._client.stop_channels()
-        self._manager.shutdown_kernel()
-
-
 @pytest.fixture(scope="module")
 def notebook(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Notebook]:
     """A notebook whose set-up cell and talker have been run, and saved."""
@@ -442,10 +372,34 @@ def test_a_cell_that_is_not_saved_yet_is_marked(notebook: Notebook) -> None:
 
 
 def test_a_program_from_a_cell_that_grading_ignores_is_named(notebook: Notebook) -> None:
-    notebook.save(answer("%%node talker\n# YOUR CODE HERE"))
+    notebook.save(answer("%%node talker\n# YOUR CODE HERE"), ("a-new-cell", "%%node talker\n", {}))
     notebook.run(TALKER, "a-new-cell")
     shown = notebook.run(CHECK).text
     assert "comes from a cell of your own" in shown and "Grading ignores that cell" in shown
+
+
+def test_copies_of_an_answer_cell_are_told_as_grading_counts_them(notebook: Notebook) -> None:
+    """A copy takes the grading mark along, and another id; the notebook on disk hears of it when it is saved."""
+    earlier = TALKER.replace("0.05", "0.06")
+    copied = told_of_copies("%%node talker", 2)
+    own, copy = answer(earlier), ("copy", TALKER, answer(TALKER)[2])
+    notebook.save(own)
+    number = notebook.run(TALKER, "copy").number
+    shown = notebook.run(CHECK).text
+    assert f"comes from cell [{number}], which is not in the saved notebook" in shown and "of your own" not in shown
+    for order, ran, counts in (
+        ((own, copy), copy, True),
+        ((own, copy), own, False),
+        ((copy, own), copy, False),
+        ((copy, own), own, True),
+    ):
+        notebook.save(*order)
+        identity, source, _ = ran
+        number = notebook.run(source, identity).number
+        for shown in (notebook.run(CHECK).text, notebook.run("%lab").text):
+            flowing = " ".join(shown.split())
+            assert copied in flowing and "Move your text" not in flowing
+            assert (f"This report is about another one, cell [{number}]" in flowing) is not counts
 
 
 def later(notebook: Notebook) -> None:
@@ -571,6 +525,60 @@ def test_a_nodes_output_streams_while_a_cell_explores(notebook: Notebook) -> Non
     assert "many | 99\n" in flood and "many | 100\n" not in flood and "[more is in ros.log()]" in flood
 
 
+def test_a_cell_that_only_looks_has_no_verdict_but_for_what_failed(notebook: Notebook) -> None:
+    write(notebook)
+    looks = 'with launch("talker", "talker") as ros:\n    ros.call("/nothing", Trigger, Trigger.Request(), within=1)'
+    assert "passed" not in notebook.run('with launch("talker") as ros:\n    ros.wait_for_graph(ros.nodes)').text
+    shown = notebook.run(f"from std_srvs.srv import Trigger\n{looks}")
+    assert "✗ failed" in shown.text
+    # Two programs of one name are two folds that can be told apart.
+    assert "Output of <code>talker</code>" in shown.html and "Output of <code>talker (2)</code>" in shown.html
+
+
+def test_what_cannot_be_started_or_drawn_is_a_sentence_and_what_runs_goes_on(notebook: Notebook) -> None:
+    write(notebook)
+    notebook.run('robot = launch("talker").start()\nrobot.wait(lambda: robot.publishers("/chatter"), within=150)')
+    for typo, sentence in (
+        ('launch("taker").start()', "There is no `taker`"),
+        ("robot.qos()", 'qos: it is about one topic, such as ros.qos("/chatter"). Topics here: "/chatter".'),
+        ("robot.arrivals()", 'Topics here: "/chatter".'),
+        ('robot.lifecycle("/talker")', "`/talker` is no lifecycle node"),
+    ):
+        shown = notebook.run(typo)
+        assert sentence in shown.error and "autograder/checks" not in shown.error
+        assert "running: talker (nodes: /talker)" in notebook.run("print(robot)").text
+    notebook.run("robot.stop()")
+
+
+def test_no_traceback_of_a_node_shows_the_kit_and_input_is_explained(notebook: Notebook) -> None:
+    body = """import threading, rclpy
+from rclpy.action import ActionServer
+from test_msgs.action import Fibonacci
+def execute(goal_handle):
+    raise ValueError("in execute")
+def work():
+    raise KeyError("in a thread")
+rclpy.init()
+node = rclpy.create_node("thrower")
+server = ActionServer(node, Fibonacci, "fibonacci", execute)
+threading.Thread(target=work).start()
+try:
+    rclpy.spin(node)
+finally:
+    input()
+"""
+    write(notebook, f"%%node talker\n{body}")
+    shown = notebook.run(
+        "from test_msgs.action import Fibonacci\n"
+        'with launch("talker") as ros:\n    goal = ros.send_goal("/fibonacci", Fibonacci, Fibonacci.Goal())\n'
+        "    goal.wait_for_result()\n"
+        "    print(ros.log())"
+    )
+    assert "in execute" in shown.text and "in a thread" in shown.text and "sandbox/inside" not in shown.text
+    write(notebook, "%%node talker\nname = input()")
+    assert "has no keyboard" in " ".join(notebook.run(CHECK).text.split())
+
+
 def test_a_nodes_output_stands_under_a_failed_check_only(notebook: Notebook) -> None:
     write(notebook)
     failed = CHECK.replace("/chatter", "/chater").replace("at_least=2", "at_least=2, within=20")
@@ -603,12 +611,58 @@ def test_a_wait_says_what_it_waits_for_and_cleans_up(notebook: Notebook) -> None
     assert "\n\n✓ passed" in shown.text
 
 
-def test_an_interrupt_is_a_sentence_and_the_next_verdict_is_right(notebook: Notebook) -> None:
+def test_an_interrupted_check_has_no_verdict_wherever_that_finds_it(notebook: Notebook) -> None:
+    """At any moment: in the kit's set-up, in a wait, in the check's own lines, at the end of the block."""
     write(notebook)
-    interrupts = "lambda: os.kill(os.getpid(), signal.SIGINT)"
-    shown = notebook.run(f'import os, signal\nwith launch("talker") as ros:\n    ros.wait({interrupts}, within=60)')
-    assert shown.error == "Interrupted while it waited for what `ros.wait` asks for."
+    whole = notebook.run(CHECK)
+    remains = "import threading\nfrom autograder.checks import runtime\n"
+    remains += "print(runtime.current.block, threading.active_count())"
+    before = notebook.run(remains).text
+    moments = random.Random(19)
+    interrupted = 0
+    while interrupted < 8:
+        shown = notebook.run(CHECK, interrupt_after=moments.uniform(0, whole.seconds))
+        if shown.error:
+            interrupted += 1
+            assert (shown.error, shown.result, "expectation" in shown.text) == (NO_VERDICT, "", False)
+        else:  # it came when all was said; the machine is faster now
+            assert shown.result == whole.result
+            whole = shown
+    assert notebook.run(remains).text == before
+    assert notebook.run(CHECK).result == whole.result
+
+
+@pytest.mark.parametrize("expectation", ["expect_node('/talker')", "require(True, 'All is well')"])
+def test_an_interrupted_check_that_expects_without_a_score_says_the_same(notebook: Notebook, expectation: str) -> None:
+    write(notebook)
+    kill = "os.kill(os.getpid(), signal.SIGINT)"
+    cell = f'import os, signal\nwith launch("talker") as ros:\n    ros.{expectation}\n    '
+    for interrupted in (kill, f"ros.wait(lambda: {kill}, within=600)"):
+        shown = notebook.run(cell + interrupted)
+        assert (shown.error, "passed" in shown.text) == (NO_VERDICT, False)
+
+
+def test_an_interrupt_while_a_cell_explores_ends_what_it_started(notebook: Notebook) -> None:
+    write(notebook)
+    cell = 'import os, signal\nwith launch("talker"):\n    os.kill(os.getpid(), signal.SIGINT)\n    print("after")'
+    shown = notebook.run(cell)
+    assert "KeyboardInterrupt" in shown.error and "after" not in shown.text.splitlines()
+    waiting = 'with launch("talker") as ros:\n    ros.wait(lambda: False, within=600)'
+    assert notebook.run(waiting, interrupt_after=2.0).error == "Interrupted."
     assert "✓ passed" in notebook.run(CHECK).text
+
+
+def test_an_interrupt_that_the_cell_catches_is_told_once(notebook: Notebook) -> None:
+    write(notebook)
+    cell = f"""{SET_UP}
+robot = launch("talker").start()
+try:
+    robot.wait(lambda: False, within=600)
+except KeyboardInterrupt:
+    robot.stop()
+    print("stopped")"""
+    shown = notebook.run(cell, interrupt_after=4.0)
+    assert "stopped" in shown.text and not shown.error
 
 
 def test_a_module_of_the_students_own_is_imported(notebook: Notebook) -> None:

@@ -103,6 +103,12 @@ def test_the_wheel_lacks_nothing_that_it_imports(files: dict[str, str]) -> None:
                 assert wanted & modules.keys(), f"{name} imports {node.module}"
 
 
+def test_the_wheel_brings_nbgraders_configuration_along(files: dict[str, str]) -> None:
+    """It puts the kit's way of validating in place of nbgrader's, which runs notebooks and shows the checks' source."""
+    (config,) = [text for name, text in files.items() if name.endswith("/etc/jupyter/nbgrader_config.py")]
+    assert "use_own_course(get_config())" in config and "gradebook" not in config
+
+
 def test_no_file_of_the_kit_names_a_package_host(files: dict[str, str]) -> None:
     from test_layout import FOREIGN
 
@@ -177,6 +183,27 @@ def the_book_is_served(kit: Path, tmp_path: Path) -> None:
         server.wait(timeout=120)
 
 
+def a_new_version_replaces_no_work(kit: Path, tmp_path: Path) -> None:
+    """Unpacked over the old one: what was begun stays, and whoever renames a lab's folder gets the lab anew."""
+    lab, notebook = kit / "labs" / "toy", kit / "labs" / "toy" / "toy.ipynb"
+    mine = notebook.read_bytes()
+    (lab / "notes.md").write_text("mine")
+    (kit / "labs" / "README.md").write_text("of an earlier version")
+    shutil.rmtree(kit / "kit" / "labs")
+    with zipfile.ZipFile(tmp_path / f"{NAME}.zip") as archive:
+        archive.extractall(kit.parent)
+    handed_out = (kit / "kit" / "labs" / "toy" / "toy.ipynb").read_bytes()
+    for once_more in (False, True):
+        done = make(kit, "setup")
+        assert done.returncode == 0, done.stderr
+        assert notebook.read_bytes() == (handed_out if once_more else mine) and handed_out != mine
+        assert (kit / "labs" / "README.md").read_bytes() == (kit / "kit" / "labs" / "README.md").read_bytes()
+        if not once_more:
+            assert (lab / "notes.md").read_text() == "mine"
+            lab.rename(lab.with_name("my toy"))
+    assert (kit / "labs" / "my toy" / "toy.ipynb").read_bytes() == mine
+
+
 def test_from_an_unpacked_zip_to_a_verdict(course: Path, tmp_path: Path) -> None:
     book = tmp_path / "book"
     book.mkdir()
@@ -223,6 +250,7 @@ def test_from_an_unpacked_zip_to_a_verdict(course: Path, tmp_path: Path) -> None
     )
 
     the_book_is_served(kit, tmp_path)
+    a_new_version_replaces_no_work(kit, tmp_path)
     refused = subprocess.run(
         [kit / ".venv" / "bin" / "autograder", "grade", "toy"], cwd=kit, env=ENVIRON, capture_output=True, text=True
     )

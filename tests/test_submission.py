@@ -24,6 +24,7 @@ from autograder.course.lab import Lab, grade_id_of, load_lab
 from autograder.course.markers import hidden_lines, without_hidden_tests
 from autograder.intake.collect import collect
 from autograder.submission.cell_files import OWN_FILES
+from autograder.submission.copies import told_of_copies
 from autograder.submission.notebook_file import NOTEBOOK_BYTES
 from autograder.submission.reader import PROBLEMS_KEPT, read_submission
 from autograder.submission.submission import Submission
@@ -252,6 +253,25 @@ def test_defects_are_named_one_by_one(lab: Lab, tmp_path: Path) -> None:
     assert defect(say("talker", "%%file answers.yaml\nx")) == ["renamed-file", "same-file"]
 
 
+def test_of_copies_of_an_answer_the_last_one_counts_and_of_a_text_all(lab: Lab, tmp_path: Path) -> None:
+    """Copied, split or pasted elsewhere: a copy that was given another name is a file of the student's own."""
+    cells = json.loads(json.dumps(solved(lab)))
+
+    def copied(grade_id: str, source: str) -> None:
+        cells.append({**by_id(cells, grade_id), "id": f"copy-{len(cells)}", "source": source})
+
+    copied("talker", "%%node talker\nprint('second')")
+    copied("talker", "%%node other\nprint('mine')")
+    copied("talker", "print('the second half of a cell that was split')")
+    copied("why", "And also because.")
+    submission = read(lab, tmp_path, cells)
+    assert submission.files["talker.py"] == "# %%node talker\nprint('second')\n"
+    assert submission.files["other.py"] == "# %%node other\nprint('mine')\n"
+    assert submission.sources["why"].endswith("\n\nAnd also because.")
+    told = [problem.because for problem in submission.problems if problem.code == "duplicated-cell"]
+    assert told == [told_of_copies("%%node talker", 2), told_of_copies("why", 2, is_file=False)]
+
+
 def test_the_labs_own_source_is_a_notebook_without_defects(lab: Lab, tmp_path: Path) -> None:
     assert "HIDDEN TESTS" in json.dumps(lab.raw)
     submission = read(lab, tmp_path, lab.raw["cells"])
@@ -410,7 +430,7 @@ def test_a_folder_that_may_not_be_entered_stops_nobody_else() -> None:
         closed.chmod(0o700)
         shutil.rmtree(folder)
     assert texts == {"ann": "ann"}
-    assert len(collected.refused) == 1 and "bob cannot be read" in collected.refused[0]
+    assert len(collected.refused) == 1 and "'bob' cannot be read" in collected.refused[0]
 
 
 def test_a_zip_cannot_write_elsewhere(tmp_path: Path) -> None:
@@ -440,7 +460,7 @@ def test_a_folder_is_taken_in_without_following_links(tmp_path: Path) -> None:
     assert collected.notes == [f"'*' cannot be a file's name here; the student is called {harmless!r}."]
     told = "\n".join(collected.refused)
     assert len(collected.refused) == 2
-    assert "eve cannot be read ('toy.ipynb' is a link" in told and "mallory is a link" in told
+    assert "'eve/toy.ipynb', which cannot be read ('toy.ipynb' is a link" in told and "mallory is a link" in told
 
 
 def test_nothing_to_take_in_is_an_error(tmp_path: Path) -> None:

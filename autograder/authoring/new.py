@@ -64,9 +64,10 @@ def new_lab(root: Path, name: str) -> list[Path]:
     notebook = paths.solutions / name / f"{name}.ipynb"
     if notebook.exists() or (paths.labs / name).exists():
         raise KitError(f"There is a lab `{name}` already, and it stays as it is.", "Choose another name.")
-    requirements = paths.requirements(name)
+    requirements, canaries = paths.requirements(name), paths.canaries(name)
     raw = json.loads((_TEMPLATES / "lab.ipynb").read_text(encoding="utf-8"))
     raw["cells"][0]["source"] = raw["cells"][0]["source"].replace("LAB_TITLE", name.replace("_", " ").capitalize())
     write_beside(notebook, json.dumps(raw, indent=1, ensure_ascii=False) + "\n")
-    write_beside(requirements, (_TEMPLATES / "requirements.yaml").read_text(encoding="utf-8"))
-    return [notebook, requirements]
+    for path in (requirements, canaries):
+        write_beside(path, (_TEMPLATES / path.name).read_text(encoding="utf-8"))
+    return [notebook, requirements, canaries]

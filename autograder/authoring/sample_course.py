@@ -14,7 +14,7 @@ def sample_course(root: Path) -> Path:
     """Make the course for sample classes below the course at `root`, and return its folder."""
     sample = CoursePaths(root).sample_course
     sample.mkdir(parents=True, exist_ok=True)
-    for path in (CoursePaths(root).solutions, CoursePaths(root).labs):
+    for path in (CoursePaths(root).solutions, CoursePaths(root).labs, root / "tests"):
         link = sample / path.name
         if not link.is_symlink():
             link.symlink_to(path, target_is_directory=True)

@@ -1,5 +1,7 @@
 """Writes what students get: the labs, the lectures, and the kit as a wheel that can check and cannot tell.
 
+The labs lie below `kit` only. Set-up puts them where a student works, once: unpacking a new version replaces no work.
+
 Neither a solution nor a hidden test is in it, and nothing of the kit that only instructors use. What was written is
 searched for both before it is given out.
 """
@@ -17,11 +19,10 @@ from pathlib import Path
 
 from autograder.authoring.secrets import leaks, secrets_of
 from autograder.core.errors import KitError
-from autograder.course.folder import KIT_FOLDER
 from autograder.course.lab import lab_names
 from autograder.course.paths import CoursePaths
 from autograder.course.settings import SETTINGS_FILE, read_settings
-from autograder.setup.places import ROOT, STUDENT_LOCK
+from autograder.setup.places import KIT_FOLDER, ROOT, STUDENT_LOCK
 
 NAME = "ros2-labs"
 """Of the folder, and of the zip."""
@@ -71,10 +72,10 @@ def write_kit(root: Path, book: Path | None, into: Path) -> Path:
         raise KitError("The students' kit is built from a checkout of the kit, and this is none.", "Use a checkout.")
     folder = into / NAME
     shutil.rmtree(folder, ignore_errors=True)
-    for place in (folder / "labs", folder / KIT_FOLDER / "labs"):
-        for name in names:
-            shutil.copytree(paths.labs / name, place / name, ignore=_NOT_OURS)
-    shutil.copy(paths.labs / "README.md", folder / "labs")
+    labs = folder / KIT_FOLDER / "labs"
+    for name in names:
+        shutil.copytree(paths.labs / name, labs / name, ignore=_NOT_OURS)
+    shutil.copy(paths.labs / "README.md", labs)
     if book is not None:
         shutil.copytree(book, folder / "lectures", ignore=_NOT_OURS)
         for page in (folder / "lectures").glob("*.html"):
@@ -116,9 +117,9 @@ def build_wheel(into: Path) -> Path:
             dropped += [path for path in (package / folder).glob("*.py") if path.stem not in kept]
         for path in dropped:
             shutil.rmtree(path) if path.is_dir() else path.unlink(missing_ok=True)
-        # nbgrader's configuration is an instructor's.
+        # The gradebook is an instructor's, and nbgrader's configuration is another one.
         project = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
-        project = re.sub(r'^ *"autograder/gradebook/.*\n', "", project, flags=re.MULTILINE)
+        project = project.replace('"autograder/gradebook/environment/', '"autograder/grading/environment/')
         (source / "pyproject.toml").write_text(project, encoding="utf-8")
         options = ("--quiet", "--wheel", "--no-build-isolation", "--offline", "--python", sys.executable)
         done = subprocess.run(

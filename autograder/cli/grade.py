@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -12,11 +14,25 @@ from autograder.cli.app import CourseOption, ForceOption, IsolationOption, JsonO
 from autograder.core.errors import KitError
 from autograder.core.results import Isolation
 from autograder.course.paths import CoursePaths
+from autograder.intake.asked import Accepted, FormatName
 
 if TYPE_CHECKING:
     from autograder.core.grades import Grade
+    from autograder.core.results import SubmissionResult
     from autograder.gradebook.class_run import ClassRun
+    from autograder.intake.collect import Collected
 
+FormatOption = Annotated[
+    FormatName | None,
+    typer.Option("--format", help="As what to read the submissions, where names can be read in two ways."),
+]
+AcceptOption = Annotated[
+    list[Accepted] | None,
+    typer.Option(
+        help="Go on although the class is smaller than the roster or the last time, one submission would take the"
+        " place of another one, or somebody is not in the roster; may be given several times."
+    ),
+]
 LEFT_OUT = 3
 """The exit status when something that was handed in could not be taken in."""
 
@@ -42,14 +58,51 @@ def grade(
     diff: Annotated[
         bool, typer.Option("--diff", help="Only show what would change, such as after a change of a check.")
     ] = False,
+    canaries: Annotated[
+        bool,
+        typer.Option(help="Run known answers among the class, to notice a machine on which they get other points."),
+    ] = True,
+    despite_canaries: Annotated[
+        bool, typer.Option("--despite-canaries", help="Record the results although a known answer got other points.")
+    ] = False,
+    format_name: FormatOption = None,
+    accept: AcceptOption = None,
     course: CourseOption = None,
 ) -> None:
     """Grade a class: gradebook, grades, feedback, and a table of who lost points why.
 
-    Exit status: 0, or 3 if something that was handed in was left out, or 2 if the gradebook lacks a result.
+    Exit status: 0, or 3 if something that was handed in was left out or could not be read, or 2 if nothing was graded
+    because a person has to say what is right, or if the gradebook lacks a result, as it lacks all of them if a known
+    answer among the class got other points than it must.
+    """
+    from autograder.gradebook.class_run import Intake, grade_class, try_class
+    from autograder.grading.runner import Settings
+    from autograder.sandbox.isolation import choose
+
+    root, source = _places(course, lab, submissions)
+    executor = f"dask://{scheduler}" if scheduler else ""
+    settings = Settings(choose(isolation), seed, force, jobs, executor, canaries, despite_canaries)
+    intake = Intake(format_name.value if format_name else "", accept or (), partial(_show_intake, as_json))
+    if diff:
+        from autograder.gradebook.differences import difference_view
+        from autograder.report.terminal import console
+
+        console().print(difference_view(try_class(root, lab, source, settings, intake)))
+        return
+    run = grade_class(root, lab, source, settings, intake)
+    _show(run, CoursePaths(root), lab, as_json)
+    # The sample class has somebody on purpose whose notebook cannot be read.
+    left_out = run.collected.refused or (submissions and _unread(run))
+    raise typer.Exit(2 if run.unrecorded else LEFT_OUT if left_out else 0)
+
+
+def _places(course: Path | None, lab: str, submissions: Path | None) -> tuple[Path, Path]:
+    """The course to grade in, and where the submissions lie.
+
+    Raises:
+        KitError: there are none, or they hold the course.
     """
     from autograder.course.folder import course_root
-    from autograder.grading.runner import Settings
 
     root = course_root(course)
     source = submissions or CoursePaths(root).sample_class(lab)
@@ -67,19 +120,25 @@ def grade(
             f"The working folder lies in the submissions, and {root} would be taken for the course.",
             "Change to the folder of your course, and name the submissions from there.",
         )
-    from autograder.gradebook.class_run import grade_class, try_class
-    from autograder.sandbox.isolation import choose
+    return root, source
 
-    settings = Settings(choose(isolation), seed, force, jobs, executor=f"dask://{scheduler}" if scheduler else "")
-    if diff:
-        from autograder.gradebook.differences import difference_view
-        from autograder.report.terminal import console
 
-        console().print(difference_view(try_class(root, lab, source, settings)))
-        return
-    run = grade_class(root, lab, source, settings)
-    _show(run, CoursePaths(root), lab, as_json)
-    raise typer.Exit(2 if run.unrecorded else LEFT_OUT if run.collected.refused else 0)
+def _show_intake(as_json: bool, collected: Collected) -> None:
+    """Say what was taken in, before the class is run."""
+    from autograder.report.terminal import console, plain
+
+    if as_json:
+        print(plain(collected.line), file=sys.stderr)
+    else:
+        console().print(plain(collected.line), markup=False, soft_wrap=True)
+
+
+def _unread(run: ClassRun) -> list[str]:
+    """Sentences about those whose notebook nobody could read: a person has to look at it."""
+    from autograder.grading.runner import not_understood
+
+    reasons = {result.student: not_understood(result) for result in run.results}
+    return [f"{student}: {why} There are no points yet: a person decides." for student, why in reasons.items() if why]
 
 
 def _show(run: ClassRun, paths: CoursePaths, lab: str, as_json: bool) -> None:
@@ -88,6 +147,7 @@ def _show(run: ClassRun, paths: CoursePaths, lab: str, as_json: bool) -> None:
     from autograder.report.terminal import class_view, console, plain, undecided_view
 
     left_out = [plain(sentence) for sentence in (*run.told, *run.collected.notes, *run.collected.refused)]
+    left_out += map(plain, _unread(run))
     left_out += [f"{plain(name)} is not in the gradebook: {plain(why)}" for name, why in run.unrecorded.items()]
     if as_json:
         store = ResultStore(paths.root)
@@ -95,7 +155,7 @@ def _show(run: ClassRun, paths: CoursePaths, lab: str, as_json: bool) -> None:
             whole = store.last(lab, result.student) or result
             print(",\n" if number else "[", whole.model_dump_json(), sep="", end="")
         print("]")
-        for sentence in left_out:
+        for sentence in (*left_out, *run.canaries):
             print(sentence, file=sys.stderr)
         return
     screen = console()
@@ -106,10 +166,12 @@ def _show(run: ClassRun, paths: CoursePaths, lab: str, as_json: bool) -> None:
         screen.print()
         screen.print(undecided)
     screen.print()
-    if run.collected.format:
-        screen.print(f"Taken as what {run.collected.format} gives out.", markup=False)
     for sentence in left_out:
         screen.print(sentence, markup=False)
+    for sentence in run.canaries:
+        screen.print(sentence, markup=False)
+    if any(check.run_again for result in run.results for check in result.checks):
+        screen.print(_run_again(run.results))
     screen.print(_time(len(run.results), run.seconds))
     for label, path in (
         ("gradebook", gradebook_place(paths.root)),
@@ -129,6 +191,17 @@ def _by_hand(grade: Grade) -> str:
     parts += [f"{len(cells) - len(given)} to grade"] if len(given) < len(cells) else []
     parts += [f"{len(grade.stale)} to look at again"] if grade.stale else []
     return ", ".join(parts)
+
+
+def _run_again(results: Sequence[SubmissionResult]) -> str:
+    """How many checks the machine had too little time for, and what came of those."""
+    checks = [check for result in results for check in result.checks]
+    again = [check for check in checks if check.run_again]
+    unknown = sum(check.points is None for check in again)
+    return (
+        f"{len(again)} of {len(checks)} checks ({len(again) / len(checks):.1%}) lost points while others kept their"
+        f" programs from the CPUs, and were run again alone; {unknown or 'none'} of them could not be decided then."
+    )
 
 
 def _time(submissions: int, seconds: dict[str, float]) -> str:

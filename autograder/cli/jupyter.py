@@ -11,6 +11,7 @@ from autograder.core.errors import KitError
 from autograder.course.folder import course_root, is_students_kit
 from autograder.course.paths import CoursePaths
 from autograder.notebook import JUPYTER_SETTINGS
+from autograder.setup.labs import put_labs
 
 
 def open_labs(words: Sequence[str]) -> NoReturn:
@@ -24,6 +25,8 @@ def open_labs(words: Sequence[str]) -> NoReturn:
     Raises:
         KitError: the course has no labs yet.
     """
+    if is_students_kit():
+        put_labs()
     labs = CoursePaths(course_root()).labs
     if not labs.is_dir():
         raise KitError(f"There are no labs in {labs}.", "Make them from the solutions: autograder release")

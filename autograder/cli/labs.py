@@ -22,10 +22,23 @@ def new_course(
     """Write a course with its settings and one small lab."""
     from autograder.authoring.new import FIRST_LAB
     from autograder.authoring.new import new_course as write
+    from autograder.gradebook.own_courses import trust as note
 
     for path in write(folder):
         print(path)
+    note(folder)
     print(f"\nNext:\n  cd {shlex.quote(str(folder))}\n  autograder lint {FIRST_LAB}\n  autograder release")
+
+
+@app.command()
+def trust(folder: Annotated[Path, typer.Argument(metavar="DIR", help="The folder of a course of yours.")]) -> None:
+    """Say that a folder is a course of yours, so that nbgrader started in it runs its nbgrader_config.py."""
+    from autograder.course.folder import course_root
+    from autograder.gradebook.own_courses import trust as note
+
+    root = course_root(folder)
+    note(root)
+    print(f"{root} is noted as a course of yours.")
 
 
 @new.command("lab")
@@ -54,7 +67,9 @@ def lint(
     from autograder.authoring.lint.static import course_findings, read_findings, release_findings
     from autograder.course.folder import course_root
     from autograder.course.lab import lab_names, load_lab
+    from autograder.course.paths import CoursePaths
     from autograder.gradebook.release import released_files
+    from autograder.grading.known_answers import known_answers
     from autograder.sandbox.isolation import choose
 
     root = course_root(course)
@@ -70,7 +85,9 @@ def lint(
             print(f"{name}: {one}")
         bad = sum(not one.warning for one in found)
         if not bad and not static:
-            for one in run_findings(load_lab(root, name), choose(isolation), jobs):
+            read = load_lab(root, name)
+            known = known_answers(root, read) if CoursePaths(root).canaries(name).is_file() else []
+            for one in run_findings(read, choose(isolation), jobs, known):
                 print(f"{name}: {one}")
                 bad += not one.warning
         print(f"{name}: {f'{bad} errors' if bad else 'fine'}")

@@ -20,20 +20,21 @@ def package(
     ] = None,
     course: CourseOption = None,
 ) -> None:
-    """Write a lab's programs and launch files as a package for an installed ROS 2."""
+    """Write a lab's programs and launch files as packages for an installed ROS 2."""
     if notebook is not None and not notebook.is_file():
         raise KitError(f"There is no notebook {notebook}.", "Name an .ipynb file.")
     from autograder.course.folder import course_root
     from autograder.course.lab import load_lab
-    from autograder.packages.ament_package import lab_files, package_name, packages_in, write_package
+    from autograder.packages.ament_package import lab_files, packages_in, write_packages
 
     found = load_lab(course_root(course), lab)
-    name, files = package_name(found), lab_files(found, notebook)
-    written = write_package(name, f"Programs and launch files of {lab}", files, folder)
-    print("\n".join(str(folder / package) for package in (name, *packages_in(files))))
-    selected = " ".join((name, *packages_in(files)))
-    print(f"\nIn a workspace of an installed ROS 2:\n  colcon build --packages-select {selected}")
-    launch = sorted(path.name for path in (written / "launch").glob("*.launch.*"))
-    program = min(path.stem for path in (written / name).glob("*.py") if path.stem != "__init__")
-    start = f"ros2 launch {name} {launch[-1]}" if launch else f"ros2 run {name} {program}"
-    print(f"  source install/setup.bash\n  {start}")
+    files = lab_files(found, notebook)
+    written = write_packages(found, files, folder)
+    names = [*written, *packages_in(files)]
+    print("\n".join(str(folder / name) for name in names))
+    print(f"\nIn a workspace of an installed ROS 2:\n  colcon build --packages-select {' '.join(names)}")
+    print("  source install/setup.bash")
+    for name, made in written.items():
+        launch = sorted(path.name for path in (made / "launch").glob("*.launch.*"))
+        program = min(path.stem for path in (made / name).glob("*.py") if path.stem != "__init__")
+        print(f"  ros2 launch {name} {launch[-1]}" if launch else f"  ros2 run {name} {program}")

@@ -2,20 +2,27 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import signal
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from autograder.graph.domains import group_of
+from autograder.sandbox.environment import group_environment, profile_environment, remove_logs
 from autograder.setup.refusals import SetUpError, refuse_foreign_ros
+
+_TRIED = "AUTOGRADER_ROS2_TRIED"
+"""The environment variable with each `ros2` that was run in place of the kit's: one that comes back here is none."""
 
 
 def real_ros2() -> str | None:
-    """The `ros2` of an installed ROS on the PATH, if there is one besides the kit's own."""
+    """The `ros2` of an installed ROS on the PATH, if there is one besides the kit's own and scripts that start it."""
+    tried = os.environ.get(_TRIED, "").split(os.pathsep)
     for folder in os.environ.get("PATH", "").split(os.pathsep):
         found = Path(folder) / "ros2"
-        if found.is_file() and os.access(found, os.X_OK):
+        if str(found) not in tried and found.is_file() and os.access(found, os.X_OK):
             with found.open("rb") as file:
                 if b"autograder" not in file.read(4096):
                     return str(found)
@@ -27,9 +34,11 @@ def ros2(words: Sequence[str]) -> int:
 
     Where an installed ROS has the tool, that runs in place of this process.
     """
+    _join_notebook()
     installed = real_ros2()
     if installed is not None:
-        os.execv(installed, [installed, *words])
+        tried = os.pathsep.join(filter(None, [os.environ.get(_TRIED, ""), installed]))
+        os.execve(installed, [installed, *words], {**os.environ, _TRIED: tried})
     try:
         refuse_foreign_ros(os.environ)
         return _run(words)
@@ -43,9 +52,16 @@ def ros2(words: Sequence[str]) -> int:
         return int(signal.SIGINT)
 
 
+def _join_notebook() -> None:
+    """Where a notebook of this user's runs programs in ROS_DOMAIN_ID, take part in the multicast group that it has."""
+    with contextlib.suppress(ValueError):  # what is no number, the tool itself refuses
+        group = group_of(int(os.environ.get("ROS_DOMAIN_ID") or 0))
+        if group is not None:
+            os.environ.update(group_environment(group))
+
+
 def _run(words: Sequence[str]) -> int:
     from autograder.ros2.main import PROFILE, run
-    from autograder.sandbox.environment import profile_environment, remove_logs
 
     os.environ.setdefault("FASTRTPS_DEFAULT_PROFILES_FILE", str(PROFILE))
     os.environ.setdefault("ROS_LOG_DIR", profile_environment()["ROS_LOG_DIR"])

@@ -83,8 +83,10 @@ def _checks(packed: Path, lab: str, isolation: Isolation | None, course: Path | 
     from autograder.report.terminal import console, summary_view
     from autograder.report.words import total
 
-    result = checked(packed, load_lab(trusted_course(course), lab), Settings(isolation=isolation_for(isolation)))
+    found = load_lab(trusted_course(course), lab)
+    result = checked(packed, found, Settings(isolation=isolation_for(isolation)))
     if gap:
         console().print()
     console().print(summary_view(result))
-    return f"{total(result)}; answers in plain text are read by a person"
+    read = sum(answer.points or 0.0 for answer in found.answers.values())
+    return total(result) + (f" by checks; {read:g} more are for answers that a person reads" if read else "")

@@ -10,10 +10,7 @@ from pathlib import Path
 
 from autograder.core.errors import KitError
 from autograder.course.settings import SETTINGS_FILE
-from autograder.setup.places import ROOT
-
-KIT_FOLDER = "kit"
-"""The folder of a student's kit with what is not the student's to change."""
+from autograder.setup.places import KIT_FOLDER, ROOT
 
 
 def course_root(named: Path | None = None) -> Path:

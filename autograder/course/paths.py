@@ -53,8 +53,13 @@ class CoursePaths:
 
     @property
     def tried(self) -> Path:
-        """The same of what was only tried, before it counts."""
+        """The same of what has run and does not count yet."""
         return self.build / "tried"
+
+    @property
+    def doubtful(self) -> Path:
+        """The same of what ran while a known answer got another verdict than it must."""
+        return self.build / "doubtful"
 
     @property
     def gradebook(self) -> Path:
@@ -107,6 +112,10 @@ class CoursePaths:
     def requirements(self, lab: str) -> Path:
         """What of a lab's text is required, and which check holds it."""
         return self.root / "tests" / "classes" / lab / "requirements.yaml"
+
+    def canaries(self, lab: str) -> Path:
+        """Wrong answers to a lab of which it is known how many points they get."""
+        return self.root / "tests" / "classes" / lab / "canaries.yaml"
 
     def submitted_notebook(self, student: str, lab: str) -> Path:
         """The notebook that a student handed in."""

@@ -9,6 +9,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TypeVar
 
+from autograder.arguments.remap_rules import full_name
 from autograder.diagnosis import events, sources
 from autograder.diagnosis.events import Call, Event, ExecutorSeen, NodeSeen, ParameterSeen, Thing
 from autograder.diagnosis.reason import DiagnosedProgram
@@ -52,6 +53,18 @@ class Inside:
     def callbacks(self) -> list[Thing]:
         """Timers, subscriptions and services that are still there."""
         return [thing for thing in self.things.values() if thing.has_callback and not thing.destroyed]
+
+    @property
+    def names_in_code(self) -> dict[str, set[str]] | None:
+        """The names that the code gives to topics, in full and before any rule, with their nodes; None if not all are
+        known."""
+        ends = [thing for thing in self.things.values() if thing.kind in ("publisher", "subscription")]
+        if not self.attached or not all(thing.given and thing.node for thing in ends):
+            return None
+        found: dict[str, set[str]] = {}
+        for thing in ends:
+            found.setdefault(full_name(thing.given, thing.node), set()).add(thing.node)
+        return found
 
     def group(self, thing: Thing) -> list[Thing]:
         """What is in the same callback group, itself included; clients too."""

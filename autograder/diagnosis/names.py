@@ -244,7 +244,7 @@ def _idle_rule(scene: Scene, topic: str, node: str) -> Diagnosis | None:
     for inside, rules in zip(scene.insides, scene.rules, strict=False):
         own = [name for name in observer.nodes() if name in inside.nodes] or observer.nodes()
         nodes = [name for name in own if name == node] if node else own
-        found = remap_rules.without_effect(rules, topic, nodes, users)
+        found = remap_rules.without_effect(rules, topic, nodes, users, inside.names_in_code)
         named = [name for name in users if found and name in found[0]]
         absolute = any(absolute_name(scene, kind, name) for name in named for kind in ("publisher", "subscription"))
         if found and (found[1] != "absolute-name" or absolute):

@@ -38,6 +38,12 @@ KNOWN_ERRORS = (
         "`packages` in its setup.py names the folder.",
     ),
     (
+        "EOF when reading a line",
+        "crashed",
+        "A node that a launch starts has no keyboard, so `input()` finds nothing to read. Give it values as "
+        "parameters, or by a topic or a service.",
+    ),
+    (
         "'NoneType' object does not support the context manager protocol",
         "crashed",
         "`with` was given None. In ROS 2 Jazzy, `rclpy.init()` returns None: call it in a line of its own, and "

@@ -23,19 +23,19 @@ def register(shell: Any, kernel: Kernel) -> None:
     def offers(context: Any) -> dict[str, Any]:
         line = context.text_until_cursor.rpartition("\n")[2]
         if _PROGRAM.search(line):
-            return _offered(_programs(kernel), context.token)
+            return _offered(_programs(kernel), context.token, "program")
         if _ROS2.match(line):
-            return _offered(_words(line[: len(line) - len(context.token)].split()[1:]), context.token)
+            return _offered(_words(line[: len(line) - len(context.token)].split()[1:]), context.token, "ros2")
         return {"completions": []}
 
     shell.Completer.custom_matchers.append(offers)
 
 
-def _offered(words: Iterable[str], token: str) -> dict[str, Any]:
-    """The words that begin so, and nothing of Python's."""
+def _offered(words: Iterable[str], token: str, kind: str) -> dict[str, Any]:
+    """The words that begin so, and nothing of Python's; beside each of them stands what kind it is of."""
     from IPython.core.completer import SimpleCompletion
 
-    found = [SimpleCompletion(word) for word in words if word.startswith(token)]
+    found = [SimpleCompletion(word, type=kind) for word in words if word.startswith(token)]
     return {"completions": found, "suppress": True, "ordered": True}
 
 

@@ -6,6 +6,7 @@ The programs lie in a folder of the notebook's own, `nodes/NAME OF THE NOTEBOOK`
 from __future__ import annotations
 
 import os
+import re
 from typing import TYPE_CHECKING, Any
 
 from autograder.core import front_end
@@ -58,6 +59,7 @@ def register(shell: Any) -> None:
     shell.register_magic_function(lab_magic.magic(kernel), magic_kind="line", magic_name="lab")
     if kernel is known:
         return
+    shell.input_transformers_cleanup.append(_with_body)
     front_end.active = kernel
     kernel.start()
     completion.register(shell, kernel)
@@ -66,6 +68,12 @@ def register(shell: Any) -> None:
     shell.display_formatter.mimebundle_formatter.for_type_by_name("autograder.checks.scoring", "Score", shown_score)
     for sentence in kernel.folder.kept:
         print(sentence)
+
+
+def _with_body(lines: list[str]) -> list[str]:
+    """A cell that is nothing but `%%file NAME` is an empty file; IPython refuses a magic without a line below it."""
+    alone = len(lines) == 1 and re.match(r"%%(node|file)\s+\S", lines[0])
+    return [lines[0].rstrip("\n") + "\n", "\n"] if alone else lines
 
 
 def shown_score(score: Score, **_: object) -> dict[str, str]:

@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from autograder.course.cell_file import BadNameError, CellFile, parse
-from autograder.course.lab import Answer, Lab, blank_mark, cell_digest, grade_id_of, source_of
+from autograder.course.lab import Answer, Lab, blank_mark, cell_digest, grade_id_of
 from autograder.notebook.program_folder import NODES, Ran, read_runs
+from autograder.submission.copies import copies_of
 from autograder.submission.notebook_file import UnreadableError, cells_of
 from autograder.submission.reader import read_submission
 
@@ -44,17 +45,20 @@ def look_over(notebook: Path, lab: Lab, packed: Path) -> HandIn:
     for problem in submission.problems:
         found.ignored.append(" ".join(text for text in (problem.because, problem.hint) if text))
     try:
-        cells = {grade_id_of(cell): cell for cell in cells_of(packed)}
+        saved = cells_of(packed)
     except UnreadableError:
         return found
     saved_at = notebook.stat().st_mtime
     untouched: list[str] = []
     unrun: list[str] = []
     runs = read_runs(notebook.parent / NODES / notebook.stem)
+    cells = {grade_id_of(cell): cell for cell in saved}
     for answer in lab.answers.values():
-        cell = cells.get(answer.grade_id)
-        if cell is not None:
-            _look_at_answer(answer, cell, runs, saved_at, found, untouched, unrun)
+        marked = [cell for cell in saved if grade_id_of(cell) == answer.grade_id]
+        if marked:
+            cells[answer.grade_id] = copies_of(marked, answer.file.file_name if answer.file else "")[-1]
+            source = submission.sources[answer.grade_id]
+            _look_at_answer(answer, cells[answer.grade_id], source, runs, saved_at, found, untouched, unrun)
     if untouched:
         found.empty.append(_of_all(untouched, "is still as you received it.", "are still as you received them."))
     if unrun:
@@ -66,13 +70,13 @@ def look_over(notebook: Path, lab: Lab, packed: Path) -> HandIn:
 def _look_at_answer(
     answer: Answer,
     cell: dict[str, Any],
+    source: str,
     runs: dict[str, Ran],
     saved_at: float,
     found: HandIn,
     untouched: list[str],
     unrun: list[str],
 ) -> None:
-    source = source_of(cell)
     name = f"`%%{answer.file.magic} {answer.file.name}`" if answer.file else f"`{answer.grade_id}`"
     if cell_digest(source) in (blank_mark(answer.blank)["blank"], cell_digest("")):
         untouched.append(name)

@@ -39,5 +39,5 @@ def _not_known(_line: str) -> None:
 
 
 def _explain(result: Any) -> None:
-    if isinstance(result.error_in_exec, NameError) and result.error_in_exec.name in NAMES:
+    if result is not None and isinstance(result.error_in_exec, NameError) and result.error_in_exec.name in NAMES:
         print(_SAY)

@@ -16,7 +16,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from autograder.core.results import CellResult
+from autograder.core import interrupts
+from autograder.core.results import CellResult, Status
 from autograder.course.lab import cell_digest
 from autograder.notebook.lab_state import Report
 from autograder.notebook.program_folder import ProgramFolder, Written, notebook_of, shown
@@ -28,6 +29,13 @@ if TYPE_CHECKING:
     from autograder.sandbox.running_program import RunningProgram
 
 _SCORED = re.compile(r"\bscore\(")
+_EXPECTS = re.compile(r"\bscore\(|\.(expect_|require)")
+"""How a cell that makes a check of something asks for a verdict."""
+NO_VERDICT = "Interrupted: this check has no verdict. Run its cell again."
+"""What such a cell says that was interrupted, wherever that found it."""
+
+_READY_POLL = 0.1
+"""Seconds between two looks whether somebody has interrupted the wait."""
 
 
 class Kernel:
@@ -51,18 +59,23 @@ class Kernel:
 
     def start(self) -> None:
         """Begin to load; apart from the rest, for this needs `active`."""
+        if self.updates_outputs:
+            _hold_interrupts(self.shell)
         self._warmed.start()
         atexit.register(self.folder.close)
 
     def ready(self) -> None:
         """Wait until the loading is done."""
-        self._warmed.join()
+        while self._warmed.is_alive():
+            self._warmed.join(_READY_POLL)
+            interrupts.here()
 
     # What runs.
 
     def begin_cell(self, info: Any) -> None:
         """Note the cell that begins, and forget what the last one found."""
         self.cell = str(info.raw_cell or "")
+        interrupts.say(NO_VERDICT if _EXPECTS.search(self.cell) else "")
         self.cell_id = str(getattr(info, "cell_id", "") or "")
         self._began = self.number
         if self._watch is not None:
@@ -73,6 +86,28 @@ class Kernel:
 
     def end_cell(self, result: Any) -> None:
         """Keep what a check said, and show what was expected in a cell that asked for no score."""
+        self._end_block()
+        if result is None or isinstance(result.error_in_exec, KeyboardInterrupt):
+            self._forget_verdict()
+        else:
+            self._keep_verdict(result)
+
+    def _end_block(self) -> None:
+        """No launch of a block outlives its cell, wherever that was left."""
+        runtime = sys.modules.get("autograder.checks.runtime")
+        block = runtime.current.block if runtime is not None else None
+        if block is not None:
+            block.stop()
+
+    def _forget_verdict(self) -> None:
+        """What an interrupted check had found out says nothing, and neither does what it said before."""
+        if self.scored:
+            self.reports[cell_digest(self.cell)] = Report(None, self._began)
+        findings = _findings()
+        if findings is not None:
+            findings.reset()
+
+    def _keep_verdict(self, result: Any) -> None:
         found = getattr(result.result, "result", None)
         if isinstance(found, CellResult) and found.max_points:
             self.reports[cell_digest(self.cell)] = Report(found, self._began)
@@ -81,7 +116,8 @@ class Kernel:
             from autograder.checks.scoring import unscored
 
             report = unscored()
-            if report is not None:
+            # Where nothing was expected, what went well on the way is no verdict: a goal may have been aborted.
+            if report is not None and (_EXPECTS.search(self.cell) or report.result.status is not Status.PASSED):
                 from IPython.display import display
 
                 display(report)
@@ -218,6 +254,23 @@ def _cells_of(notebook: Path | None) -> Callable[[str], bool]:
     return has
 
 
+def _hold_interrupts(shell: Any) -> None:
+    """Let interrupts wait while the kit works; from the moment at which the kernel begins with what it is asked for."""
+    kernel = shell.kernel
+    before, after = kernel.pre_handler_hook, kernel.post_handler_hook
+
+    def begin() -> None:
+        before()
+        interrupts.begin(shell.user_ns)
+
+    def end() -> None:
+        interrupts.end()
+        after()
+
+    kernel.pre_handler_hook, kernel.post_handler_hook = begin, end
+    interrupts.begin(shell.user_ns)
+
+
 def _findings() -> Any:
     """What the cell's checks have found; None before somebody has imported them, and while that is under way."""
     return getattr(sys.modules.get("autograder.checks.findings"), "current", None)
@@ -232,10 +285,12 @@ def _warm_up() -> None:
     """Load the launcher, the checks and the middleware, so that the first launch need not wait for them."""
     with contextlib.suppress(Exception):
         from autograder.checks.runtime import current
+        from autograder.graph.domains import claim_domain
         from autograder.graph.observer import Observer
         from autograder.sandbox.environment import profile_environment
 
         os.environ.update(profile_environment())
         os.environ.pop("ROS_AUTOMATIC_DISCOVERY_RANGE", None)
         _ = current.sandbox
-        Observer(current.next_domain()).close()
+        domain = claim_domain()
+        Observer(domain.id, left=domain.release).close()

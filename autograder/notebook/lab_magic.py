@@ -33,6 +33,7 @@ def magic(kernel: Kernel) -> Any:
         except UnreadableError as error:
             print(error.problem.because)
             return
+        state.notes += [said for said in kernel.remarks(set(kernel.folder.written)) if said not in state.notes]
         from IPython.display import display
 
         from autograder.report.html import render
@@ -63,6 +64,8 @@ def _text(state: LabState) -> str:
             mark = SYMBOL[row.verdict] if row.verdict else ("✓" if row.done else "○")
             rows.add_row(mark, ("  " if part.heading else "") + plain(row.title), row.said, row.points)
     screen.print(rows)
+    for note in state.notes:
+        screen.print(plain(f"! {note}"), markup=False)
     if state.next:
         screen.print(plain(f"Go on with: {state.next}"), markup=False)
     if state.guesses:

@@ -13,6 +13,7 @@ from autograder.core.results import CellResult
 from autograder.course.lab import TEXT_STUB, cell_digest, grade_id_of, headings, nbgrader_of, source_of
 from autograder.report import words
 from autograder.report.words import Verdict
+from autograder.submission.copies import DELETE_COPIES, copies_of, named_file, told_of_copies
 from autograder.submission.notebook_file import cells_of
 
 _PART = 2
@@ -25,7 +26,8 @@ _FACT = re.compile(r"(^|_)(measured|seen)$")
 class Report:
     """What the check of a cell said last."""
 
-    result: CellResult
+    result: CellResult | None
+    """None: it was interrupted."""
     number: int
     """In the brackets beside the cell when it was run."""
 
@@ -89,6 +91,8 @@ class LabState:
     title: str = ""
     parts: list[Part] = field(default_factory=list)
     guesses: list[Guess] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+    """Where what was run, or stands in the notebook, is not what would be graded."""
 
     @property
     def rows(self) -> list[Row]:
@@ -130,8 +134,11 @@ def lab_state(notebook: Path, reports: Mapping[str, Report], runs: Mapping[str, 
         UnreadableError: it is no notebook.
     """
     state = LabState()
+    cells = cells_of(notebook)
+    texts, state.notes = _texts(cells)
     title, part, newest = "", "", 0
-    for cell in cells_of(notebook):
+    seen: set[str] = set()
+    for cell in cells:
         source, marks = source_of(cell), nbgrader_of(cell)
         if cell.get("cell_type") == "markdown" and not marks.get("solution"):
             for level, heading in headings(source):
@@ -139,21 +146,38 @@ def lab_state(notebook: Path, reports: Mapping[str, Report], runs: Mapping[str, 
                 part = title if level <= _PART else part
                 state.title = state.title or title
         elif marks.get("solution"):
-            named = re.match(r"%%(node|file)\s+(\S+)", source)
-            if named:
-                newest = max(newest, runs.get(f"{named[2]}.py" if named[1] == "node" else named[2], 0))
-        if not marks.get("points"):
+            file = named_file(cell)
+            newest = max(newest, runs.get(file.file_name, 0) if file else 0)
+        if not marks.get("points") or grade_id_of(cell) in seen:
             continue
+        seen.add(grade_id_of(cell))
         if not state.parts or state.parts[-1].title != part:
             state.parts.append(Part(part))
         rows, full = state.parts[-1].rows, float(marks["points"])
         if marks.get("solution"):
-            rows.append(_text(title or grade_id_of(cell), source, full))
+            rows.append(_text(title or grade_id_of(cell), texts[grade_id_of(cell)], full))
         elif marks.get("grade"):
             rows.append(_check(title or grade_id_of(cell), reports.get(cell_digest(source)), newest, full))
             newest = 0
     state.guesses = _guesses(files)
     return state
+
+
+def _texts(cells: Sequence[dict[str, Any]]) -> tuple[dict[str, str], list[str]]:
+    """What the answers say that are no files, by their marks; and of which answers there are copies."""
+    marked: dict[str, list[dict[str, Any]]] = {}
+    for cell in cells:
+        if grade_id_of(cell) and nbgrader_of(cell).get("solution"):
+            marked.setdefault(grade_id_of(cell), []).append(cell)
+    texts, notes = {}, []
+    for grade_id, copies in marked.items():
+        file = next((file for cell in copies if (file := named_file(cell)) is not None), None)
+        copies = copies_of(copies, file.file_name if file is not None else "")
+        if len(copies) > 1:
+            name = f"%%{file.magic} {file.name}" if file is not None else grade_id
+            notes.append(f"{told_of_copies(name, len(copies), is_file=file is not None)} {DELETE_COPIES}")
+        texts[grade_id] = "\n\n".join(dict.fromkeys(map(source_of, copies)))
+    return texts, notes
 
 
 def _text(title: str, source: str, full: float) -> Row:
@@ -166,6 +190,8 @@ def _check(title: str, report: Report | None, newest: int, full: float) -> Row:
     points = f"{full:g} point{'' if full == 1 else 's'}"
     if report is None:
         return Row(title, None, "not run in this kernel", points, False, possible=full)
+    if report.result is None:
+        return Row(title, None, "interrupted, no verdict", points, False, possible=full)
     verdict = words.verdict(report.result)
     if newest > report.number:
         return Row(title, None, f"{verdict}, but a cell above was run again since", points, False, possible=full)

@@ -122,6 +122,9 @@ class ProgramFolder:
         text = written.file.text.encode("utf-8", "replace")
         if path.exists() and path.read_bytes() != text and (before is None or self.changed_by_hand(name)):
             told.append(self._move_aside(path))
+        nodes = self.path.parent
+        if not nodes.is_dir():
+            nodes.mkdir(parents=True, mode=0o700)  # answers are nobody else's, on a machine with others' homes beside
         path.parent.mkdir(parents=True, exist_ok=True)
         write_beside(path, text.decode("utf-8"))
         self.written[name] = written

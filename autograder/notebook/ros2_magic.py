@@ -95,6 +95,8 @@ def _help_on(words: list[str], observer: Observer) -> None:
             print(f"({word} has no publisher)")
         elif word.startswith("/") and word not in names and (likely := nearest(word, names)):
             print(f"(there is no {word}; the nearest name is {likely})")
+        elif f"/{word}" in names:
+            print(f"(there is no {word}; a full name begins with a slash: /{word})")
 
 
 def _is_endless(words: list[str]) -> bool:

@@ -10,6 +10,7 @@ from typing import Any
 from autograder.course.cell_file import BadNameError, parse
 from autograder.course.lab import blank_mark_of, cell_digest, grade_id_of, nbgrader_of, source_of
 from autograder.notebook.program_folder import Written
+from autograder.submission.copies import DELETE_COPIES, told_of_copies
 from autograder.submission.notebook_file import UnreadableError, cells_of
 
 
@@ -31,6 +32,8 @@ class SavedNotebook:
         """Read it; a notebook that cannot be read has no cells, and so there is nothing to say."""
         self.path = path
         self.cells: list[_Cell] = []
+        self._ids: set[str] = set()
+        """Of all cells."""
         self.saved_at = 0.0
         self.readable = False
         try:
@@ -43,6 +46,7 @@ class SavedNotebook:
             self._take(cell)
 
     def _take(self, cell: dict[str, Any]) -> None:
+        self._ids.add(str(cell.get("id", "")))
         if cell.get("cell_type") != "code":
             return
         try:
@@ -67,6 +71,11 @@ class SavedNotebook:
         naming = [cell for cell in self.cells if cell.file_name == file_name]
         return next((cell for cell in reversed(naming) if cell.grade_id), naming[-1] if naming else None)
 
+    def _copies(self, graded: _Cell) -> list[_Cell]:
+        """The cells that have its grading mark and name its file."""
+        mark = (graded.grade_id, graded.file_name)
+        return [cell for cell in self.cells if graded.grade_id and (cell.grade_id, cell.file_name) == mark]
+
     def is_answer(self, written: Written) -> bool:
         """Whether a student's answer is in this file."""
         cell = self._graded(written.file.file_name)
@@ -88,10 +97,20 @@ class SavedNotebook:
             )
         if graded is None:
             return ""
+        copies = self._copies(graded)
+        copied = f"{told_of_copies(first, len(copies))} {DELETE_COPIES}" if len(copies) > 1 else ""
         if _same(graded.source, written.source):
             theirs = f"The cell `{first}` is the lab's own and has been changed. Grading takes it as you received it."
-            return theirs if graded.altered else ""
+            return theirs if graded.altered else copied
         known = written.cell_id and graded.cell_id
+        ran = next((cell for cell in self.cells if cell.cell_id == written.cell_id), None) if known else None
+        if ran in copies and ran is not graded:
+            return f"{copied} This report is about another one, cell [{written.number}]."
+        if known and graded.grade_id and written.cell_id not in self._ids:
+            return (
+                f"This `{written.file.name}` comes from cell [{written.number}], which is not in the saved notebook, so"
+                " nobody can say whether grading takes that cell. Save the notebook, and run this cell again."
+            )
         if known and graded.cell_id != written.cell_id and graded.grade_id:
             return (
                 f"This `{written.file.name}` comes from a cell of your own, cell [{written.number}]. Grading ignores"

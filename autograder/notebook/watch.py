@@ -99,5 +99,12 @@ class Watch:
             whole = new if rest else new[: new.rfind("\n") + 1]
             self._shown[number] = self._shown.get(number, 0) + len(whole)
             if whole:
-                block = self._blocks.setdefault(number, Stream(program.name, self._updates))
+                name = self._label(number)
+                block = self._blocks.setdefault(number, Stream(name, self._updates))
                 block.add(whole)
+
+    def _label(self, number: int) -> str:
+        """The name of a program; of one that was started more than once, which one it is."""
+        names = [program.name for program in self._programs()[: number + 1]]
+        before = names[:number].count(names[number])
+        return f"{names[number]} ({before + 1})" if before else names[number]

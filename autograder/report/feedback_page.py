@@ -12,6 +12,7 @@ from markupsafe import Markup
 from autograder.core.grades import CellGrade, Grade
 from autograder.core.results import CheckResult, SubmissionResult
 from autograder.core.version import VERSION
+from autograder.course.lab import TEXT_STUB
 from autograder.report import words
 from autograder.report.audience import reason, result_for
 from autograder.report.html import check_html, render
@@ -55,6 +56,8 @@ class _Repair:
     tasks: dict[str, str] = field(default_factory=dict)
     """Titles, by anchor."""
     checks: set[str] = field(default_factory=set)
+    begun: bool = False
+    """Whether any of these tasks was worked on."""
 
     @property
     def points(self) -> str:
@@ -107,7 +110,7 @@ def feedback_html(
                 "title": task.title,
                 "anchor": f"task-{number}",
                 "points": _points(of_task),
-                "verdict": _verdict(of_task, [checks[name] for name in task.graded if name in checks]),
+                "verdict": _verdict(of_task, [checks[name] for name in task.graded if name in checks], task),
                 "graded": graded,
                 "programs": [(name, text) for name, text in task.answers.items() if name not in task.graded],
             }
@@ -171,17 +174,19 @@ def _points(cells: Sequence[CellGrade]) -> str:
     return f"{_number(sum(decided))} of {top}{open_}"
 
 
-def _verdict(cells: Sequence[CellGrade], checks: Sequence[CheckResult]) -> Verdict:
+def _verdict(cells: Sequence[CellGrade], checks: Sequence[CheckResult], task: Task) -> Verdict:
     if any(cell.points is None for cell in cells):
         return Verdict.UNKNOWN
     earned, top = sum(cell.points or 0.0 for cell in cells), sum(cell.max_points for cell in cells)
-    if not earned and any(words.verdict(check) is Verdict.NOT_ATTEMPTED for check in checks):
+    texts = [task.answers.get(cell.grade_id, "?").strip() for cell in cells]
+    untouched = all(text in ("", TEXT_STUB) for text in texts)
+    if not earned and (untouched or any(words.verdict(check) is Verdict.NOT_ATTEMPTED for check in checks)):
         return Verdict.NOT_ATTEMPTED
     return Verdict.PASSED if earned >= top else Verdict.PARTLY if earned else Verdict.FAILED
 
 
 def _graded(cell: CellGrade, check: CheckResult | None, task: Task, fold: bool) -> _Graded:
-    look = _verdict([cell], [check] if check is not None else [])
+    look = _verdict([cell], [check] if check is not None else [], task)
     title = f"Check {task.graded.index(cell.grade_id) + 1}" if len(task.graded) > 1 else ""
     report = Markup(check_html(check, title=title, fold_pictures=fold) if check is not None else "")
     remark = ""
@@ -201,7 +206,10 @@ def _graded(cell: CellGrade, check: CheckResult | None, task: Task, fold: bool) 
 
 
 def _repairs(tasks: Sequence[Task], cells: Mapping[str, CellGrade], checks: Mapping[str, CheckResult]) -> list[_Repair]:
-    """What to repair first: the reasons that cost the most, each with the tasks that it is the first reason of."""
+    """What to repair first: the reasons that cost the most, each with the tasks that it is the first reason of.
+
+    What was begun comes before what is still untouched: only the former is there to be repaired.
+    """
     repairs: dict[str, _Repair] = {}
     for number, task in enumerate(tasks, start=1):
         for name in task.graded:
@@ -209,10 +217,12 @@ def _repairs(tasks: Sequence[Task], cells: Mapping[str, CellGrade], checks: Mapp
             if cell is None or check is None or cell.points is None or cell.points >= cell.max_points:
                 continue
             failure = check.first_failure
-            why = words.not_attempted(check) or (reason(failure) if failure is not None else "") or check.status.value
-            hint = failure.hint if failure is not None else ""
+            untouched = words.not_attempted(check)
+            why = untouched or (reason(failure) if failure is not None else "") or check.status.value
+            hint = failure.hint if failure is not None and not untouched else ""
             repair = repairs.setdefault(why, _Repair(why, hint))
+            repair.begun = repair.begun or words.verdict(check) is not Verdict.NOT_ATTEMPTED
             repair.lost += cell.max_points - cell.points
             repair.tasks[f"task-{number}"] = task.title
             repair.checks.add(name)
-    return sorted(repairs.values(), key=lambda repair: -repair.lost)[:_FIRST]
+    return sorted(repairs.values(), key=lambda repair: (not repair.begun, -repair.lost))[:_FIRST]

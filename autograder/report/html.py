@@ -13,7 +13,7 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
-from autograder.core.output import last_lines
+from autograder.core.output import last_lines, plain
 from autograder.core.results import CellResult, Status
 from autograder.report import words
 from autograder.report.audience import Audience, check_for
@@ -42,9 +42,9 @@ LOG_LINES = 40
 
 def _code(text: str) -> Markup:
     """Escape, and set what stands between backticks in code type."""
-    pieces = text.split("`")
+    pieces = plain(text).split("`")
     if len(pieces) % 2 == 0:
-        return escape(text)
+        return escape(plain(text))
     marked = [
         Markup('<code style="{}">{}</code>').format(_CODE_STYLE, piece) if number % 2 else escape(piece)
         for number, piece in enumerate(pieces)
@@ -52,11 +52,17 @@ def _code(text: str) -> Markup:
     return Markup("").join(marked)
 
 
+def _shown(value: Any) -> Any:
+    """A value of a page: names of files and people, too, may hold what turns the direction of the whole page."""
+    return plain(value) if type(value) is str else value
+
+
 @cache
 def _environment() -> Environment:
     environment = Environment(
         loader=PackageLoader("autograder.report", "templates"),
         autoescape=True,
+        finalize=_shown,
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,

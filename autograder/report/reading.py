@@ -38,7 +38,7 @@ SECTIONS: dict[tuple[int, str], str] = {
     (3, "A service has a name, too"): "service-name no-service",
     (3, "Remap rules"): (
         "node-name namespace rule-order rules-do-not-chain rule-prefix rule-kind absolute-rule private-rule"
-        " rule-without-match parameter-as-rule"
+        " rule-without-match rule-takes-name parameter-as-rule"
     ),
     (3, "What ROS 2 refuses"): (
         "name-space name-slash name-characters begins-with-digit double-underscore wildcard command-line"

@@ -18,6 +18,7 @@ from autograder.setup.commands import write_commands
 from autograder.setup.environment import create, digest, discard, finish, read_marker
 from autograder.setup.interpreter import find_python
 from autograder.setup.jupyter import lead_jupyter
+from autograder.setup.labs import put_labs
 from autograder.setup.packages import fill, install_wheel, say
 from autograder.setup.places import DEV_LOCK, MARKER, PYTHON, ROOT, STUDENT_LOCK, VENV, WHEEL
 from autograder.setup.refusals import SetUpError, refuse_closed_folder, refuse_foreign_ros, refuse_other_machines
@@ -73,6 +74,8 @@ def main() -> int:
         # Two commands in two terminals must not make one environment at once. The checkout itself is the lock.
         fcntl.flock(os.open(str(ROOT), os.O_RDONLY), fcntl.LOCK_EX)
         make_ready(options.dev, options.python)
+        if WHEEL:
+            put_labs()
     except SetUpError as error:
         say("\n%s\n\nWhat to do: %s" % (error.what, error.do))
     except OSError as error:

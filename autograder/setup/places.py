@@ -4,6 +4,8 @@
 import sys
 from pathlib import Path
 
+KIT_FOLDER = "kit"
+"""The folder of a student's kit with what is not the student's to change."""
 MARKER_NAME = "autograder-ready.json"
 _ABOVE = Path(__file__).resolve().parent.parent.parent
 """What this package lies in: a checkout, a wheel, or an environment's folder of packages."""

@@ -7,7 +7,7 @@ from typing import Any
 
 from autograder.course.cell_file import CELL_BYTES
 from autograder.course.lab import Lab, grade_id_of, nbgrader_of, source_of
-from autograder.submission.cell_files import names
+from autograder.submission.copies import DELETE_COPIES, copies_of, told_of_copies
 from autograder.submission.notebook_file import UnreadableError, problem
 from autograder.submission.submission import Submission
 
@@ -23,12 +23,15 @@ def take_answers(cells: list[dict[str, Any]], lab: Lab, submission: Submission) 
     for cell in cells:
         if grade_id_of(cell):
             found[grade_id_of(cell)].append(cell)
-    if not found.keys() & released.keys():
+    ours = lab.answers.keys() | {cell.grade_id for cell in lab.checks}
+    # Labs may call a few cells alike: of another one's, most are unknown here, and most of this one's answers missing.
+    known, answers = len(found.keys() & ours), len(found.keys() & lab.answers.keys())
+    if not known or (2 * known < len(found.keys() - (released.keys() - ours)) and 2 * answers < len(lab.answers)):
         raise UnreadableError(
             problem(
                 "wrong-notebook",
                 f"the notebook is {lab.name}",
-                f"No cell of it belongs to {lab.name}: it is another notebook, or every graded cell was deleted.",
+                f"Hardly a cell of it belongs to {lab.name}: it is another notebook, or the graded cells were deleted.",
                 f"Start from labs/{lab.name}/{lab.name}.ipynb and submit that notebook.",
             )
         )
@@ -51,18 +54,16 @@ def _take_cell(
     grade_id: str, original: dict[str, Any], copies: list[dict[str, Any]], lab: Lab, submission: Submission
 ) -> None:
     answer = lab.answers.get(grade_id)
+    file = answer.file if answer is not None else None
     if answer is not None:
-        # A copy that was given another name is a file of the student's own.
-        copies = [cell for cell in copies if names(cell, answer)] or copies
+        copies = copies_of(copies, file.file_name if file is not None else "")
     if len(copies) > 1:
-        which = "the last one counts" if answer else "none of them is run; the lab's own cell is"
+        because = f"There are {len(copies)} copies of the cell `{grade_id}`: the lab's own cell is run."
+        if answer is not None:
+            name = f"%%{file.magic} {file.name}" if file is not None else grade_id
+            because = told_of_copies(name, len(copies), is_file=file is not None)
         submission.problems.append(
-            problem(
-                "duplicated-cell",
-                f"there is one cell `{grade_id}`",
-                f"There are {len(copies)} copies of the cell `{grade_id}`: {which}.",
-                "Delete the copies: a copied cell takes its grading mark along.",
-            )
+            problem("duplicated-cell", f"there is one cell `{grade_id}`", because, DELETE_COPIES)
         )
     flags = ("grade", "solution", "locked")
     meant = {flag: bool(nbgrader_of(original).get(flag, False)) for flag in flags}
@@ -88,7 +89,10 @@ def _take_cell(
         )
         return
     try:
-        source = source_of(copies[-1])
+        # A text may have been split or begun anew: whoever reads it decides.
+        texts = [source_of(cell) for cell in (copies if answer.file is None else copies[-1:])]
+        written = [text for text in texts if text.strip() != answer.blank.strip()] or texts[:1]
+        source = "\n\n".join(dict.fromkeys(written))
     except ValueError:
         submission.problems.append(
             problem("not-a-notebook", f"the cell `{grade_id}` holds text", f"The cell `{grade_id}` holds no text.")

@@ -6,8 +6,9 @@ from collections.abc import Iterable
 from typing import Any
 
 from autograder.core.results import Outcome
-from autograder.course.cell_file import CELL_BYTES, BadNameError, CellFile, check_free, parse
-from autograder.course.lab import Answer, Lab, grade_id_of, source_of
+from autograder.course.cell_file import BadNameError, CellFile, check_free, parse
+from autograder.course.lab import Lab, grade_id_of
+from autograder.submission.copies import named_file
 from autograder.submission.notebook_file import problem
 from autograder.submission.submission import Submission
 
@@ -61,23 +62,6 @@ def take_files(lab: Lab, submission: Submission) -> None:
     submission.files.update(lab.given)
 
 
-def _named(cell: dict[str, Any]) -> CellFile | None:
-    """Return the file that a code cell names, if it does so in a way that the notebook's magics accept."""
-    if cell.get("cell_type") != "code":
-        return None
-    try:
-        source = source_of(cell)
-        return None if len(source.encode("utf-8")) > CELL_BYTES else parse(source)
-    except ValueError:  # BadNameError is one: in the notebook, too, such a cell wrote nothing
-        return None
-
-
-def names(cell: dict[str, Any], answer: Answer) -> bool:
-    """Whether a copy of an answer cell still names the answer's file."""
-    file = _named(cell)
-    return answer.file is None or (file is not None and file.file_name == answer.file.file_name)
-
-
 def take_own_files(cells: list[dict[str, Any]], lab: Lab, submission: Submission) -> dict[str, str]:
     """Take along what cells of the student's own hold, as in the notebook; an answer's name belongs to its own cell."""
     answers = {answer.file.file_name: answer.grade_id for answer in lab.answers.values() if answer.file is not None}
@@ -85,7 +69,7 @@ def take_own_files(cells: list[dict[str, Any]], lab: Lab, submission: Submission
     places = _Places(taken)
     own: dict[str, str] = {}
     for cell in cells:
-        file = _named(cell)
+        file = named_file(cell)
         if file is None or taken.get(file.file_name) == file.text:
             continue
         if file.file_name in taken or file.file_name in answers:

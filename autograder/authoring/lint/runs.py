@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 
 from autograder.authoring.lint.finding import Finding
@@ -11,20 +11,23 @@ from autograder.authoring.mutation.reach import reached
 from autograder.authoring.mutation.source import Mutant
 from autograder.core.results import Isolation, SubmissionResult
 from autograder.course.lab import Cell, Lab
+from autograder.grading.canaries import otherwise
 from autograder.grading.job import Job
+from autograder.grading.known_answers import KnownAnswers
 from autograder.grading.supervisor import run_in_worker
 
 _TRIES = 40
 """Mutants that are tried on a check before it counts as one that no mistake fails."""
 
 
-def run_findings(lab: Lab, isolation: Isolation, jobs: int) -> Iterator[Finding]:
-    """Run a lab's solution, its blank notebook, and mutants until each check is beaten by one.
+def run_findings(lab: Lab, isolation: Isolation, jobs: int, known: Sequence[KnownAnswers] = ()) -> Iterator[Finding]:
+    """Run a lab's solution, its blank notebook, its known answers, and mutants until each check is beaten by one.
 
     Args:
         lab: to run.
         isolation: how the programs are kept apart.
         jobs: how many run at once.
+        known: notebooks of which the points are known.
     """
     solutions = {grade_id: answer.solution for grade_id, answer in lab.answers.items()}
     blanks = {grade_id: answer.blank for grade_id, answer in lab.answers.items()}
@@ -32,8 +35,12 @@ def run_findings(lab: Lab, isolation: Isolation, jobs: int) -> Iterator[Finding]
         solved = pool.submit(_run, lab, isolation, lab.files_with(solutions), {}, list(lab.cells))
         answers = {file.file_name: True for answer in lab.answers.values() if (file := answer.file) is not None}
         blank = pool.submit(_run, lab, isolation, lab.files_with(blanks), answers, list(lab.cells))
-        yield from _solution(solved.result())
+        wrong = list(_solution(solved.result()))
+        yield from wrong
         yield from _blank(blank.result())
+        if not wrong:  # known answers are made from the solution
+            for finding in pool.map(lambda one: list(_otherwise(lab, isolation, one)), known):
+                yield from finding
         every = mutants(lab)
         yield from filter(None, pool.map(lambda check: _unbeaten(lab, isolation, check, every), lab.checks))
 
@@ -52,6 +59,18 @@ def _blank(result: SubmissionResult) -> Iterator[Finding]:
         if check.points != 0:
             points = "no verdict" if check.points is None else f"{check.points:g} points"
             yield Finding(check.grade_id, f"the notebook as students receive it gets {points}.")
+
+
+def _otherwise(lab: Lab, isolation: Isolation, known: KnownAnswers) -> Iterator[Finding]:
+    result = _run(lab, isolation, lab.files_with(known.sources), {}, list(lab.cells))
+    for flip in otherwise(known, lab, result):
+        which = "a right answer" if flip.right else "the wrong answer"
+        yield Finding(
+            flip.check, f"{which} of canaries.yaml must get {flip.expected}, and gets {flip.seen.points:g}. {flip.why}"
+        )
+    for check in result.checks:
+        if check.points is None:
+            yield Finding(check.grade_id, "an answer of canaries.yaml gets no verdict.")
 
 
 def _unbeaten(lab: Lab, isolation: Isolation, check: Cell, every: list[Mutant]) -> Finding | None:

@@ -15,6 +15,7 @@ from autograder.course.lab import Lab, lab_names, load_lab
 from autograder.course.markers import MARK
 from autograder.course.paths import CoursePaths
 from autograder.course.settings import SETTINGS_FILE, read_settings
+from autograder.grading.known_answers import wrong_answers
 
 
 def course_findings(root: Path) -> list[Finding]:
@@ -44,7 +45,23 @@ def read_findings(root: Path, name: str) -> list[Finding]:
     found += check_findings(lab)
     if not lab.checks:
         found.append(Finding("", "it has no check, so nobody can get points."))
+    found += _canary_findings(root, lab)
     return [*found, *_requirement_findings(lab, CoursePaths(root).requirements(name))]
+
+
+def _canary_findings(root: Path, lab: Lab) -> Iterator[Finding]:
+    path = CoursePaths(root).canaries(lab.name)
+    try:
+        named = {name for one in wrong_answers(root, lab) for name in one.points}
+    except KitError as error:
+        yield Finding("", error.what)
+        return
+    if not path.is_file():
+        yield Finding("", f"there is no {path}, so no wrong answers are known that could run in a class.", warning=True)
+        return
+    for check in lab.checks:
+        if check.grade_id not in named:
+            yield Finding(check.grade_id, f"{path.name} has no wrong answer for it.", warning=True)
 
 
 def _requirement_findings(lab: Lab, path: Path) -> Iterator[Finding]:
