@@ -20,7 +20,7 @@ echo "No Python was found. The kit needs Python 3.11 to 3.14." >&2; \
 echo "What to do: sudo apt-get install python3 python3-venv   or name one: make PYTHON=/path/to/python3.12" >&2; exit 2
 endef
 
-.PHONY: help setup setup-dev doctor grade check submit test test-all lint jupyter lectures pdf release wheel soak mutants bench lock clean distclean
+.PHONY: help setup setup-dev doctor grade check submit test test-all lint jupyter lectures pdf release wheel soak machines margins mutants bench lock clean distclean
 
 help: ## this list
 	@echo 'make TARGET [LAB=$(LAB)] [PYTHON=python3.12] [ARGS="more options"]'; echo
@@ -80,6 +80,12 @@ lint: setup-dev ## ruff, its formatting, mypy --strict, and the direction of imp
 
 soak: setup-dev ## grade every sample student N=20 times, half of them under load: nothing may differ
 	@$(RUN) python tests/soak.py --times $(N) $(if $(filter command line,$(origin LAB)),--lab $(LAB)) $(ARGS)
+
+machines: setup-dev ## grade LAB's sample students with half and a quarter of a CPU, and beside 30 busy loops: nothing may differ
+	@$(RUN) python tests/machines.py $(LAB) $(ARGS)
+
+margins: setup-dev ## how far each bound on time in a check is from the sample students, on a quiet and on a busy machine
+	@$(RUN) python tests/margins.py $(if $(filter command line,$(origin LAB)),--lab $(LAB)) $(ARGS)
 
 mutants: setup-dev ## change LAB's solutions by rule, one change at a time, and grade each: what survives lacks a check
 	@$(RUN) python tests/mutants.py $(LAB) $(ARGS)

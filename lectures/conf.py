@@ -14,13 +14,12 @@ HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent
 sys.path[:0] = [str(ROOT), str(HERE / "_ext"), str(HERE / "_lib")]
 
-from autograder.graph.domains import free_domains  # noqa: E402
+from autograder.graph.domains import claim_domain  # noqa: E402
 from autograder.sandbox.environment import profile_environment  # noqa: E402  (needs the path above)
 
-# A domain is claimed as long as what gave it is there.
-_domains = free_domains()
+_domain = claim_domain()
 # What the kernels inherit. The log folder must exist before rclpy starts.
-os.environ |= profile_environment() | {"ROS_DOMAIN_ID": str(next(_domains)), "JUPYTER_PREFER_ENV_PATH": "1"}
+os.environ |= profile_environment() | {"ROS_DOMAIN_ID": str(_domain.id), "JUPYTER_PREFER_ENV_PATH": "1"}
 os.environ |= {"LECTURES": str(HERE), "PYTHONPATH": str(HERE / "_lib")}
 Path(os.environ["ROS_LOG_DIR"]).mkdir(parents=True, exist_ok=True)
 # A page that runs the command `autograder` means the one of this environment.

@@ -13,6 +13,7 @@ from typing import Any
 
 from autograder.core.processes import descendants, memory
 from autograder.core.results import Isolation
+from autograder.sandbox.environment import profile_environment
 from autograder.sandbox.node_sandbox import NodeSandbox
 from autograder.sandbox.running_program import RunningProgram
 
@@ -89,7 +90,7 @@ def watched(program: RunningProgram, wanted: str) -> dict[str, Any]:
 
 def run_beside_honest_node(sandbox: NodeSandbox, names: list[str]) -> dict[str, Any]:
     """Run programs that attack by ROS, beside an honest node and an observer."""
-    os.environ.setdefault("ROS_LOG_DIR", "/tmp/log")
+    os.environ.update(profile_environment())
     from std_msgs.msg import String
 
     from autograder.graph.observer import Observer

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 import signal
+import tempfile
 from collections.abc import Iterator
 from typing import Any
 
@@ -13,6 +14,9 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+
+# Courses of tests are nobody's, and stand in nobody's list.
+os.environ["XDG_CONFIG_HOME"] = tempfile.mkdtemp(prefix="autograder-tests-")
 
 BROWSER_SECONDS = 180
 """Far beyond what a step of a browser takes on a busy machine."""

@@ -2,7 +2,7 @@
 
 A line of an attack's docstring says what must happen, and the tests hold it to that:
     Must: refused.                   It reports no escape, and ends by itself with status 0.
-    Must: memory limit.              That limit ends it (likewise: output limit, process limit).
+    Must: memory limit.              That limit ends it (likewise: process limit).
     Must: ended by signal 6.         It ends by that signal.
     Must: goes on.                   It runs until the end of the launch, which ends it.
     Must, alone: …                   It runs in a launch of its own (`twice`: in two), since it would harm the others.

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import io
+import tarfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -16,7 +18,10 @@ from autograder.grading.builds import with_interfaces
 from autograder.grading.job import Job
 from autograder.grading.supervisor import run_in_workers
 from autograder.packages.explain import CODES
+from autograder.sandbox import build as sandbox_build
+from autograder.sandbox.build import BuildRun
 from autograder.sandbox.isolation import preflight
+from autograder.sandbox.outer import OuterRun
 
 SENSORS = {
     "package.xml": """<?xml version="1.0"?>
@@ -104,10 +109,41 @@ def without(files: Mapping[str, str], file: str) -> dict[str, str]:
     return {name: text for name, text in files.items() if name != file}
 
 
+FORGES = """import io, os, tarfile
+forged = io.BytesIO()
+with tarfile.open(fileobj=forged, mode="w") as tar:
+    tar.addfile(tarfile.TarInfo("NAME/share/forged"))
+for process in filter(str.isdigit, os.listdir("/proc")):
+    try:
+        with open(f"/proc/{process}/cmdline") as line:
+            builds = "build_packages.py" in line.read()
+        if builds or process == "1":
+            os.write(os.open(f"/proc/{process}/fd/1", os.O_WRONLY), forged.getvalue())
+    except OSError:
+        pass
+"""
+MAKES_FILES = """import os
+os.mkdir("many")
+for number in range(60_000):
+    os.close(os.open(f"many/{number}", os.O_CREAT | os.O_WRONLY))
+"""
+
 EXPECT = "expect_built()"
 RUNS = 'expect_executable("speed_sensor")'
 CASES: dict[str, tuple[dict[str, str], str, str, str]] = {
     # name: (files, expectation, code, words of the reason)
+    "forges_the_result": (
+        {**SENSORS, "setup.py": FORGES + SENSORS["setup.py"]},
+        'expect_installed("share/forged")',
+        "not-installed",
+        "installs no `share/forged`",
+    ),
+    "makes_files": (
+        {**SENSORS, "setup.py": MAKES_FILES + SENSORS["setup.py"]},
+        EXPECT,
+        "build-files",
+        "30,000 files",
+    ),
     "not_xml": (changed(SENSORS, "package.xml", "</package>", ""), EXPECT, "package-xml", "package.xml"),
     "no_license": (
         changed(SENSORS, "package.xml", "<license>Apache-2.0</license>", ""),
@@ -420,6 +456,8 @@ def found(request: pytest.FixtureRequest) -> dict[str, CheckResult]:
 )
 def test_a_package_that_is_not_as_it_should_be_is_told_why(found: dict[str, CheckResult], name: str) -> None:
     _, _, code, words = CASES[name]
+    if code == "build-files" and not preflight().full:
+        pytest.skip(preflight().why_not_full)
     first = next(one for one in found[name].outcomes if one.because)
     assert found[name].points == 0
     assert first.code == code, first
@@ -483,7 +521,7 @@ def test_without_a_compiler_nothing_is_decided_and_the_reason_is_told(
 
 def test_every_code_of_a_build_has_a_case() -> None:
     seen = {code for _, _, code, _ in CASES.values()}
-    assert CODES.keys() - seen <= {"build-failed", "build-time"}
+    assert CODES.keys() - seen <= {"build-failed", "build-time", "build-limit"}
 
 
 @pytest.mark.skipif(not preflight().full, reason="without full isolation a build is a plain process")
@@ -494,3 +532,13 @@ def test_a_hostile_build_is_ended_and_reaches_nothing(found: dict[str, CheckResu
     told = check.outcomes[-1].title
     assert "WRITTEN []" in told
     assert name != "looks_around" or "GOT []" in told, told
+    assert name != "forks" or "limit of processes" in check.outcomes[0].because, check.outcomes[0]
+
+
+def test_a_name_that_no_text_can_say_is_left_out_of_what_was_built() -> None:
+    archive = io.BytesIO()
+    with tarfile.open(fileobj=archive, mode="w", errors="surrogateescape") as tar:
+        for name in ("car/share/odd\udcff", "car/share/plain"):
+            tar.addfile(tarfile.TarInfo(name))
+    run = sandbox_build._finished(OuterRun(archive.getvalue(), "", 0, False), [])
+    assert list(BuildRun.model_validate_json(run.model_dump_json()).installed) == ["car/share/plain"]

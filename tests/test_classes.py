@@ -22,9 +22,11 @@ from sample_class import ROOT
 from autograder.authoring.mutation.reach import using
 from autograder.core.results import CheckResult, SubmissionResult
 from autograder.course.lab import Cell, Lab, load_lab
+from autograder.grading import once_more
 from autograder.grading.job import Job
 from autograder.grading.runner import Settings, job_of, without_running
 from autograder.grading.supervisor import run_in_worker
+from autograder.grading.validation import TOO_BUSY
 from autograder.submission.reader import read_submission
 from autograder.submission.submission import Submission
 
@@ -39,7 +41,9 @@ for name, text in {files!r}.items():
     if name in {kept!r}:
         (current.folder / name).write_text(text, encoding="utf-8")
 """
+TRIES_ALONE = 5
 Grade = Callable[[threading.Event], SubmissionResult]
+_one_alone = threading.Lock()
 _read: dict[tuple[str, str], Submission] = {}
 
 
@@ -54,7 +58,21 @@ def grading(lab: Lab, student: str, complete: bool) -> Grade:
         job = each_check_alone(lab, job)
     elif not complete:
         job = job.model_copy(update={"cells": cells_to_run(lab, student, job.files)})
-    return lambda stop: run_in_worker(job, stop)
+    return lambda stop: decided(job, stop)
+
+
+def decided(job: Job, stop: threading.Event) -> SubmissionResult:
+    """What a job comes to, with checks run again whose programs others kept from the CPUs."""
+    first = run_in_worker(job, stop)
+    again = once_more.open_checks(job, first)
+    if again is None:
+        return first
+    for _ in range(TRIES_ALONE):  # other tests run beside it all the same
+        with _one_alone:
+            second = run_in_worker(again, stop)
+        if not any(map(once_more.is_open, second.checks)):
+            break
+    return once_more.settled(again, first, second)
 
 
 def handed_in(lab: Lab, student: str) -> Submission:
@@ -137,7 +155,7 @@ def differences(lab: Lab, student: str, result: SubmissionResult) -> list[str]:
     """Where a result is not what was expected, as lines to read."""
     expected = sample_class.expected(lab, student)
     found = []
-    without_parts = {check.grade_id for check in result.checks if not check.parts}
+    without_parts = {check.grade_id for check in result.checks if not (check.parts or was_too_busy(check))}
     found += [f"{name}: it has no parts" for name in expected.lost.keys() & without_parts]
     if sorted(problem.code for problem in result.problems) != expected.problems:
         found.append(f"problems {[p.code for p in result.problems]}, expected {expected.problems}")
@@ -149,6 +167,8 @@ def differences(lab: Lab, student: str, result: SubmissionResult) -> list[str]:
         if expected.points[name] != sample_class.expected(lab, known.get(name, "solution")).points[name]:
             found.append(f"{name}: no changed answer reaches it, and still it is expected to lose points")
     for check in result.checks:
+        if was_too_busy(check):
+            continue
         name, first = check.grade_id, check.first_failure
         told = f"{first.code}: {first.title}: {first.because}" if first else "passed"
         if check.points != expected.points[name]:
@@ -162,6 +182,17 @@ def differences(lab: Lab, student: str, result: SubmissionResult) -> list[str]:
     return found
 
 
+def was_too_busy(check: CheckResult) -> bool:
+    """Whether this machine had too little time for a check, which then says nothing."""
+    return any(outcome.code == TOO_BUSY for outcome in check.outcomes)
+
+
+def skip_if_too_busy(result: SubmissionResult) -> None:
+    """Say which checks of a result say nothing."""
+    if busy := [check.grade_id for check in result.checks if was_too_busy(check)]:
+        pytest.skip(f"this machine was too busy for {', '.join(busy)}; all others are as expected")
+
+
 def lost_parts(check: CheckResult) -> list[str]:
     """Titles of the parts that did not give all their points, sorted."""
     return sorted(part.title for part in check.parts if part.points < part.max_points)
@@ -173,14 +204,16 @@ def test_a_student_gets_exactly_the_expected_points_and_reasons(
 ) -> None:
     result = graded[lab_name, student].result()
     assert differences(load_lab(ROOT, lab_name), student, result) == []
+    skip_if_too_busy(result)
 
 
 @pytest.mark.parametrize(("lab_name", "student"), [(lab, ALONE) for lab in LABS])
 def test_no_other_answer_reaches_a_check(
     lab_name: str, student: str, graded: dict[tuple[str, str], Future[SubmissionResult]]
 ) -> None:
-    lost = [check for check in graded[lab_name, student].result().checks if check.points != check.max_points]
-    assert lost == []
+    result = graded[lab_name, student].result()
+    assert [one for one in result.checks if one.points != one.max_points and not was_too_busy(one)] == []
+    skip_if_too_busy(result)
 
 
 @pytest.mark.parametrize("lab_name", LABS)

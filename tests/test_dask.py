@@ -13,7 +13,9 @@ from dask_cluster import KIT, cluster, until
 from autograder.core.errors import KitError
 from autograder.core.results import Isolation
 from autograder.course.lab import load_lab
+from autograder.grading.canaries import Canaries
 from autograder.grading.class_runner import run_class
+from autograder.grading.known_answers import known_answers
 from autograder.grading.runner import Settings
 from autograder.sandbox.isolation import preflight
 
@@ -42,8 +44,10 @@ def test_a_killed_worker_costs_no_result_and_another_kit_is_refused(
                 first.kill()
 
         begun: list[str] = []
-        results = run_class(class_, course, lab, settings, kill_the_first, begun.append)
+        canaries = Canaries(lab, known_answers(course, lab), settings)
+        results = run_class(class_, course, lab, settings, kill_the_first, begun.append, canaries=canaries)
         assert set(begun) == set(class_)  # whose names are shown while they run
+        assert (canaries.ran, canaries.flips) == (2, [])  # known answers took the same way
         assert {student: result.points for student, result in results.items()} == dict.fromkeys(class_, 5.0)
         assert psutil.wait_procs(family, timeout=120)[1] == []
 

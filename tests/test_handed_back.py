@@ -26,15 +26,15 @@ from autograder.core.grades import CellGrade, Grade
 from autograder.core.results import CheckResult, Isolation, Outcome, Part, Status, SubmissionResult
 from autograder.course.lab import load_lab
 from autograder.gradebook.class_entries import class_entries
-from autograder.gradebook.class_run import ClassRun, grade_class
+from autograder.gradebook.class_run import ClassRun, Intake, grade_class
 from autograder.gradebook.preparation import prepare_nbgrader
 from autograder.gradebook.scores import read_grades
 from autograder.gradebook.settings import gradebook_address, gradebook_file
 from autograder.grading.executors import local
 from autograder.grading.runner import Settings
 from autograder.grading.validation import validated
-from autograder.intake.formats import recognise
-from autograder.intake.members import members
+from autograder.intake.asked import Accepted
+from autograder.intake.reading import read_class
 from autograder.intake.roster import read_roster
 from autograder.report.class_page import write_class_page
 from autograder.report.export import FORMATS
@@ -75,7 +75,7 @@ def answers(root: Path, talker: str, why: str = "Because of that.") -> str:
 
 
 def grade(root: Path, source: Path) -> ClassRun:
-    return grade_class(root, toy.LAB, source, Settings(isolation=Isolation.NONE))
+    return grade_class(root, toy.LAB, source, Settings(isolation=Isolation.NONE), Intake(accepted=tuple(Accepted)))
 
 
 @pytest.fixture(scope="module")
@@ -193,9 +193,9 @@ def test_feedback_goes_back_under_the_names_that_the_platform_gave(graded: Grade
     with zipfile.ZipFile(tmp_path / "moodle.zip", "w") as archive:
         for name in names:
             archive.writestr(name, "")
-    recognised = recognise(members(tmp_path / "moodle.zip"), toy.LAB)
-    assert recognised is not None and recognised.format == "Moodle"
-    assert {claim.owner["moodle_id"] for claim in recognised.claims} == {"501", "502", "503"}
+    reading = read_class(tmp_path / "moodle.zip", toy.LAB)
+    assert reading.format.title == "Moodle"
+    assert {claim.owner["moodle_id"] for claim in reading.recognised.claims} == {"501", "502", "503"}
 
 
 def test_gradescope_gets_a_result_for_each_submission(graded: Graded) -> None:

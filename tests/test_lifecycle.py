@@ -17,7 +17,7 @@ from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.lifecycle import LifecycleNode, TransitionCallbackReturn
 
-from autograder.checks import runtime
+from autograder.graph.domains import claim_domain
 from autograder.graph.lifecycle import LifecycleClient, in_order
 from autograder.graph.observer import Observer
 from autograder.graph.parameters import NoAnswer
@@ -47,7 +47,8 @@ class Part(LifecycleNode):  # type: ignore[misc]
 def observer() -> Iterator[Observer]:
     os.environ.update(profile_environment())
     Path(os.environ["ROS_LOG_DIR"]).mkdir(parents=True, exist_ok=True)
-    watching = Observer(runtime.current.next_domain())
+    domain = claim_domain()
+    watching = Observer(domain.id, left=domain.release)
     yield watching
     watching.close()
 

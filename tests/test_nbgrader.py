@@ -191,13 +191,13 @@ def test_a_result_that_lost_a_check_means_manual_grading(course: Course) -> None
     assert course.grades("lost") == {"check_talker": (None, True), "check_answers": (None, True), "why": (None, True)}
 
 
-def test_broken_submissions_fail_with_their_reason_and_stop_nobody(course: Course) -> None:
+def test_broken_submissions_wait_for_a_person_with_their_reason_and_stop_nobody(course: Course) -> None:
     course.hand_in("broken", "{")
     course.hand_in("empty", "")
     course.hand_in("fine", course.cells())
     course.grade("broken", "empty", "fine")
-    for student, reason in (("broken", "not valid JSON"), ("empty", "handed in")):
-        assert course.grades(student) == {"check_talker": (0, False), "check_answers": (0, False), "why": (0, False)}
+    for student, reason, grade in (("broken", "not valid JSON", (None, True)), ("empty", "handed in", (0, False))):
+        assert course.grades(student) == {"check_talker": grade, "check_answers": grade, "why": (0, False)}
         assert reason in course.feedback(student)
     assert course.grades("fine")["check_talker"] == (3, False)
 
@@ -507,7 +507,7 @@ def test_nbgraders_own_commands_give_the_same_grades(course: Course, tmp_path: P
     done = nbgrader(root, "autograde", toy.LAB)
     assert done.returncode == 0, done.stderr
     assert own.grades("ann") == {"check_talker": (3, False), "check_answers": (2, False), "why": (None, True)}
-    assert own.grades("broken")["check_talker"] == (0, False)
+    assert own.grades("broken")["check_talker"] == (None, True)
     done = nbgrader(root, "generate_feedback", toy.LAB)
     assert done.returncode == 0, done.stderr
     assert "A hidden check passed" in own.feedback("ann") and Tags(own.feedback("ann")).live == []

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import os
+import re
 import subprocess
 import sys
 import xml.etree.ElementTree as ET
@@ -18,7 +19,7 @@ from autograder.cli.main import app
 from autograder.core.errors import KitError
 from autograder.course.lab import load_lab
 from autograder.launch_files import read_launch_file
-from autograder.packages.ament_package import lab_files, package_name, write_package
+from autograder.packages.ament_package import lab_files, package_name, write_package, write_packages
 
 LAB = load_lab(ROOT, "lab3_remapping")
 SOLUTION = ROOT / "solutions" / "lab3_remapping" / "lab3_remapping.ipynb"
@@ -113,6 +114,34 @@ def test_packages_that_a_lab_has_already_stay_as_they_are_beside_that_of_its_pro
     assert (tmp_path / "lab7_interfaces" / "lab7_interfaces" / "count_server.py").is_file()
     for path in (tmp_path / "lab7_interfaces").rglob("*.py"):
         ast.parse(path.read_text(encoding="utf-8"))
+
+
+@pytest.mark.parametrize("path", [path.parent.name for path in sorted((ROOT / "solutions").glob("lab*/lab*.ipynb"))])
+@pytest.mark.parametrize("solved", [False, True])
+def test_every_launch_file_names_packages_and_programs_that_are_written(
+    path: str, solved: bool, tmp_path: Path
+) -> None:
+    lab = load_lab(ROOT, path)
+    files = lab_files(lab, ROOT / "solutions" / path / f"{path}.ipynb" if solved else None)
+    written = write_packages(lab, files, tmp_path)
+    for launch in tmp_path.rglob("*.launch.yaml"):
+        nodes = re.findall(r"pkg: *\"?(\w+)\"?[,\s]+exec: *\"?(\w+)", launch.read_text(encoding="utf-8"))
+        for package, program in nodes:
+            if package in written or solved:  # to write the others is what the lab asks for
+                setup = (tmp_path / package / "setup.py").read_text(encoding="utf-8")
+                assert f'"{program} = ' in setup, (launch, program)
+        for beside in re.findall(r"\$\(dirname\)/([\w.]+)", launch.read_text(encoding="utf-8")):
+            assert (launch.parent / beside).is_file(), (launch, beside)
+    named = {"lab3_remapping": ["camera_lab"], "lab8_bringup": ["car_lab", "porter_lab"]}
+    assert list(written) == named.get(path, [path])
+
+
+def test_nothing_is_written_where_one_of_the_packages_is_there(tmp_path: Path) -> None:
+    lab = load_lab(ROOT, "lab8_bringup")
+    (tmp_path / "porter_lab").mkdir()
+    with pytest.raises(KitError, match="porter_lab exists already"):
+        write_packages(lab, lab_files(lab, None), tmp_path)
+    assert [path.name for path in tmp_path.iterdir()] == ["porter_lab"]
 
 
 def test_the_programs_of_a_notebook_are_taken() -> None:
