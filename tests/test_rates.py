@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from autograder.checks.expect.rates import at_rate, in_words, too_slow
+from autograder.checks.expect.rates import at_rate, in_time, in_words, too_slow
 from autograder.graph.recording import Received
 
 
@@ -30,7 +32,7 @@ STEADY = [0.05 * n for n in range(10)]
     ids=["as it should be", "most were lost", "one twice", "two held up"],
 )
 def test_messages_at_their_rate(messages: list[Received]) -> None:
-    assert at_rate(messages, 20, 0.2)
+    assert at_rate(messages, 20, 0.2) and in_time(messages, 20, 0.2)
 
 
 @pytest.mark.parametrize(
@@ -53,3 +55,19 @@ def test_messages_chosen_by_what_they_say_are_not_lost_in_between() -> None:
     every_other = received(STEADY, lost=[2, 4, 6, 8, 10])
     assert not at_rate(every_other, 20, 0.2, every=False)
     assert too_slow(every_other, 20, every=False) and not too_slow(every_other, 20)
+
+
+def test_a_timer_that_is_held_up_less_and_less_long_has_no_other_rate() -> None:
+    """At one hertz, held up by 0.95 s, 0.5 s and 0.0 s: half a second lies between most of the messages."""
+    messages = received([1.95, 2.5, 3.0, 4.0])
+    assert at_rate(messages, 2, 0.2) and not in_time(messages, 2, 0.2)
+    assert too_slow(messages, 2)
+
+
+@given(late=st.lists(st.floats(0, 0.999), min_size=4, max_size=12), slower=st.floats(2, 10))
+def test_a_slower_timer_is_never_in_time_however_it_is_held_up(late: list[float], slower: float) -> None:
+    assert not in_time(received([(n + part) * slower for n, part in enumerate(late)]), 1, 0.2)
+
+
+def test_a_timer_that_is_in_time_for_a_while_is_in_time() -> None:
+    assert in_time(received([*STEADY[:5], 1.0, 1.5, *[2 + at for at in STEADY[:3]]]), 20, 0.2)

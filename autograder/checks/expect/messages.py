@@ -209,7 +209,9 @@ class MessageExpectations(SourceExpectations):
         enough = need if wanted.most is not None else _RATE_DECIDED * need
 
         def right() -> bool:
-            return rates.at_rate(wanted.counted()[-need:], rate, tolerance, every)
+            last = wanted.counted()[-need:]
+            in_time = wanted.most is not None or rates.in_time(last, rate, tolerance, every)
+            return in_time and rates.at_rate(last, rate, tolerance, every)
 
         self.wait(lambda: right() or len(wanted.counted()) >= enough, within)
         until = time.monotonic() + within

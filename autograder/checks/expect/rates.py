@@ -11,6 +11,9 @@ from autograder.graph.recording import Received
 _SHORT = 0.5
 """The share of a period below which a gap is short: a timer that was held up makes one, two timers make many."""
 
+_IN_A_ROW = 4
+"""How many gaps in a row have to be of the right length together."""
+
 
 def _gaps(received: Sequence[Received], every: bool) -> list[float]:
     """Seconds from one message to the next as they were published.
@@ -45,10 +48,26 @@ def _in_bursts(gaps: Sequence[float], period: float) -> bool:
     return sum(gap < _SHORT * period for gap in gaps) > len(gaps) // 3
 
 
+def in_time(received: Sequence[Received], rate: float, tolerance: float, every: bool = True) -> bool:
+    """Whether somewhere among these messages a timer of this rate was in time for four periods, or for all there are.
+
+    A timer that is held up less and less long makes short gaps, but it keeps its beat: from the first to the last of n
+    calls at least n - 2 of its periods go by (rcl, `rcl_timer_call`). A slower one never looks in time for so long.
+    The arguments are those of `at_rate`.
+    """
+    return _quickest(_gaps(received, every)) <= (1 + tolerance) / rate
+
+
+def _quickest(gaps: Sequence[float]) -> float:
+    """The shortest mean of as many gaps in a row as are looked at together."""
+    length = min(_IN_A_ROW, len(gaps))
+    return min((statistics.fmean(gaps[i : i + length]) for i in range(len(gaps) - length + 1)), default=0.0)
+
+
 def too_slow(received: Sequence[Received], rate: float, every: bool = True) -> bool:
     """Whether messages come less often than at this rate: what a busy machine makes of the right one, too."""
     gaps = _gaps(received, every)
-    return not gaps or statistics.median(gaps) > 1 / rate
+    return not gaps or statistics.median(gaps) > 1 / rate or _quickest(gaps) > 1 / rate
 
 
 def in_words(received: Sequence[Received], every: bool = True) -> str:
