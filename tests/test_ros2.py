@@ -284,7 +284,8 @@ def test_a_command_waits_for_a_program_that_is_slow_to_answer(ten_nodes: tuple[s
         text=True,
     )  # fmt: skip
     assert until(lambda: discovery.participants_here(domain) == 2)
-    time.sleep(4)  # longer than a command waits where there is nothing
+    with pytest.raises(subprocess.TimeoutExpired):
+        listed.wait(4)  # longer than where there is nothing
     made.send_signal(signal.SIGCONT)
     said, warned = listed.communicate(timeout=WITHIN)
     assert (len(said.splitlines()), warned) == (21, "")

@@ -22,18 +22,22 @@ from autograder.grading.runner import Settings
 from autograder.grading.validation import TOO_BUSY, lacks_a_result
 from autograder.sandbox.isolation import preflight
 
-NEEDS_A_CPU = """
+COMPUTES_FIRST = """
 import time
 import rclpy
 from std_msgs.msg import String
 rclpy.init()
 node = rclpy.create_node("talker")
 publisher = node.create_publisher(String, "/talk", 10)
-while time.thread_time() < 0.8:
+while not publisher.get_subscription_count():
+    time.sleep(0.01)
+until = time.thread_time() + 0.3
+while time.thread_time() < until:
     pass
 node.create_timer(0.1, lambda: publisher.publish(String(data="hello")))
 rclpy.spin(node)
 """
+"""Needs 0.3 s of a CPU once somebody listens: 5 s of its time where sixteen others want it, and a check waits for 3."""
 CHECK = """
 with launch("p") as ros:
     ros.expect_node("/talker", within=60)
@@ -60,10 +64,10 @@ while True: pass
 
 @pytest.fixture
 def crowded_cpu() -> Iterator[str]:
-    """Eight strangers that compute on one CPU; gives its number."""
+    """Sixteen strangers that compute on one CPU; gives its number."""
     cpu = str(max(os.sched_getaffinity(0)))
     command = [sys.executable, "-c", STRANGER, cpu]
-    strangers = [int(subprocess.run(command, stdout=subprocess.PIPE, check=True).stdout) for _ in range(8)]
+    strangers = [int(subprocess.run(command, stdout=subprocess.PIPE, check=True).stdout) for _ in range(16)]
     yield cpu
     for stranger in strangers:
         os.kill(stranger, signal.SIGKILL)
@@ -76,7 +80,7 @@ def test_a_program_that_others_kept_from_the_cpu_gets_its_points(crowded_cpu: st
         Cell(grade_id="set_up", source="from autograder.checks import launch\nfrom std_msgs.msg import String"),
         Cell(grade_id="check", points=1, source=CHECK),
     ]
-    what = {"files": {"p.py": NEEDS_A_CPU}, "cells": cells, "isolation": Isolation.FULL}
+    what = {"files": {"p.py": COMPUTES_FIRST}, "cells": cells, "isolation": Isolation.FULL}
     job = Job(student="ann", lab="toy", digest="0", seed=1, **what)
     command = [sys.executable, "-c", GRADE, crowded_cpu]
     ran = subprocess.run(command, input=job.model_dump_json(), capture_output=True, text=True, check=True)
