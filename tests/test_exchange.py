@@ -12,8 +12,8 @@ import toy
 
 from autograder.course.lab import grade_id_of
 from autograder.gradebook.class_run import grade_class
-from autograder.gradebook.own_courses import trust
-from autograder.gradebook.settings import TEMPLATE, settings_of
+from autograder.gradebook.own_courses import TEMPLATE, trust
+from autograder.gradebook.settings import settings_of
 from autograder.grading.runner import Settings
 
 KIT = Path(__file__).resolve().parent.parent
@@ -44,6 +44,7 @@ def test_a_lab_goes_out_and_feedback_comes_back_through_the_exchange(tmp_path: P
     (root / "nbgrader_config.py").write_text(TEMPLATE.read_text(encoding="utf-8") + settings, encoding="utf-8")
     cache = f"get_config().Exchange.cache = {str(tmp_path / 'cache')!r}\n"
     (student / "nbgrader_config.py").write_text(settings + cache, encoding="utf-8")
+    trust(root)
     trust(student)
     (root / "solutions" / "toy" / "map.txt").write_text("a file of the lab")
 

@@ -23,11 +23,12 @@ from autograder.core.results import Isolation
 from autograder.course.lab import Lab, grade_id_of, load_lab
 from autograder.gradebook.class_run import grade_class
 from autograder.gradebook.grades import write_grades
+from autograder.gradebook.own_courses import TEMPLATE, trust
 from autograder.gradebook.preparation import prepare_nbgrader
 from autograder.gradebook.recorder import Recorder
 from autograder.gradebook.release import register
 from autograder.gradebook.scores import read_grades
-from autograder.gradebook.settings import TEMPLATE, settings_of
+from autograder.gradebook.settings import settings_of
 from autograder.grading import runner
 from autograder.grading.executors import local
 from autograder.grading.runner import Settings
@@ -343,6 +344,7 @@ def test_a_courses_configuration_leaves_the_kit_where_python_finds_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "nbgrader_config.py").write_text(TEMPLATE.read_text(encoding="utf-8") + LATE, encoding="utf-8")
+    trust(tmp_path)
     monkeypatch.setattr(sys, "path", [str(KIT), *(folder for folder in sys.path if folder != str(KIT))])
     monkeypatch.chdir(KIT)
     settings_of(tmp_path)
@@ -354,6 +356,7 @@ def test_who_is_late_has_the_same_score_everywhere(tmp_path: Path, monkeypatch: 
     late = Course(tmp_path / "course")
     template = TEMPLATE.read_text(encoding="utf-8")
     (late.root / "nbgrader_config.py").write_text(template + LATE, encoding="utf-8")
+    trust(late.root)
     for student, hour in (("ann", "11:59"), ("bob", "14:10")):
         notebook = toy.hand_in(tmp_path / "class", student, late.cells())
         notebook.with_name("timestamp.txt").write_text(f"2026-11-02 {hour}:00.5 UTC\n", encoding="utf-8")

@@ -17,7 +17,8 @@ from autograder.authoring.new import new_course
 from autograder.core.errors import KitError
 from autograder.core.version import VERSION
 from autograder.course.paths import CoursePaths
-from autograder.gradebook.settings import gradebook_address
+from autograder.gradebook.own_courses import TEMPLATE, trust
+from autograder.gradebook.settings import gradebook_address, settings_of
 
 KIT = Path(__file__).resolve().parent.parent
 LAB = "lab2_talkers"
@@ -163,9 +164,20 @@ def test_an_address_that_no_gradebook_can_have_is_said_to_be_one(address: str, t
     (tmp_path / "nbgrader_config.py").write_text(
         f"get_config().CourseDirectory.db_url = {address!r}\n", encoding="utf-8"
     )
+    trust(tmp_path)
     with pytest.raises(KitError) as refused:
         gradebook_address(tmp_path)
     assert told in refused.value.what and "nbgrader_config.py" in refused.value.what and refused.value.do
+
+
+def test_settings_in_a_folder_that_nobody_called_a_course_are_no_program_to_run(tmp_path: Path) -> None:
+    """As in an unpacked submission, which can look like a course."""
+    config = tmp_path / "nbgrader_config.py"
+    config.write_text(f"open({str(tmp_path / 'ran')!r}, 'w')\n", encoding="utf-8")
+    for read in (settings_of, gradebook_address):
+        with pytest.raises(KitError) as refused:
+            read(tmp_path)
+        assert f"autograder trust {tmp_path}" in refused.value.do and not (tmp_path / "ran").exists()
 
 
 def test_a_course_is_begun_in_no_folder_that_holds_something_and_keeps_grades_out_of_git(tmp_path: Path) -> None:
@@ -279,6 +291,4 @@ def test_a_course_that_lists_a_lab_it_does_not_have_is_told_so(course: Path, tmp
 
 
 def test_this_repositorys_configuration_is_what_a_new_course_gets() -> None:
-    from autograder.gradebook.settings import TEMPLATE
-
     assert (KIT / "nbgrader_config.py").read_text() == TEMPLATE.read_text()

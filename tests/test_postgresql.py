@@ -15,7 +15,7 @@ import pytest
 import toy
 
 from autograder.course.lab import load_lab
-from autograder.gradebook.settings import TEMPLATE
+from autograder.gradebook.own_courses import TEMPLATE, trust
 
 KIT = Path(__file__).resolve().parent.parent
 PROGRAMS = max(Path("/usr/lib/postgresql").glob("*/bin"), default=None)  # where Debian puts them
@@ -93,6 +93,7 @@ def test_a_class_is_graded_into_a_server_and_again(server: str, tmp_path: Path) 
     root = toy.make_course(tmp_path / "course")
     setting = f"get_config().CourseDirectory.db_url = {server!r}  # noqa: F821\n"
     (root / "nbgrader_config.py").write_text(TEMPLATE.read_text(encoding="utf-8") + setting, encoding="utf-8")
+    trust(root)
     lab = load_lab(root, toy.LAB)
     sources = {"talker": "%%node talker\nprint('hello')", "answers": "%%file answers.yaml\nanswer: 42", "why": "So."}
     for student in ("ann", "bob"):

@@ -10,7 +10,8 @@ from autograder.core.errors import KitError
 from autograder.core.files import write_beside
 from autograder.course.paths import CoursePaths
 from autograder.course.settings import SETTINGS_FILE
-from autograder.gradebook.settings import CONFIG_FILE, TEMPLATE
+from autograder.gradebook.own_courses import TEMPLATE
+from autograder.gradebook.settings import CONFIG_FILE
 
 FIRST_LAB = "lab1_greeter"
 _TEMPLATES = Path(__file__).with_name("templates")

@@ -7,7 +7,8 @@ from pathlib import Path
 from autograder.core.files import write_beside
 from autograder.course.paths import CoursePaths
 from autograder.course.settings import SETTINGS_FILE
-from autograder.gradebook.settings import CONFIG_FILE, TEMPLATE
+from autograder.gradebook.own_courses import TEMPLATE
+from autograder.gradebook.settings import CONFIG_FILE
 
 
 def sample_course(root: Path) -> Path:

@@ -32,7 +32,7 @@ def new_course(
 
 @app.command()
 def trust(folder: Annotated[Path, typer.Argument(metavar="DIR", help="The folder of a course of yours.")]) -> None:
-    """Say that a folder is a course of yours, so that nbgrader started in it runs its nbgrader_config.py."""
+    """Say that a folder is a course of yours: its nbgrader_config.py, which is a program, may run then."""
     from autograder.course.folder import course_root
     from autograder.gradebook.own_courses import trust as note
 

@@ -10,7 +10,7 @@ from typing import Any
 from autograder.core.errors import KitError
 from autograder.course.paths import CoursePaths
 from autograder.gradebook.backup import file_of
-from autograder.gradebook.own_courses import TEMPLATE as TEMPLATE
+from autograder.gradebook.own_courses import TEMPLATE, may_run
 
 CONFIG_FILE = "nbgrader_config.py"
 _KIT = str(Path(__file__).resolve().parents[2])
@@ -93,5 +93,17 @@ def gradebook_place(root: Path) -> str:
 
 
 def _says_more(root: Path) -> bool:
+    """Whether a course has settings of its own.
+
+    Raises:
+        KitError: it has, and they may be a program of somebody else's.
+    """
     own = root / CONFIG_FILE
-    return own.is_file() and own.read_text(encoding="utf-8") != TEMPLATE.read_text(encoding="utf-8")
+    if not own.is_file() or own.read_text(encoding="utf-8") == TEMPLATE.read_text(encoding="utf-8"):
+        return False
+    if not may_run(own):
+        raise KitError(
+            f"{own} is a program, and it is not known to be yours. Nothing of it was run.",
+            f"If this folder is your course, and not what somebody handed in, say once: autograder trust {root}",
+        )
+    return True
