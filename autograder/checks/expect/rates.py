@@ -12,7 +12,10 @@ _SHORT = 0.5
 """The share of a period below which a gap is short: a timer that was held up makes one, two timers make many."""
 
 _IN_A_ROW = 4
-"""How many gaps in a row have to be of the right length together."""
+"""How many gaps in a row have to be of the right length together, where there are few of them."""
+
+_MANY = 7
+"""From so many gaps on, a slower timer would have to be held up again and again for just as long."""
 
 
 def _gaps(received: Sequence[Received], every: bool) -> list[float]:
@@ -49,13 +52,14 @@ def _in_bursts(gaps: Sequence[float], period: float) -> bool:
 
 
 def in_time(received: Sequence[Received], rate: float, tolerance: float, every: bool = True) -> bool:
-    """Whether somewhere among these messages a timer of this rate was in time for four periods, or for all there are.
+    """Whether messages are so many that the median tells their rate, or a timer of this rate was in time for a while.
 
     A timer that is held up less and less long makes short gaps, but it keeps its beat: from the first to the last of n
-    calls at least n - 2 of its periods go by (rcl, `rcl_timer_call`). A slower one never looks in time for so long.
+    calls at least n - 2 of its periods go by (rcl, `rcl_timer_call`). A slower one never looks in time for four periods.
     The arguments are those of `at_rate`.
     """
-    return _quickest(_gaps(received, every)) <= (1 + tolerance) / rate
+    gaps = _gaps(received, every)
+    return len(gaps) >= _MANY or _quickest(gaps) <= (1 + tolerance) / rate
 
 
 def _quickest(gaps: Sequence[float]) -> float:
@@ -67,7 +71,7 @@ def _quickest(gaps: Sequence[float]) -> float:
 def too_slow(received: Sequence[Received], rate: float, every: bool = True) -> bool:
     """Whether messages come less often than at this rate: what a busy machine makes of the right one, too."""
     gaps = _gaps(received, every)
-    return not gaps or statistics.median(gaps) > 1 / rate or _quickest(gaps) > 1 / rate
+    return not gaps or statistics.median(gaps) > 1 / rate or (len(gaps) < _MANY and _quickest(gaps) > 1 / rate)
 
 
 def in_words(received: Sequence[Received], every: bool = True) -> str:
