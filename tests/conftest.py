@@ -13,7 +13,12 @@ import kill_matrix
 import pytest
 from hypothesis import HealthCheck, settings
 
+from autograder.sandbox.environment import profile_environment
+
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+
+# Fast DDS reads its profile once in a process, for the first participant: that is the kit's in every process of tests.
+os.environ.update(profile_environment())
 
 # Courses of tests are nobody's, and stand in nobody's list.
 os.environ["XDG_CONFIG_HOME"] = tempfile.mkdtemp(prefix="autograder-tests-")
