@@ -9,6 +9,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -30,7 +31,8 @@ from std_msgs.msg import Int64
 
 from autograder.checks.concurrency import Concurrency
 from autograder.checks.program import Program
-from autograder.core.cpu_use import CpuUse, CpuWait, cpu_uses, kept_waiting
+from autograder.core import cpu_use
+from autograder.core.cpu_use import CpuUse, CpuWait, Withheld, cpu_uses, kept_waiting
 from autograder.core.errors import KitError
 from autograder.graph.domains import claim_domain
 from autograder.graph.names import nearest
@@ -220,6 +222,36 @@ def test_a_program_that_only_computes_gains_no_time_by_it() -> None:
     assert kept_waiting({}, {HOG: had(10.0, *threads)})[HOG] == 0.0
     quota = {HOG: had(10.0, (2.5, 7.5)), NODE: had(10.0, (0.1, 2.5), (0.0, 0.0))}  # a quarter of a CPU, all used up
     assert kept_waiting(NOTHING_YET, quota, share=0.25) == {HOG: 0.0, NODE: 0.0}
+
+
+def test_a_thread_that_runs_without_a_break_has_not_waited() -> None:
+    before = {NODE: CpuUse(1.0, 10.0, {1: CpuWait(10.0, 1.0, 0.0, 5, ready=True)})}
+    after = {NODE: CpuUse(2.0, 11.0, {1: CpuWait(11.0, 2.0, 0.0, 5, ready=True)})}
+    assert kept_waiting(before, after) == {NODE: 0.0}
+
+
+def test_one_long_wait_counts_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The kernel says how long it was when it is over; up to then the clock does."""
+    looks = [(0.0, 0.0, 1), (1.0, 0.0, 1), (2.0, 0.0, 1), (3.0, 3.0, 2)]  # when, and what the kernel counts by then
+    clock = iter([100.0, 101.0, 102.0, 103.0])
+    seen = iter(
+        {NODE: CpuUse(0.0, 10.0, {1: CpuWait(when, 0.0, waited, turns, ready=True)})} for when, waited, turns in looks
+    )
+    monkeypatch.setattr(cpu_use.time, "monotonic", lambda: next(clock))
+    monkeypatch.setattr(cpu_use, "cpu_uses", lambda: next(seen))
+    withheld = Withheld()
+    for _ in looks:
+        withheld.measure()
+    assert withheld.from_one(100.0) == pytest.approx(3.0)
+
+
+def test_what_a_program_had_before_its_end_counts_where_it_was_used() -> None:
+    """Its parent's account takes in all of it at once when it ends."""
+    before = {HOG: had(10.0, (9.0, 0.0)), NODE: had(10.0, (0.1, 0.0))}
+    crowded = {NODE: replace(had(11.0, (0.1, 0.8)), children=9.0)}
+    assert kept_waiting(before, crowded)[NODE] == pytest.approx(0.8)
+    forks = {**before, NODE: replace(had(11.0, (0.1, 0.8)), children=1.0)}  # of its own that lived for a moment
+    assert kept_waiting(before, forks)[NODE] == 0.0
 
 
 def test_what_others_took_was_withheld_from_who_computes_too() -> None:

@@ -6,7 +6,7 @@ import contextlib
 import os
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
 
 from autograder.core.processes import cpu_time, descendants, read_text, stat_fields, threads
@@ -16,6 +16,8 @@ _CPU_TO_BEGIN = 1.0
 _PIECE = 1.0
 """Seconds between two measurements."""
 _CPUS = "AUTOGRADER_CPUS"
+_TICKS = os.sysconf("SC_CLK_TCK")
+"""How many of the kernel's units of time a second has."""
 
 
 @dataclass(frozen=True)
@@ -38,16 +40,19 @@ class CpuWait:
 class CpuUse:
     """What a process has had of the CPUs."""
 
-    cpu: float
+    own: float
     """Seconds, of all its threads, those that have ended included."""
     age: float
     """Seconds since it began."""
     threads: dict[int, CpuWait]
+    children: float = 0.0
+    """Seconds of those of its children that have ended."""
 
     def computes(self) -> bool:
         """Whether it has computed for most of the time in which nobody kept it from that."""
         free = self.age - max((wait.waited for wait in self.threads.values()), default=0.0)
-        return self.cpu > _CPU_TO_BEGIN and self.cpu > free / 2
+        cpu = self.own + self.children
+        return cpu > _CPU_TO_BEGIN and cpu > free / 2
 
 
 def computes(pid: int) -> bool:
@@ -75,9 +80,9 @@ def cpu_uses() -> dict[int, CpuUse]:
 
 def _use(pid: int) -> CpuUse:
     fields = stat_fields(f"/proc/{pid}")
-    began = int(fields[19]) / os.sysconf("SC_CLK_TCK")
-    threads = _cpu_waits(pid)
-    return CpuUse(cpu_time(pid), time.clock_gettime(time.CLOCK_BOOTTIME) - began, threads)
+    user, system, childrens_user, childrens_system, *_, began = (int(field) / _TICKS for field in fields[11:20])
+    age = time.clock_gettime(time.CLOCK_BOOTTIME) - began
+    return CpuUse(user + system, age, _cpu_waits(pid), childrens_user + childrens_system)
 
 
 def _cpu_waits(pid: int) -> dict[int, CpuWait]:
@@ -94,19 +99,22 @@ def _cpu_waits(pid: int) -> dict[int, CpuWait]:
 def kept_waiting(before: dict[int, CpuUse], after: dict[int, CpuUse], share: float = 1.0) -> dict[int, float]:
     """Return by how many seconds each of these processes may have been late because of others.
 
-    A wait counts only as far as its own kind cannot have caused it: the time for which the rest of these threads had a
-    CPU is taken off. So who computes on and on, in however many threads and processes, gains nothing by it. The threads
-    of a process wait side by side.
+    The CPU time of the other threads of this launch is subtracted from a wait, because they may have caused that part
+    themselves. So a program that computes all the time, in however many threads and processes, gains nothing by it. The
+    threads of a process wait side by side.
 
     Args:
         before: what each of them had of the CPUs.
         after: and what it had later.
-        share: of one CPU that all of them together may have; 1.0 if they may have a whole one. Who computes on and on
-            uses that up, and then all of them wait.
+        share: of one CPU that all of them together may have; 1.0 if they may have a whole one. A program that computes
+            all the time uses up the quota, and then every process waits.
     """
     weight = {pid: 1 / share if pid != os.getpid() and use.computes() else 1.0 for pid, use in after.items()}
-    used = {pid: use.cpu - (before[pid].cpu if pid in before else 0.0) for pid, use in after.items()}
-    together = sum(weight[pid] * used[pid] for pid in after)
+    together = sum(weight[pid] * (use.own - (before[pid].own if pid in before else 0.0)) for pid, use in after.items())
+    # What has ended is in its parent's account now, with all that it had before this piece.
+    ended = sum(use.children for use in after.values()) - sum(before[pid].children for pid in before if pid in after)
+    known_before = sum(use.own + use.children for pid, use in before.items() if pid not in after)
+    together += max(0.0, ended - known_before) / share
     kept = {}
     for pid, use in after.items():
         known = before[pid].threads if pid in before else {}
@@ -119,10 +127,28 @@ def _since(before: CpuWait | None, after: CpuWait) -> tuple[float, float]:
     """For how many seconds a thread has waited since then, and for how many it ran."""
     if before is None:
         before = CpuWait(after.when, 0.0, 0.0, 0, ready=False)
-    waited = after.waited - before.waited
-    if after.ready and before.ready and after.turns == before.turns:
-        waited = after.when - before.when  # the kernel adds a wait when it is over, and this one is not
-    return waited, after.used - before.used
+    used = after.used - before.used
+    if _still_waits(before, after):
+        return max(0.0, after.when - before.when - used), used
+    return max(0.0, after.waited - before.waited), used
+
+
+def _still_waits(before: CpuWait, after: CpuWait) -> bool:
+    """Whether a thread has waited, or run, without a break since then: the kernel adds a wait when it is over."""
+    return after.ready and before.ready and after.turns == before.turns
+
+
+def _with_open_waits(before: dict[int, CpuUse], after: dict[int, CpuUse]) -> dict[int, CpuUse]:
+    """Return what the processes had later, with the waits that are not over, so that none is counted a second time."""
+    noted = {}
+    for pid, use in after.items():
+        threads = dict(use.threads)
+        for thread, known in before[pid].threads.items() if pid in before else ():
+            if thread in threads and _still_waits(known, threads[thread]):
+                waited, _ = _since(known, threads[thread])
+                threads[thread] = replace(threads[thread], waited=known.waited + waited)
+        noted[pid] = replace(use, threads=threads)
+    return noted
 
 
 class Withheld:
@@ -147,6 +173,7 @@ class Withheld:
         if self._before is not None:
             kept = kept_waiting(self._before[1], uses, self._share).values()
             self._pieces.append((self._before[0], now, sum(kept), max(kept, default=0.0)))
+            uses = _with_open_waits(self._before[1], uses)
         self._before = now, uses
 
     def from_all(self, when: float) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 
 from autograder.core.cpu_use import Withheld
@@ -11,13 +12,13 @@ PATIENCE = 60.0
 STRETCH = 3.0
 """How often its own length one wait may take."""
 ALONE = 300.0
-"""Seconds in place of both where a check is run alone, and nothing comes after it: a wait may take all of them."""
+"""Seconds by which all waits of a check together may grow where it runs alone; a single wait may take all of them."""
 _SHORT = 0.1
-"""Seconds of which it does not pay to ask what was withheld in them."""
+"""Seconds after which it pays to measure again what was withheld."""
 _TOLERATED = 0.5
 """Seconds that a long wait may lack, and a short one a quarter of its length: nowhere is a CPU free at any moment."""
 _SHARE, _SHARE_ALONE = 0.25, 0.5
-"""The share of a time that may have been withheld from what was measured in it: the median of periods bears half."""
+"""A measurement is trusted if no more than this share of its time was withheld; a median stands up to one half."""
 
 
 class Patience:
@@ -31,7 +32,7 @@ class Patience:
         """All of it is left."""
         self.left = ALONE if alone else PATIENCE
         self.withheld = Withheld()
-        self._stretch = 1 + ALONE if alone else STRETCH
+        self._stretch = math.inf if alone else STRETCH
         self._share = _SHARE_ALONE if alone else _SHARE
         self._lacked = 0.0
         """The most that one of the waits in vain lacked since something was decided last."""
@@ -39,6 +40,7 @@ class Patience:
         """Seconds of those waits together."""
         self._since = time.monotonic()
         """When something was decided last."""
+        self._sure = False
 
     def more(self, began: float, within: float) -> float:
         """Return how many seconds longer a wait may take that began then: as long as its time was withheld."""
@@ -51,7 +53,7 @@ class Patience:
         over = now - began - within
         self.left -= max(0.0, over)
         if not came:
-            # Who gives a wait up has looked at that himself.
+            # A wait that was given up early has taken into account already what was withheld.
             lacked = self.kept(began) - over if over >= 0 else 0.0
             if lacked > min(_TOLERATED, within / 4):
                 self._lacked = max(self._lacked, lacked)
@@ -64,7 +66,11 @@ class Patience:
 
     def passed(self) -> None:
         """Something was decided in favour of the program."""
-        self._lacked, self._in_vain, self._since = 0.0, 0.0, time.monotonic()
+        self._lacked, self._in_vain, self._since, self._sure = 0.0, 0.0, time.monotonic(), False
+
+    def is_sure(self) -> None:
+        """What is decided next is so on every machine, however long it takes to look for the reason."""
+        self._sure = True
 
     def decided(self) -> float:
         """Return the seconds that were lacking for what is decided now, from the last time that something was.
@@ -75,6 +81,6 @@ class Patience:
         kept, now = self.kept(self._since), time.monotonic()
         took = now - self._since
         measured = kept if kept > self._share * took and self._in_vain < took / 2 else 0.0
-        lacked = max(self._lacked, measured)
+        lacked = 0.0 if self._sure else max(self._lacked, measured)
         self.passed()
         return lacked

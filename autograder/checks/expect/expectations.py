@@ -90,9 +90,9 @@ class Expectations:
         return self.wait(ready, within, needs=ready)
 
     def _sure_if(self, quicker: bool) -> None:
-        """Note that what is decided next does not depend on the machine: nothing is quicker where others compute."""
+        """Note that what is decided next does not depend on the machine: a busy one never makes a program faster."""
         if quicker:
-            self._observer.patience.passed()
+            self._observer.patience.is_sure()
 
     def _fail(
         self, title: str, reason: Diagnosis | None, *, expected: str = "", observed: str = "", hint: str = ""
