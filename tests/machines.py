@@ -144,7 +144,10 @@ def main() -> int:
     parser.add_argument("--here", action="store_true", help=argparse.SUPPRESS)
     options = parser.parse_args()
     lab = load_lab(sample_class.ROOT, options.lab)
-    students = options.students or sample_class.students(lab.name)
+    everyone = sample_class.students(lab.name)
+    if unknown := sorted(set(options.students) - set(everyone)):
+        parser.error(f"{lab.name} has no sample student {', '.join(unknown)}")
+    students = options.students or everyone
     if options.here:
         checks = graded(lab, students)
         out = {student: [check.model_dump(mode="json") for check in one] for student, one in checks.items()}
