@@ -235,6 +235,8 @@ def test_undecided_checks_are_listed_for_the_instructor() -> None:
     undecided = result(check(None, outcome(Status.UNKNOWN, because="The observer died.")), student="bob")
     assert undecided_view([decided]) is None
     assert "bob: The talker: The observer died." in text_of(undecided_view([decided, undecided]))
+    unread = [check(None, outcome(Status.UNKNOWN, because="It is no notebook."), grade_id=name) for name in "abc"]
+    assert "eve: everything: It is no notebook." in text_of(undecided_view([result(*unread, student="eve")]))
     assert "?" in text_of(class_view([undecided], {}))
 
 

@@ -243,13 +243,7 @@ def _legend(checks: Sequence[CheckResult]) -> list[str]:
 
 def undecided_view(results: Sequence[SubmissionResult]) -> RenderableType | None:
     """Return what an instructor has to decide by hand or to look at, with the cause; None if there is nothing."""
-    lines = [
-        Text(f"  {plain(result.student)}: {plain(check.title or check.grade_id)}: ")
-        + Text(plain(reason(check.first_failure)) if check.first_failure else "no outcome")
-        for result in results
-        for check in result.checks
-        if check.status is Status.UNKNOWN
-    ]
+    lines = [Text(f"  {plain(line)}") for result in results for line in _undecided(result)]
     flagged = [Text(f"  {plain(result.student)}: {plain(flag)}") for result in results for flag in result.flags]
     found = []
     if lines:
@@ -258,6 +252,20 @@ def undecided_view(results: Sequence[SubmissionResult]) -> RenderableType | None
     if flagged:
         found += [Text("The points of these stand, and a person should look at them:", "bold magenta"), *flagged]
     return Group(*found) if found else None
+
+
+def _undecided(result: SubmissionResult) -> list[str]:
+    """A line for each cause that left checks of a submission undecided, with all of these checks."""
+    by_cause: dict[str, list[str]] = {}
+    for check in result.checks:
+        if check.status is Status.UNKNOWN:
+            cause = reason(check.first_failure) if check.first_failure else "no outcome"
+            by_cause.setdefault(cause, []).append(check.title or check.grade_id)
+    named = {
+        cause: "everything" if 1 < len(which) == len(result.checks) else "; ".join(dict.fromkeys(which))
+        for cause, which in by_cause.items()
+    }
+    return [f"{result.student}: {which}: {cause}" for cause, which in named.items()]
 
 
 _LINES = 3
