@@ -10,17 +10,15 @@ import os
 import socket
 import subprocess
 import sys
-from collections.abc import Iterator
 
 import pytest
 from std_msgs.msg import Int64
+from test_side_by_side import WITHIN, started  # noqa: F401
 
 from autograder.graph.domains import claim_domain
 from autograder.graph.observer import Observer
 from autograder.sandbox.environment import GROUP, profile_environment
 
-WITHIN = 120
-"""Far beyond what a start takes on a busy machine, in seconds."""
 TALKS = """
 import sys
 import rclpy
@@ -96,17 +94,8 @@ CASES = {name: (settings, ("stranger", "/")) for name, settings in STRANGERS.ite
 CASES |= {name: ({}, called) for name, called in NAMES.items()}
 
 
-@pytest.fixture
-def started() -> Iterator[list[subprocess.Popen[str]]]:
-    processes: list[subprocess.Popen[str]] = []
-    yield processes
-    for process in processes:
-        process.kill()
-        process.communicate()
-
-
 @pytest.mark.parametrize("case", CASES)
-def test_a_launch_hears_no_stranger(case: str, started: list[subprocess.Popen[str]]) -> None:
+def test_a_launch_hears_no_stranger(case: str, started: list[subprocess.Popen[str]]) -> None:  # noqa: F811
     settings, (name, namespace) = CASES[case]
     plain = {key: value for key, value in os.environ.items() if not key.startswith(("FASTRTPS", "ROS_", GROUP))}
     plain["ROS_LOG_DIR"] = os.environ["ROS_LOG_DIR"]
