@@ -611,6 +611,22 @@ def test_a_wait_says_what_it_waits_for_and_cleans_up(notebook: Notebook) -> None
     assert "\n\n✓ passed" in shown.text
 
 
+def test_a_check_that_fails_where_others_have_the_cpus_says_so(notebook: Notebook) -> None:
+    """The kernel and its programs are kept from the CPUs as on a busy machine; what was measured stands for that."""
+    write(notebook)
+    notebook.run(
+        "from autograder.graph.patience import Patience\nreal = Patience.decided\nPatience.decided = lambda self: 3.2"
+    )
+
+    def told(check: str) -> bool:
+        return "for 3.2 s of the time in which this was decided." in " ".join(notebook.run(check).text.split())
+
+    fails = CHECK.replace("at_least=2", "at_least=2, at_most=0")
+    assert told(fails) and not told(CHECK)
+    notebook.run("Patience.decided = real")
+    assert not told(fails)
+
+
 def test_an_interrupted_check_has_no_verdict_wherever_that_finds_it(notebook: Notebook) -> None:
     """At any moment: in the kit's set-up, in a wait, in the check's own lines, at the end of the block."""
     write(notebook)

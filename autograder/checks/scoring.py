@@ -89,7 +89,18 @@ def _in_notebook(result: CellResult, used: set[str]) -> Score:
     here = runtime.current.front_end
     if here is None:
         return Score(result)
-    return Score(result, here.remarks(used), here.origin(used))
+    return Score(result, [*here.remarks(used), *_too_busy(result)], here.origin(used))
+
+
+def _too_busy(result: CellResult) -> list[str]:
+    """What to do about points that were lost while others had the CPUs."""
+    if result.starved <= 0 or result.points == result.max_points:
+        return []
+    return [
+        f"Other programs on this machine kept yours from the CPU for {result.starved:.1f} s of the time in which this"
+        " was decided. Before you look for a mistake, run this cell again when the machine has less to do. At grading"
+        " such a check is run again by itself."
+    ]
 
 
 def _by_part(points: float | Mapping[str, float], found: list[Outcome]) -> Mapping[str, float]:
