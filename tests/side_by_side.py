@@ -193,7 +193,10 @@ class Seen:
 
 
 def as_user(user: int) -> list[str]:
-    """Begin a command line with this, to be another user who may still read where root's Python lies."""
+    """Begin a command line with this, to be another user who may still read where root's Python lies.
+
+    CMake asks with access(2), which knows of no such right: lab 7 needs a Python in folders that everybody may enter.
+    """
     caps = ["--inh-caps=+dac_read_search", "--ambient-caps=+dac_read_search"]
     return ["setpriv", f"--reuid={user}", f"--regid={user}", "--clear-groups", *caps] if os.getuid() == 0 else []
 
