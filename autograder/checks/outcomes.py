@@ -43,11 +43,15 @@ class LaunchEnded(CheckEnded):
     """The launch, or the table, failed as a whole: none of its parts is worth anything."""
 
 
-def ends_block(error: BaseException | None) -> bool:
-    """What becomes of an exception that leaves a launch or a table: whether Python is to forget it.
+def ends_block(error: BaseException | None, ran: bool = False) -> bool:
+    """What becomes of an exception that leaves a launch, a build or a table: whether Python is to forget it.
 
     A check that breaks at grading says nothing about the student: the instructor decides. In a notebook the error is
     the student's to see.
+
+    Args:
+        error: the exception.
+        ran: something of the student's has run, besides the programs of a launch.
     """
     if error is None or isinstance(error, CheckEnded):
         return True
@@ -56,7 +60,7 @@ def ends_block(error: BaseException | None) -> bool:
             failed_as_a_whole("The ROS graph can be read", because=_FORGED, code="forged-graph")
         return True
     if isinstance(error, KitError):  # such as a machine without a compiler
-        if runtime.current.block is not None:  # its programs run, and may have brought it about
+        if ran or runtime.current.block is not None:  # what the student wrote may have brought it about
             _flag(error)
         unknown("This can be found out on this machine", " ".join(part for part in (error.what, error.do) if part))
         return True
