@@ -67,7 +67,7 @@ def run_job(job: Job, folder: Path, stacks: TextIO = sys.stderr) -> Iterator[Che
             findings.current.reset()
             runtime.current.vary_for(f"{job.seed} {cell.grade_id}")
             faulthandler.dump_traceback_later(limit + STUCK_SECONDS, exit=True, file=stacks)
-            error, value = _run_cell(cell, number, namespace, limit)
+            error, value = _run_cell(cell, number, namespace, limit, CELL_CPU_SECONDS)
             faulthandler.cancel_dump_traceback_later()
             if cell.points is None:
                 broken_set_up = broken_set_up or error
@@ -138,7 +138,7 @@ def _out_of_time(*_: object) -> None:
 
 
 def _out_of_cpu(*_: object) -> None:
-    raise TimeoutError("the check took more of the grader's own CPU time than it may: far too much came in to look at")
+    raise unusable.OutOfBudget("the check took more of the grader's own CPU time than it may")
 
 
 def _run_cell(
