@@ -17,6 +17,7 @@ from sample_class import ROOT
 from std_msgs.msg import Int64, String
 from test_checks import Grade, grade  # noqa: F401  a fixture
 
+from autograder.checks import outcomes
 from autograder.checks.expect.meanwhile import MeanwhileExpectations
 from autograder.core.results import CheckResult, Status
 from autograder.course.lab import Cell, load_lab
@@ -212,6 +213,16 @@ class Counted(float):
     def __gt__(self, other: float) -> bool:
         Counted.compared += 1
         return float.__gt__(self, other)
+
+
+def test_each_message_is_looked_at_once_and_a_long_text_is_cut_before_it_is_kept(grade: Grade) -> None:  # noqa: F811
+    more = """looked_at = []
+    ros.expect_messages("/sent", TYPE, at_least=40, where=lambda m: looked_at.append(m) or True)
+    ros.require(len(looked_at) <= ros.listen("/sent", TYPE).count, "Each message is looked at once")
+    ros.require(False, "It is long", because="x" * 1_000_000)"""
+    result = sent(grade, "std_msgs/String", "", more.replace("TYPE", "String"))
+    assert [outcome.title for outcome in result.outcomes if outcome.status is Status.FAILED] == ["It is long"]
+    assert len(result.outcomes[-1].because) < 2 * outcomes.TEXT_KEPT
 
 
 def test_messages_during_runs_are_looked_up_and_not_counted_one_by_one() -> None:

@@ -11,6 +11,7 @@ from pathlib import Path
 import psutil
 import pytest
 
+from autograder.checks.outcomes import TEXT_KEPT
 from autograder.core.results import Isolation, NodeLog
 from autograder.grading import supervisor, worker
 from autograder.grading.job import CELL_SECONDS, Cell, Job
@@ -46,7 +47,7 @@ def test_a_text_that_explodes_is_cut_and_costs_no_other_check() -> None:
         )
     )
     assert [check.points for check in result.checks] == [1.0, 1.0, 1.0]
-    assert len(result.checks[0].outcomes[0].observed) < 2 * worker.TEXT_KEPT
+    assert len(result.checks[0].outcomes[0].observed) < 2 * TEXT_KEPT
     assert len(result.checks[1].outcomes) == worker.OUTCOMES_KEPT
 
 
