@@ -593,6 +593,26 @@ def test_a_build_about_which_nothing_is_known_raises_a_flag(tmp_path: Path, monk
     assert len(score.result.flags) == 1 and "too busy" in score.result.flags[0]
 
 
+@pytest.mark.parametrize(
+    "setup",
+    [
+        "import os\nos.kill(os.getpid(), 9)\n",
+        "import os\nos.write(2, b'c++: fatal error: Killed signal terminated program cc1plus')\nos._exit(1)\n",
+        "import os\nos.write(2, b'cc1: error: /tmp/x.s: No space left on device')\nos._exit(1)\n",
+    ],
+)
+def test_a_build_that_the_system_ends_each_time_costs_nothing_and_raises_a_flag(tmp_path: Path, setup: str) -> None:
+    for name, text in package("sensors", {**SENSORS, "setup.py": setup}).items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(text)
+    runtime.current.configure(tmp_path, Isolation.NONE, 1)
+    with build("sensors") as sensors:
+        sensors.expect_built()
+    score = sensors.score(1)
+    assert score.result.points is None and len(score.result.flags) == 1, score.result
+    assert "this says nothing about `sensors`" in score.result.outcomes[0].because
+
+
 def test_a_name_that_no_text_can_say_is_left_out_of_what_was_built() -> None:
     archive = io.BytesIO()
     with tarfile.open(fileobj=archive, mode="w", errors="surrogateescape") as tar:
