@@ -18,7 +18,8 @@ from boxes import ATTACKS, ROOT, RUN_STDIN, in_sandbox
 from autograder.core.errors import KitError
 from autograder.core.processes import descendants
 from autograder.core.results import Isolation
-from autograder.sandbox import isolation
+from autograder.sandbox import isolation, loop
+from autograder.sandbox.group import ProgramGroup
 from autograder.sandbox.isolation import Preflight, choose, preflight
 from autograder.sandbox.limits import Limits
 from autograder.sandbox.node_sandbox import NodeSandbox
@@ -268,6 +269,30 @@ def test_a_program_that_prints_without_end_waits_as_at_a_terminal(local: NodeSan
             assert program._changed.wait_for(lambda: b"waited" in program._tail[-30:] or not program.running(), 120)
         assert program.running() and program.truncated()
         assert program.output().startswith("first\n") and program.output().endswith("waited\n")
+
+
+def test_a_machine_that_looks_seldom_makes_no_program_wait_that_prints_a_lot(
+    local: NodeSandbox, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    looks, over, watch = [], threading.Event(), ProgramGroup.watch
+
+    def look(group: ProgramGroup) -> None:
+        if not over.is_set():
+            looks.append(watch(group))
+
+    monkeypatch.setattr(ProgramGroup, "watch", look)
+    monkeypatch.setattr(loop, "_LOOK_EVERY", 1.0)
+    (local.folder / "prints.py").write_text(
+        "import os, time\nwhile not os.path.exists('go'): time.sleep(0.01)\n"
+        "for _ in range(16): os.write(1, b'x' * 65536)\nprint('done', flush=True)\ntime.sleep(600)\n"
+    )
+    with local.group() as group:
+        program = group.start("prints")
+        _wait_for(lambda: len(looks) > 3, 120)
+        over.set()
+        (local.folder / "go").touch()
+        with program._changed:
+            assert program._changed.wait_for(lambda: program._tail.endswith(b"done\n"), 60)
 
 
 def test_one_launch_ends_its_own_programs_only(local: NodeSandbox) -> None:
