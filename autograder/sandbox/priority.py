@@ -44,7 +44,8 @@ class Priority:
         """
         with contextlib.suppress(OSError):
             self._behind = self._behind or self._goes_on_and_on(pid)
-            for thread in threads(pid) if self._behind else ():  # Linux keeps a nice value for each thread
+            # Linux keeps a nice value for each thread; threads inherit that of the thread that starts them.
+            for thread in threads(pid) if self._behind else ():
                 with contextlib.suppress(ProcessLookupError):
                     if os.getpriority(os.PRIO_PROCESS, thread) < LAST:
                         os.setpriority(os.PRIO_PROCESS, thread, LAST)
