@@ -184,7 +184,7 @@ def failed_as_a_whole(
 def _failure(
     title: str, expected: str = "", observed: str = "", because: str = "", hint: str = "", code: str = ""
 ) -> Outcome:
-    return worded(Status.FAILED, title, expected, observed, because, hint, code or "failed")
+    return worded(Status.FAILED, title, expected, observed, because, hint, code=code or "failed")
 
 
 def unknown(title: str, because: str) -> None:
