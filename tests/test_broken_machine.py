@@ -45,6 +45,13 @@ CHECKS = {
     "python": BUILD.replace("NAME", "sensors"),
     "interfaces": BUILD.replace("NAME", "interfaces"),
 }
+WAITS = """import signal, threading
+replaced = threading.Event()
+signal.signal(signal.SIGWINCH, lambda *_: replaced.set())
+assert replaced.wait(120)
+signal.signal(signal.SIGWINCH, signal.SIG_IGN)
+"""
+"""The head of a check that begins when this process is told that the files have been replaced."""
 SITE = sysconfig.get_path("purelib")
 SHARE = str(Path(sysconfig.get_path("data")) / "share")
 
@@ -117,13 +124,6 @@ def test_where_a_process_may_open_too_few_files_nothing_is_held_against_the_prog
     assert points(result) == {"launch": None}, result
 
 
-WAITS = """import signal, threading
-replaced = threading.Event()
-signal.signal(signal.SIGWINCH, lambda *_: replaced.set())
-assert replaced.wait(120)
-signal.signal(signal.SIGWINCH, signal.SIG_IGN)
-"""
-"""The head of a check that begins when this process is told that the files have been replaced."""
 REPLACED = ("ld.so.cache", "nsswitch.conf", "localtime", "passwd", "hosts")
 KILLED = {
     # which process: (its name, or a word of its command line; the check)
