@@ -21,7 +21,7 @@ CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", 
 os.environ.update(profile_environment())
 
 # Courses of tests are nobody's, and stand in nobody's list.
-os.environ["XDG_CONFIG_HOME"] = tempfile.mkdtemp(prefix="autograder-tests-")
+os.environ["XDG_CONFIG_HOME"] = NOBODYS = tempfile.mkdtemp(prefix="autograder-tests-")
 
 BROWSER_SECONDS = 180
 """Far beyond what a step of a browser takes on a busy machine."""
@@ -58,6 +58,11 @@ settings.load_profile("steady")
 
 # A shell starts what it puts into the background deaf to Ctrl-C, and so would be every program that a test interrupts.
 signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def pytest_unconfigure() -> None:
+    """Leave nothing behind."""
+    shutil.rmtree(NOBODYS, ignore_errors=True)
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

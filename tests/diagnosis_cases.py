@@ -843,6 +843,16 @@ CASES = {
         ask=trouble,
         never=("syntax-error", "exited", "not-spinning"),
     ),
+    "maps_more_than_there_is": Case(
+        main="import mmap, tempfile\nfile = tempfile.TemporaryFile()\nfile.truncate(4096)\n"
+        "mapped = mmap.mmap(file.fileno(), 4096)\nfile.truncate(0)\nmapped[0] = 1",
+        says="crashed",
+        because="a part of a mapped file",
+        ask=trouble,
+    ),
+    "ended_by_another_signal": Case(
+        main="import os\nos.abort()", says="crashed", because="was ended by signal 6.", ask=trouble
+    ),
     "done_callback_of_none": Case(
         "from rclpy.task import Future\nself.future = Future()\nself.future.add_done_callback(print('done'))\n"
         "self.create_timer(0.05, lambda: self.future.done() or self.future.set_result(1))\n",

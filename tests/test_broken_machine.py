@@ -8,9 +8,11 @@ from __future__ import annotations
 
 import contextlib
 import shutil
+import signal
 import subprocess
 import sysconfig
 import threading
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -43,6 +45,13 @@ CHECKS = {
     "python": BUILD.replace("NAME", "sensors"),
     "interfaces": BUILD.replace("NAME", "interfaces"),
 }
+WAITS = """import signal, threading
+replaced = threading.Event()
+signal.signal(signal.SIGWINCH, lambda *_: replaced.set())
+assert replaced.wait(120)
+signal.signal(signal.SIGWINCH, signal.SIG_IGN)
+"""
+"""The head of a check that begins when this process is told that the files have been replaced."""
 SITE = sysconfig.get_path("purelib")
 SHARE = str(Path(sysconfig.get_path("data")) / "share")
 
@@ -92,10 +101,19 @@ def test_a_wrong_package_is_still_wrong_if_the_tools_say_nothing_of_its_files() 
 def test_files_of_etc_that_are_replaced_while_a_submission_is_graded_cost_nothing(tmp_path: Path) -> None:
     etc = tmp_path / "etc"
     shutil.copytree("/etc", etc, symlinks=True, ignore=lambda _, names: [name for name in names if "shadow" in name])
-    checks = {"wait": "import time\ntime.sleep(3)\n" + LAUNCH, "python": CHECKS["python"], "launch": LAUNCH}
+    checks = {"wait": WAITS + LAUNCH, "python": CHECKS["python"], "launch": LAUNCH}
     job = job_of(FILES, checks)
     process = started(job, ["--bind", str(etc), "/etc"])
-    with at_once(process, "worker", lambda _: [(etc / name).unlink(missing_ok=True) for name in REPLACED]) as seen:
+
+    def replace(worker: psutil.Process) -> None:
+        for name in REPLACED:
+            (etc / name).unlink(missing_ok=True)
+        with contextlib.suppress(psutil.Error):
+            while process.poll() is None:  # a signal that comes before somebody waits for it is ignored
+                worker.send_signal(signal.SIGWINCH)
+                time.sleep(0.05)
+
+    with at_once(process, "worker", replace) as seen:
         result = result_of(process, job)
     assert seen
     assert points(result) == {"wait": 1.0, "python": 1.0, "launch": 1.0}, result

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import io
+import os
+import subprocess
+import sys
 import tarfile
 from collections.abc import Mapping
 from pathlib import Path
@@ -10,6 +13,7 @@ from typing import Any
 
 import pytest
 from boxes import ROOT
+from test_run_again import crowded_cpu  # noqa: F401  a fixture
 
 from autograder.checks import build, runtime
 from autograder.core.results import CheckResult, Isolation, Status
@@ -535,10 +539,84 @@ def test_a_hostile_build_is_ended_and_reaches_nothing(found: dict[str, CheckResu
     assert name != "forks" or "limit of processes" in check.outcomes[0].because, check.outcomes[0]
 
 
+NAPS = """import time
+while True:
+    until = time.process_time() + 0.01
+    while time.process_time() < until:
+        pass
+    time.sleep(0.15)
+"""
+"""Takes little of a CPU and never rests for long, so that neither says that it goes on without end."""
+BUILDS = """
+import os, sys
+from pathlib import Path
+from autograder.core.errors import KitError
+from autograder.core.results import Isolation
+from autograder.sandbox import build
+build.BUILD_SECONDS = 15.0
+os.sched_setaffinity(0, {int(sys.argv[2])})
+try:
+    print(build.build_packages(Path(sys.argv[1]), ["naps"], Isolation.NONE).over)
+except KitError as error:
+    print(error.what)
+"""
+
+
+def built_in_short_time(folder: Path, cpu: str) -> str:
+    """What is said of a build that has 15 s, and goes on without end."""
+    for name, text in package("naps", {**SENSORS, "setup.py": NAPS}).items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_text(text)
+    command = [sys.executable, "-c", BUILDS, str(folder / "src"), cpu]
+    return subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True, cwd=ROOT).stdout.strip()
+
+
+def test_a_build_that_hardly_does_anything_has_taken_too_long_and_not_been_kept_from_it(tmp_path: Path) -> None:
+    assert built_in_short_time(tmp_path, str(max(os.sched_getaffinity(0)))) == "time"
+
+
+def test_a_build_that_others_kept_from_the_cpu_has_not_taken_too_long(tmp_path: Path, crowded_cpu: str) -> None:  # noqa: F811
+    assert "because this machine was too busy" in built_in_short_time(tmp_path, crowded_cpu)
+
+
+def test_a_build_about_which_nothing_is_known_raises_a_flag(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name, text in package("sensors", SENSORS).items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(text)
+    monkeypatch.setattr(sandbox_build._Watched, "had_no_chance", True)
+    monkeypatch.setattr(sandbox_build, "BUILD_SECONDS", 0.1)
+    runtime.current.configure(tmp_path, Isolation.NONE, 1)
+    with build("sensors") as sensors:
+        sensors.expect_built()
+    score = sensors.score(1)
+    assert score.result.points is None
+    assert len(score.result.flags) == 1 and "too busy" in score.result.flags[0]
+
+
+@pytest.mark.parametrize(
+    "setup",
+    [
+        "import os\nos.kill(os.getpid(), 9)\n",
+        "import os\nos.write(2, b'c++: fatal error: Killed signal terminated program cc1plus')\nos._exit(1)\n",
+        "import os\nos.write(2, b'cc1: error: /tmp/x.s: No space left on device')\nos._exit(1)\n",
+    ],
+)
+def test_a_build_that_the_system_ends_each_time_costs_nothing_and_raises_a_flag(tmp_path: Path, setup: str) -> None:
+    for name, text in package("sensors", {**SENSORS, "setup.py": setup}).items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(text)
+    runtime.current.configure(tmp_path, Isolation.NONE, 1)
+    with build("sensors") as sensors:
+        sensors.expect_built()
+    score = sensors.score(1)
+    assert score.result.points is None and len(score.result.flags) == 1, score.result
+    assert "this says nothing about `sensors`" in score.result.outcomes[0].because
+
+
 def test_a_name_that_no_text_can_say_is_left_out_of_what_was_built() -> None:
     archive = io.BytesIO()
     with tarfile.open(fileobj=archive, mode="w", errors="surrogateescape") as tar:
         for name in ("car/share/odd\udcff", "car/share/plain"):
             tar.addfile(tarfile.TarInfo(name))
-    run = sandbox_build._finished(OuterRun(archive.getvalue(), "", 0, False), [])
+    run = sandbox_build._finished(OuterRun(archive.getvalue(), "", 0, False), sandbox_build._Watched())
     assert list(BuildRun.model_validate_json(run.model_dump_json()).installed) == ["car/share/plain"]

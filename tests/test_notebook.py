@@ -663,21 +663,26 @@ def test_an_interrupt_while_a_cell_explores_ends_what_it_started(notebook: Noteb
     cell = 'import os, signal\nwith launch("talker"):\n    os.kill(os.getpid(), signal.SIGINT)\n    print("after")'
     shown = notebook.run(cell)
     assert "KeyboardInterrupt" in shown.error and "after" not in shown.text.splitlines()
-    waiting = 'with launch("talker") as ros:\n    ros.wait(lambda: False, within=600)'
-    assert notebook.run(waiting, interrupt_after=2.0).error == "Interrupted."
+    waiting = """import threading
+waits = threading.Event()
+threading.Thread(target=lambda: (waits.wait(), os.kill(os.getpid(), signal.SIGINT))).start()
+with launch("talker") as ros:
+    ros.wait(waits.set, within=600)"""
+    assert notebook.run(waiting).error == "Interrupted."
     assert "✓ passed" in notebook.run(CHECK).text
 
 
 def test_an_interrupt_that_the_cell_catches_is_told_once(notebook: Notebook) -> None:
     write(notebook)
     cell = f"""{SET_UP}
+import os, signal
 robot = launch("talker").start()
 try:
-    robot.wait(lambda: False, within=600)
+    robot.wait(lambda: os.kill(os.getpid(), signal.SIGINT), within=600)
 except KeyboardInterrupt:
     robot.stop()
     print("stopped")"""
-    shown = notebook.run(cell, interrupt_after=4.0)
+    shown = notebook.run(cell)
     assert "stopped" in shown.text and not shown.error
 
 

@@ -17,6 +17,7 @@ from sample_class import ROOT
 from std_msgs.msg import Int64, String
 from test_checks import Grade, grade  # noqa: F401  a fixture
 
+from autograder.checks import outcomes
 from autograder.checks.expect.meanwhile import MeanwhileExpectations
 from autograder.core.results import CheckResult, Status
 from autograder.course.lab import Cell, load_lab
@@ -119,6 +120,71 @@ def test_a_check_that_breaks_over_nothing_that_can_be_named_is_undecided_and_rai
     assert len(result.flags) == 1 and error in result.flags[0], result.flags
 
 
+SENDS = """
+import rclpy
+from MODULE.msg import TYPE
+
+rclpy.init()
+node = rclpy.create_node("sender")
+publisher = node.create_publisher(TYPE, "sent", 10)
+message = TYPE()
+MAKE
+node.create_timer(0.05, lambda: publisher.publish(message))
+rclpy.spin(node)
+"""
+HEARS = """
+from MODULE.msg import TYPE
+from std_msgs.msg import Float64
+with launch("sender") as ros:
+    ros.listen("/own", Float64)
+    ros.expect_messages("/sent", TYPE)
+    {more}
+ros.score(2)
+"""
+
+
+def sent(grade: Grade, kind: str, make: str, more: str) -> CheckResult:  # noqa: F811
+    """What becomes of a check that hears a message, and then breaks."""
+    module, _, name = kind.partition("/")
+    check, program = (text.replace("MODULE", module).replace("TYPE", name) for text in (HEARS, SENDS))
+    return grade(check.format(more=more), sender__py=program.replace("MAKE", make))
+
+
+@pytest.mark.parametrize(
+    ("kind", "make"),
+    [
+        ("sensor_msgs/Image", "message.data = bytes(640 * 480 * 3)"),
+        ("sensor_msgs/LaserScan", "message.ranges = [1.0, float('inf'), float('nan')]"),
+        ("sensor_msgs/Range", "message.range = float('-inf')"),
+        ("builtin_interfaces/Duration", "message.sec = -1"),
+    ],
+)
+def test_what_is_allowed_in_a_message_is_no_reason_for_a_check_that_breaks(grade: Grade, kind: str, make: str) -> None:  # noqa: F811
+    result = sent(grade, kind, make, "[][0]")
+    assert result.points is None and len(result.flags) == 1, result
+
+
+def test_what_the_check_itself_sends_is_no_reason_for_its_breaking(grade: Grade) -> None:  # noqa: F811
+    subscribes = "node.create_subscription(Float64, 'own', print, 10)"
+    more = "ros.publish('/own', Float64(data=float('nan'))); ros.expect_messages('/own', Float64); [][0]"
+    result = sent(grade, "std_msgs/Float64", subscribes, more)
+    assert result.points is None and len(result.flags) == 1, result
+
+
+@pytest.mark.parametrize("breaks", ["raise MemoryError", "while True: pass"])
+def test_a_check_that_takes_too_much_over_long_texts_costs_the_part(
+    grade: Grade,  # noqa: F811
+    monkeypatch: pytest.MonkeyPatch,
+    breaks: str,
+) -> None:
+    monkeypatch.setattr(worker, "CELL_CPU_SECONDS", 3.0)
+    result = sent(grade, "std_msgs/String", "message.data = 'x' * 1_000_000", breaks)
+    failure = result.first_failure
+    assert result.points == 0 and failure is not None and failure.code == "unusable-data", result
+    assert "a text of 1,000,000 characters; that is far longer than any answer" in failure.because
+    assert len(result.flags) == 1
+
+
 def test_a_check_that_breaks_after_its_launch_raises_a_flag_and_one_that_breaks_before_does_not(grade: Grade) -> None:  # noqa: F811
     after = grade(
         BREAKS.format(more="").replace("ros.score", "[][0]\nros.score"), clock__py=CLOCK.replace("SECONDS", "1")
@@ -147,6 +213,16 @@ class Counted(float):
     def __gt__(self, other: float) -> bool:
         Counted.compared += 1
         return float.__gt__(self, other)
+
+
+def test_each_message_is_looked_at_once_and_a_long_text_is_cut_before_it_is_kept(grade: Grade) -> None:  # noqa: F811
+    more = """looked_at = []
+    ros.expect_messages("/sent", TYPE, at_least=40, where=lambda m: looked_at.append(m) or True)
+    ros.require(len(looked_at) <= ros.listen("/sent", TYPE).count, "Each message is looked at once")
+    ros.require(False, "It is long", because="x" * 1_000_000)"""
+    result = sent(grade, "std_msgs/String", "", more.replace("TYPE", "String"))
+    assert [outcome.title for outcome in result.outcomes if outcome.status is Status.FAILED] == ["It is long"]
+    assert len(result.outcomes[-1].because) < 2 * outcomes.TEXT_KEPT
 
 
 def test_messages_during_runs_are_looked_up_and_not_counted_one_by_one() -> None:

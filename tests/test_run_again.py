@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 import toy
 
-from autograder.core.results import CheckResult, Isolation, Outcome, Status, SubmissionResult
+from autograder.core.results import CheckResult, Isolation, NodeLog, Outcome, Status, SubmissionResult
 from autograder.course.lab import load_lab
 from autograder.grading import executors, once_more
 from autograder.grading.class_runner import run_class
@@ -99,15 +99,22 @@ class Machine:
         self.asked.append([(job.student, [cell.grade_id for cell in job.checks], job.alone) for job in jobs])
         for job in jobs:
             told = self.alone if job.alone else self.first
-            yield job.result([failing(cell, told.get(job.student, 0.0)) for cell in job.checks])
+            yield job.result([failing(cell, told.get(job.student, 0.0), job.alone) for cell in job.checks])
 
 
-def failing(cell: Cell, starved: float) -> CheckResult:
+def failing(cell: Cell, starved: float, alone: bool) -> CheckResult:
     """A check that lost its points in a time of which so many seconds were withheld; of the table none ever are."""
     starved *= cell.grade_id == "check_talker"
-    outcome = Outcome(status=Status.FAILED, title="a message comes", code="silent")
+    run = "again" if alone else "first"
+    outcome = Outcome(status=Status.FAILED, title="a message comes", code="silent", observed=run)
     return CheckResult(
-        grade_id=cell.grade_id, max_points=cell.points or 0.0, points=0.0, starved=starved, outcomes=[outcome]
+        grade_id=cell.grade_id,
+        max_points=cell.points or 0.0,
+        points=0.0,
+        starved=starved,
+        outcomes=[outcome],
+        flags=["odd in both", f"odd {run}"],
+        logs=[NodeLog(program="p", text=run)],
     )
 
 
@@ -133,6 +140,11 @@ def test_a_class_runs_what_was_starved_again_at_its_end_one_by_one(
     assert [check.run_again for check in results["ann"].checks] == [True, False]
     failure = results["bob"].checks[0].first_failure
     assert failure is not None and failure.code == TOO_BUSY and "when the machine has less to do" in failure.because
+    for who in ("ann", "bob"):  # a person may look at both runs
+        check = results[who].checks[0]
+        assert check.flags == ["odd in both", "odd first", "odd again"]
+        assert [log.text for log in check.logs] == ["again"]
+        assert (check.outcomes[-1].code, check.outcomes[-1].observed) == ("silent", "again")
     assert lacks_a_result(results["bob"]) and not lacks_a_result(results["ann"])  # a later run grades bob again
 
 

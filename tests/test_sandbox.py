@@ -18,7 +18,8 @@ from boxes import ATTACKS, ROOT, RUN_STDIN, in_sandbox
 from autograder.core.errors import KitError
 from autograder.core.processes import descendants
 from autograder.core.results import Isolation
-from autograder.sandbox import isolation
+from autograder.sandbox import isolation, loop
+from autograder.sandbox.group import ProgramGroup
 from autograder.sandbox.isolation import Preflight, choose, preflight
 from autograder.sandbox.limits import Limits
 from autograder.sandbox.node_sandbox import NodeSandbox
@@ -230,6 +231,8 @@ def test_output_keeps_its_beginning_and_its_end(tmp_path: Path) -> None:
         assert len(program.output()) < 2100
 
 
+BEGINS = "import time\nwhile time.thread_time() < 4: pass\nprint('here', flush=True)\ntime.sleep(600)\n"
+"""Computes for as long as a big library takes to load on a slow machine, and then rests."""
 BURNS = "import threading\ndef burn():\n    while True: pass\nthreading.Thread(target=burn).start()\nburn()\n"
 """Computes without a pause, in two threads."""
 
@@ -240,15 +243,17 @@ def test_a_program_that_only_computes_goes_on_behind_all_others() -> None:
         "import os, tempfile, time\nfrom pathlib import Path\nfrom autograder.core.processes import cpu_time, threads\n"
         "from autograder.core.results import Isolation\nfrom autograder.sandbox.node_sandbox import NodeSandbox\n"
         f"folder = Path(tempfile.mkdtemp()); (folder / 'burns.py').write_text({BURNS!r})\n"
+        f"(folder / 'begins.py').write_text({BEGINS!r})\n"
         "(folder / 'rests.py').write_text('import time\\nwhile True: time.sleep(0.01)')\n"
         "def nice(program): return {os.getpriority(os.PRIO_PROCESS, thread) for thread in threads(program.pid)}\n"
         "with NodeSandbox(folder, Isolation.FULL) as sandbox, sandbox.group() as group:\n"
         "    rests, burns = group.start('rests'), group.start('burns')\n"
+        "    begins = group.start('begins')\n"
         "    end = time.monotonic() + 120\n"
-        "    while nice(burns) != {19} and time.monotonic() < end: time.sleep(0.1)\n"
-        "    print(nice(burns), nice(rests), burns.running(), rests.running())\n"
+        "    while (nice(burns) != {19} or not begins.output()) and time.monotonic() < end: time.sleep(0.1)\n"
+        "    print(nice(burns), nice(rests), nice(begins), burns.running(), rests.running())\n"
     )
-    assert run.stdout.startswith("{19} {0} True True\n"), run
+    assert run.stdout.startswith("{19} {0} {0} True True\n"), run
 
 
 def test_a_program_that_prints_without_end_waits_as_at_a_terminal(local: NodeSandbox) -> None:
@@ -264,6 +269,30 @@ def test_a_program_that_prints_without_end_waits_as_at_a_terminal(local: NodeSan
             assert program._changed.wait_for(lambda: b"waited" in program._tail[-30:] or not program.running(), 120)
         assert program.running() and program.truncated()
         assert program.output().startswith("first\n") and program.output().endswith("waited\n")
+
+
+def test_a_machine_that_looks_seldom_makes_no_program_wait_that_prints_a_lot(
+    local: NodeSandbox, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    looks, over, watch = [], threading.Event(), ProgramGroup.watch
+
+    def look(group: ProgramGroup) -> None:
+        if not over.is_set():
+            looks.append(watch(group))
+
+    monkeypatch.setattr(ProgramGroup, "watch", look)
+    monkeypatch.setattr(loop, "_LOOK_EVERY", 1.0)
+    (local.folder / "prints.py").write_text(
+        "import os, time\nwhile not os.path.exists('go'): time.sleep(0.01)\n"
+        "for _ in range(16): os.write(1, b'x' * 65536)\nprint('done', flush=True)\ntime.sleep(600)\n"
+    )
+    with local.group() as group:
+        program = group.start("prints")
+        _wait_for(lambda: len(looks) > 3, 120)
+        over.set()
+        (local.folder / "go").touch()
+        with program._changed:
+            assert program._changed.wait_for(lambda: program._tail.endswith(b"done\n"), 60)
 
 
 def test_one_launch_ends_its_own_programs_only(local: NodeSandbox) -> None:

@@ -41,6 +41,20 @@ print("up", flush=True)
 rclpy.spin(node)
 """
 
+EAR = """
+import sys, time
+import rclpy
+
+rclpy.init()
+node = rclpy.create_node(sys.argv[1])
+print("up", flush=True)
+end = time.monotonic() + 120
+while not {*sys.argv[2:]} <= {*node.get_node_names()} and time.monotonic() < end:
+    time.sleep(0.05)
+print("heard" if time.monotonic() < end else "heard nothing", flush=True)
+time.sleep(600)
+"""
+
 
 @pytest.fixture(autouse=True)
 def profile(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -65,12 +79,15 @@ def started() -> Iterator[list[subprocess.Popen[str]]]:
 
 
 def start(
-    started: list[subprocess.Popen[str]], name: str, number: int, settings: dict[str, str]
+    started: list[subprocess.Popen[str]], name: str, number: int, settings: dict[str, str], *waits_for: str
 ) -> subprocess.Popen[str]:
-    """Start a program with a node in a domain, and wait until it has one."""
+    """Start a program with a node in a domain, and wait until it has one.
+
+    It publishes, or says when it has heard of other nodes, if it is given their names.
+    """
     plain = {key: value for key, value in os.environ.items() if not key.startswith(("FASTRTPS", "ROS_", GROUP))}
     process = subprocess.Popen(
-        [sys.executable, "-c", SOMEBODY, name],
+        [sys.executable, "-c", EAR if waits_for else SOMEBODY, name, *waits_for],
         env=plain | {"ROS_LOG_DIR": os.environ["ROS_LOG_DIR"]} | settings | {"ROS_DOMAIN_ID": str(number)},
         stdout=subprocess.PIPE,
         text=True,
@@ -85,6 +102,24 @@ def in_time(done: Any) -> bool:
     while not done() and time.monotonic() < deadline:
         time.sleep(0.05)
     return bool(done())
+
+
+def heard(ear: subprocess.Popen[str]) -> bool:
+    """Whether a program has heard of the nodes that it waits for."""
+    assert ear.stdout is not None
+    return ear.stdout.readline() == "heard\n"
+
+
+def claimed_in_time(number: int) -> bool:
+    """Whether a domain can be claimed; a launch of somebody else's may have it for a while."""
+
+    def claimed() -> bool:
+        claim = domains._claimed(number)
+        if claim is not None:
+            claim.close()
+        return claim is not None
+
+    return in_time(claimed)
 
 
 # Nothing outlives it.
@@ -113,9 +148,7 @@ def test_an_observer_that_cannot_begin_leaves_its_domain(monkeypatch: pytest.Mon
     with pytest.raises(KitError):
         Observer(claimed.id, left=claimed.release)
     assert is_free(claimed.id)
-    again = domains._claimed(claimed.id)
-    assert again is not None, "it is still claimed"
-    again.close()
+    assert claimed_in_time(claimed.id), "it is still claimed"
 
 
 # Domains are claimed.
@@ -142,11 +175,7 @@ def test_no_two_launches_get_one_domain_and_what_is_given_back_is_given_again() 
     assert len({each.id for each in claimed}) == 20
     for each in claimed:
         each.release()
-    again = [domains._claimed(each.id) for each in claimed]
-    assert all(again)
-    for each in again:
-        assert each is not None
-        each.close()
+    assert all(claimed_in_time(each.id) for each in claimed)
 
 
 def test_the_domain_of_a_process_that_was_killed_is_given_again() -> None:
@@ -160,9 +189,7 @@ def test_the_domain_of_a_process_that_was_killed_is_given_again() -> None:
         number = int(process.stdout.readline())
         assert domains._claimed(number) is None
         process.kill()
-    again = domains._claimed(number)
-    assert again is not None
-    again.close()
+    assert claimed_in_time(number)
 
 
 def test_where_every_domain_is_claimed_one_in_which_nobody_lives_is_shared(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -190,13 +217,16 @@ def test_launches_of_one_domain_do_not_hear_each_other_if_they_are_of_two_kernel
     start(started, "stranger", domain.id, other)
     observer = Observer(domain.id)
     try:
-        heard = observer.record("/stranger", Int64)
+        said = observer.record("/stranger", Int64)
         start(started, "own", domain.id, profile_environment())
         assert observer.wait(lambda: observer.nodes() == ["/own"], WITHIN)
+        ear = start(started, "ear", domain.id, other, "stranger", "late_stranger")
         start(started, "late_stranger", domain.id, other)
-        observer.pause(2.0)  # ten rounds of announcements
-        assert observer.nodes() == ["/own"]
-        assert "/stranger" not in observer.topics() and not heard.messages
+        assert heard(ear)  # and so would the observer have heard of it, which hears of the next one of its own
+        start(started, "late_own", domain.id, profile_environment())
+        assert observer.wait(lambda: "/late_own" in observer.nodes(), WITHIN)
+        assert observer.nodes() == ["/late_own", "/own"]
+        assert "/stranger" not in observer.topics() and not said.messages
     finally:
         observer.close()
 
@@ -208,28 +238,28 @@ def test_a_launch_hears_no_program_with_settings_of_its_own(
     """Such as one in a terminal, whose number a launch has claimed before."""
     observer = Observer(domain.id)
     try:
-        strangers = [
-            start(started, f"stranger{number}", domain.id, {"ROS_AUTOMATIC_DISCOVERY_RANGE": reach})
-            for number in range(2)
-        ]
+        settings = {"ROS_AUTOMATIC_DISCOVERY_RANGE": reach}
+        ear = start(started, "ear", domain.id, settings, "stranger0", "stranger1")
+        strangers = [start(started, f"stranger{number}", domain.id, settings) for number in range(2)]
+        assert heard(ear)  # and so would the observer have heard of them, which hears of the next one of its own
         start(started, "own", domain.id, profile_environment())
         assert observer.wait(lambda: "/own" in observer.nodes(), WITHIN)
-        observer.pause(4.0)  # they announce themselves every 3 s
         assert observer.nodes() == ["/own"]
         assert all(stranger.poll() is None for stranger in strangers)
     finally:
         observer.close()
 
 
-def test_a_terminal_finds_the_group_of_the_users_own_launch_and_of_nobody_else(domain: Domain) -> None:
+def test_a_terminal_finds_the_group_of_the_users_own_launch_and_of_nobody_else(
+    domain: Domain, monkeypatch: pytest.MonkeyPatch
+) -> None:
     assert group_of(domain.id) is None
     observer = Observer(domain.id)
     assert group_of(domain.id) == os.environ[GROUP]
-    if os.getuid() == 0:
-        ask = (
-            f"import os; from autograder.graph.domains import group_of; os.setuid(12001); print(group_of({domain.id}))"
-        )
-        assert subprocess.run([sys.executable, "-c", ask], stdout=subprocess.PIPE, check=True).stdout == b"None\n"
+    somebody = os.getuid() + 1
+    with monkeypatch.context() as as_somebody:
+        as_somebody.setattr(os, "getuid", lambda: somebody)
+        assert group_of(domain.id) is None
     observer.close()
     assert in_time(lambda: group_of(domain.id) is None)
 
@@ -259,11 +289,29 @@ def test_a_folder_of_logs_that_leads_elsewhere_is_not_used(temporary: Path, tmp_
     assert logs.resolve() != elsewhere and stat.S_IMODE(logs.stat().st_mode) == 0o700
 
 
-@pytest.mark.skipif(os.getuid() != 0, reason="only root makes files of others")
-def test_a_folder_of_logs_that_is_somebody_elses_is_not_used(temporary: Path) -> None:
-    temporary.mkdir()
-    os.chown(temporary, 12001, 12001)
-    assert Path(profile_environment()["ROS_LOG_DIR"]) != temporary
+def test_a_folder_of_logs_that_is_somebody_elses_is_not_used(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(environment.tempfile, "tempdir", str(tmp_path))
+    somebody = os.getuid() + 1
+    monkeypatch.setattr(os, "getuid", lambda: somebody)
+    theirs = tmp_path / f"autograder-log-{somebody}"
+    theirs.mkdir()  # by who runs the tests, and so not by somebody
+    environment._log_folder.cache_clear()
+    try:
+        assert Path(profile_environment()["ROS_LOG_DIR"]) != theirs
+    finally:
+        environment._log_folder.cache_clear()
+
+
+def test_a_folder_of_logs_that_a_process_made_for_itself_goes_with_it(tmp_path: Path) -> None:
+    (tmp_path / f"autograder-log-{os.getuid()}").write_text("no folder")
+    look = "from autograder.sandbox.environment import profile_environment; print(profile_environment()['ROS_LOG_DIR'])"
+    process = subprocess.run(
+        [sys.executable, "-c", look], env=os.environ | {"TMPDIR": str(tmp_path)}, stdout=subprocess.PIPE, text=True,
+        check=True,
+    )  # fmt: skip
+    own = Path(process.stdout.strip())
+    assert own.parent == tmp_path and own.name.startswith(f"autograder-log-{os.getuid()}-")
+    assert not own.exists()
 
 
 def test_a_port_below_is_not_taken_for_a_participant(domain: Domain) -> None:

@@ -11,11 +11,13 @@ from pathlib import Path
 import psutil
 import pytest
 
+from autograder.checks.outcomes import TEXT_KEPT
 from autograder.core.results import Isolation, NodeLog
 from autograder.grading import supervisor, worker
 from autograder.grading.job import CELL_SECONDS, Cell, Job
 from autograder.grading.supervisor import run_in_worker, run_in_workers
 from autograder.grading.validation import lacks_a_result
+from autograder.sandbox.isolation import preflight
 
 PASS = "from autograder.checks import outcomes\nfrom autograder.checks.scoring import score\n"
 
@@ -46,8 +48,30 @@ def test_a_text_that_explodes_is_cut_and_costs_no_other_check() -> None:
         )
     )
     assert [check.points for check in result.checks] == [1.0, 1.0, 1.0]
-    assert len(result.checks[0].outcomes[0].observed) < 2 * worker.TEXT_KEPT
+    assert len(result.checks[0].outcomes[0].observed) < 2 * TEXT_KEPT
     assert len(result.checks[1].outcomes) == worker.OUTCOMES_KEPT
+
+
+FILLS = """
+import mmap
+for number in range(2):
+    file = open(f"/dev/shm/{number}", "w+b")
+    file.truncate(12 << 20)
+    mapped = mmap.mmap(file.fileno(), 12 << 20)
+    for page in range(0, 12 << 20, 4096):
+        mapped[page] = 1
+"""
+
+
+@pytest.mark.skipif(not preflight().full, reason="without full isolation /dev/shm is the machine's")
+def test_a_program_that_maps_more_than_there_is_room_for_is_told_the_limit() -> None:
+    check = (
+        'from autograder.checks import launch\nwith launch("fills") as ros:\n    ros.expect_exit("fills", status=0)\n'
+    )
+    given = job(check + "score(1)", files={"fills.py": FILLS}).model_copy(update={"isolation": Isolation.FULL})
+    (result,) = run_in_worker(given).checks
+    assert result.points == 0 and result.first_failure is not None
+    assert "signal 7 (SIGBUS)" in result.first_failure.because and "16 MiB" in result.first_failure.because
 
 
 def test_a_check_that_never_ends_is_ended() -> None:

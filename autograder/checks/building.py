@@ -17,6 +17,7 @@ from autograder.packages.executables import why_no_executable, why_other_target
 from autograder.packages.explain import needed_packages, not_described, why_not_built
 from autograder.packages.imports import imported_interfaces
 from autograder.packages.interfaces import InterfaceError, interface_parts
+from autograder.packages.workspace import missing_tools
 
 _RECORDS = re.compile(r"(egg-info|dist-info|__pycache__|/colcon-core/|/hook/)|(^|/)package\.(d?sv|sh|ps1|bash|zsh)$")
 """Files that colcon, setuptools and Python write for themselves."""
@@ -36,7 +37,7 @@ class Package:
         return self
 
     def __exit__(self, kind: object, error: BaseException | None, trace: object) -> bool:
-        return outcomes.ends_block(error)
+        return outcomes.ends_block(error, ran=not missing_tools())
 
     def part(self, title: str) -> AbstractContextManager[None]:
         """A block whose expectations give points of their own; see `autograder.checks.parts`.

@@ -56,8 +56,8 @@ GROUPS: dict[str, dict[str, str]] = {
         "exit-status": "the program ended with another status",
         "signal-ignored": "the program was told to end by a signal, and still ran when the time for that was over",
         "unclean-end": "told to end by a signal, the program ended with another status than 0 or printed an error",
-        "unusable-data": "the check broke, and the programs had sent what no check can use: a NaN, a stamp below 0 s, a"
-        " text or a list without measure",
+        "unusable-data": "the check broke, and the programs had sent what no check can use: a NaN, a stamp below 0 s,"
+        " or an extremely long text or list",
         "no-log": "no such line was logged, or not that often",
         "required": "a fact that the check established does not hold; the check gave no code of its own",
         "failed": "an expectation does not hold; nothing more is known",
@@ -115,7 +115,7 @@ GROUPS: dict[str, dict[str, str]] = {
         "absolute-rule": "one side of a rule is absolute, and the name lies in a namespace",
         "private-rule": "one side of a rule is private to the node, and the other name is not",
         "rule-without-match": "no name in the code is the left side",
-        "rule-takes-name": "a rule gives another name to what has the wanted one",
+        "rule-takes-name": "a rule renames the topic or node that already has the expected name",
     },
     "The notebook that was handed in": {
         "no-notebook": "there is no file of the lab's name, or it is empty",

@@ -26,6 +26,9 @@ _PACKAGE = str(Path(__file__).resolve().parent.parent)
 _NOT_CELLS = (_PACKAGE, sys.prefix, sys.base_prefix, "<frozen", "<string>")
 """How the names of files begin that are the kit's, an installed package's, the standard library's or generated."""
 
+TEXT_KEPT = 8000
+"""Characters of one text in an outcome: some of them quote what a student's program sent."""
+
 _USABLE = "The check can go on with what the programs send"
 
 _FORGED = "A program has announced a node or a topic whose name is no text, below ROS, which allows no such name."
@@ -43,11 +46,15 @@ class LaunchEnded(CheckEnded):
     """The launch, or the table, failed as a whole: none of its parts is worth anything."""
 
 
-def ends_block(error: BaseException | None) -> bool:
-    """What becomes of an exception that leaves a launch or a table: whether Python is to forget it.
+def ends_block(error: BaseException | None, ran: bool = False) -> bool:
+    """What becomes of an exception that leaves a launch, a build or a table: whether Python is to forget it.
 
     A check that breaks at grading says nothing about the student: the instructor decides. In a notebook the error is
     the student's to see.
+
+    Args:
+        error: the exception.
+        ran: something of the student's has run, besides the programs of a launch.
     """
     if error is None or isinstance(error, CheckEnded):
         return True
@@ -56,7 +63,7 @@ def ends_block(error: BaseException | None) -> bool:
             failed_as_a_whole("The ROS graph can be read", because=_FORGED, code="forged-graph")
         return True
     if isinstance(error, KitError):  # such as a machine without a compiler
-        if runtime.current.block is not None:  # its programs run, and may have brought it about
+        if ran or runtime.current.block is not None:  # what the student wrote may have brought it about
             _flag(error)
         unknown("This can be found out on this machine", " ".join(part for part in (error.what, error.do) if part))
         return True
@@ -94,7 +101,29 @@ def _is_cells(file: str) -> bool:
 
 def passed(title: str, *, expected: str = "", observed: str = "") -> None:
     """Record that an expectation holds."""
-    _record(Outcome(status=Status.PASSED, title=title, expected=expected, observed=observed))
+    _record(worded(Status.PASSED, title, expected, observed))
+
+
+def worded(
+    status: Status,
+    title: str,
+    expected: str = "",
+    observed: str = "",
+    because: str = "",
+    hint: str = "",
+    code: str = "",
+    hidden: bool = False,
+) -> Outcome:
+    """Return an outcome whose texts have a bounded length; its arguments are those of `Outcome`."""
+    title, expected, observed, because, hint = map(_cut, (title, expected, observed, because, hint))
+    return Outcome(
+        status=status, title=title, expected=expected, observed=observed, because=because, hint=hint, code=code,
+        hidden=hidden,
+    )  # fmt: skip
+
+
+def _cut(text: str) -> str:
+    return text if len(text) <= TEXT_KEPT else f"{text[: TEXT_KEPT // 2]} […] {text[-TEXT_KEPT // 2 :]}"
 
 
 def failed(
@@ -155,15 +184,7 @@ def failed_as_a_whole(
 def _failure(
     title: str, expected: str = "", observed: str = "", because: str = "", hint: str = "", code: str = ""
 ) -> Outcome:
-    return Outcome(
-        status=Status.FAILED,
-        title=title,
-        expected=expected,
-        observed=observed,
-        because=because,
-        hint=hint,
-        code=code or "failed",
-    )
+    return worded(Status.FAILED, title, expected, observed, because, hint, code=code or "failed")
 
 
 def unknown(title: str, because: str) -> None:
@@ -173,7 +194,7 @@ def unknown(title: str, because: str) -> None:
     """
     frame = _check_frame()
     hidden = frame is not None and bool(hidden_lines(_lines(frame)))
-    _record(Outcome(status=Status.UNKNOWN, title=title, because=because, code="grader", hidden=hidden))
+    _record(worded(Status.UNKNOWN, code="grader", hidden=hidden, title=title, because=because))
 
 
 def _record(outcome: Outcome) -> None:

@@ -108,9 +108,12 @@ def cpu_time(pid: int) -> float:
 
 
 def wants_cpu(pid: int) -> bool:
-    """Whether the first thread of a process computes, or waits for a CPU or a disk; not if the process is gone."""
-    with contextlib.suppress(OSError, IndexError):
-        return stat_fields(f"/proc/{pid}")[0] in "RD"
+    """Whether a thread of a process computes, or waits for a CPU or a disk; not if the process is gone."""
+    with contextlib.suppress(OSError):
+        for thread in threads(pid):
+            with contextlib.suppress(OSError, IndexError):
+                if stat_fields(f"/proc/{pid}/task/{thread}")[0] in "RD":
+                    return True
     return False
 
 

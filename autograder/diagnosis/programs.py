@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import signal
 
 from autograder.arguments import params_file, remap_rules
 from autograder.diagnosis import callbacks
@@ -11,6 +12,7 @@ from autograder.diagnosis.reason import Diagnosis
 from autograder.diagnosis.scene import Scene
 from autograder.diagnosis.spinning import SHUT_DOWN_IN_MAIN
 from autograder.diagnosis.traces import last_traceback
+from autograder.sandbox.limits import MIB, Limits
 
 _WRONG_FIELD = re.compile(
     r"(\w{1,100}?)__(?:msg|srv|action)__\w{1,100}convert_from_py.{0,200}Assertion `Py(\w{1,9})_Check"
@@ -60,6 +62,14 @@ def _death(inside: Inside) -> Diagnosis:
             " and holds a value of another type. That ended the program, without a word of Python's.",
             "crashed",
             "Lecture 7, section 'Python does not check what you assign'.",
+        )
+    if status == -signal.SIGBUS:
+        return Diagnosis(
+            f"`{program.name}` was ended by signal 7 (SIGBUS), because it used a part of a mapped file that does not"
+            " exist, or for which there was no room. When a program is graded, its files in /tmp may have"
+            f" {Limits().disk // MIB} MiB together, and so may those in /dev/shm.",
+            "crashed",
+            "Map less of the file, or make the file as long as what you map of it.",
         )
     if status is not None and status < 0:
         return Diagnosis(

@@ -34,13 +34,20 @@ def settled(job: Job, first: SubmissionResult, again: SubmissionResult) -> Submi
         again: the result of the second.
     """
     cells = {cell.grade_id: cell for cell in job.checks}
-    second = {check.grade_id: _settled(cells[check.grade_id], check) for check in again.checks}
+    before = {check.grade_id: check for check in first.checks}
+    second = {one.grade_id: _settled(cells[one.grade_id], before[one.grade_id], one) for one in again.checks}
     seconds = {name: round(first.seconds.get(name, 0.0) + spent, 3) for name, spent in again.seconds.items()}
     checks = [second.get(check.grade_id, check) for check in first.checks]
     return first.model_copy(update={"checks": checks, "seconds": seconds})
 
 
-def _settled(cell: Cell, check: CheckResult) -> CheckResult:
-    if is_open(check):
-        check = too_busy(cell, check.starved).model_copy(update={"seconds": check.seconds})
-    return check.model_copy(update={"run_again": True})
+def _settled(cell: Cell, first: CheckResult, again: CheckResult) -> CheckResult:
+    """What a check came to, with all that a person may want to see of both runs."""
+    check = again
+    if is_open(again):
+        busy = too_busy(cell, again.starved)
+        check = busy.model_copy(
+            update={"seconds": again.seconds, "outcomes": [*busy.outcomes, *again.outcomes], "logs": again.logs}
+        )
+    flags = list(dict.fromkeys([*first.flags, *again.flags]))
+    return check.model_copy(update={"run_again": True, "flags": flags, "logs": check.logs or first.logs})

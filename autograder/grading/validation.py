@@ -57,8 +57,8 @@ def undecided(cell: Cell, because: str, printed: str = "", code: str = NO_RESULT
 def too_busy(cell: Cell, seconds: float) -> CheckResult:
     """Return the result of a check whose programs others kept from the CPUs for so many seconds, alone as well."""
     because = (
-        f"This machine was too busy: others kept the programs of this check from the CPUs for {seconds:.1f} s"
-        " of the time that decides, also when it was run again alone. Run it again when the machine has less to do."
+        f"Even when the check was run again alone, other processes kept its programs from the CPU for {seconds:.1f} s"
+        " of the time in which it was decided. Run it again when the machine has less to do."
     )
     return undecided(cell, because, code=TOO_BUSY)
 

@@ -19,10 +19,10 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, TextIO
 
-from autograder.checks import findings, runtime, unusable
+from autograder.checks import findings, outcomes, runtime, unusable
 from autograder.checks.misuse import place_of
 from autograder.checks.scoring import Score
-from autograder.core.results import CellResult, CheckResult, NodeLog, Outcome, Status
+from autograder.core.results import CellResult, CheckResult, NodeLog, Status
 from autograder.course.lab import Cell
 from autograder.grading.job import CELL_CPU_SECONDS, CELL_SECONDS, STUCK_SECONDS, Job
 from autograder.graph import bag
@@ -33,8 +33,6 @@ from autograder.sandbox.scratch import Scratch
 
 MEMORY = 2048 * MIB
 """Bytes that the worker may take for itself: what a student wrote may unfold in it, and then fails its own check."""
-TEXT_KEPT = 8000
-"""Characters of one text in an outcome."""
 PICTURE_KEPT = 150_000
 """Characters of a picture: what is longer is left out."""
 OUTCOMES_KEPT = 400
@@ -67,7 +65,7 @@ def run_job(job: Job, folder: Path, stacks: TextIO = sys.stderr) -> Iterator[Che
             findings.current.reset()
             runtime.current.vary_for(f"{job.seed} {cell.grade_id}")
             faulthandler.dump_traceback_later(limit + STUCK_SECONDS, exit=True, file=stacks)
-            error, value = _run_cell(cell, number, namespace, limit)
+            error, value = _run_cell(cell, number, namespace, limit, CELL_CPU_SECONDS)
             faulthandler.cancel_dump_traceback_later()
             if cell.points is None:
                 broken_set_up = broken_set_up or error
@@ -86,15 +84,15 @@ def _check_result(cell: Cell, value: object, error: str) -> CheckResult:
         found = value.result
     else:
         because = error or f"The check cell did not end in a score of {cell.points:g} points."
-        outcomes = [
+        found_out = [
             *findings.current.outcomes,
-            Outcome(status=Status.UNKNOWN, title="The check itself broke", because=because, code="grader"),
+            outcomes.worded(Status.UNKNOWN, code="grader", title="The check itself broke", because=because),
         ]
         found = CellResult(
             max_points=cell.points or 0.0,
             points=None,
             starved=max(findings.current.starved, findings.current.patience.decided()),
-            outcomes=outcomes,
+            outcomes=found_out,
             flags=list(dict.fromkeys(findings.current.flags)),
             logs=findings.current.logs,
         )
@@ -102,18 +100,14 @@ def _check_result(cell: Cell, value: object, error: str) -> CheckResult:
 
 
 def _shortened(check: CheckResult) -> CheckResult:
-    """The result with texts of bounded length: some of them quote what a student's program sent."""
-    texts = ("title", "expected", "observed", "because", "hint")
-    outcomes = []
-    for outcome in check.outcomes[:OUTCOMES_KEPT]:
-        long = {name: text for name in texts if len(text := getattr(outcome, name)) > TEXT_KEPT}
-        short: dict[str, object] = {
-            name: f"{text[: TEXT_KEPT // 2]} […] {text[-TEXT_KEPT // 2 :]}" for name, text in long.items()
-        }
-        if outcome.picture is not None and len(outcome.picture.svg) + len(outcome.picture.alt) > PICTURE_KEPT:
-            short["picture"] = None
-        outcomes.append(outcome.model_copy(update=short))
-    return check.model_copy(update={"outcomes": outcomes})
+    """The result with a bounded number of outcomes, and without pictures that are too large."""
+    kept = [
+        one.model_copy(update={"picture": None})
+        if one.picture is not None and len(one.picture.svg) + len(one.picture.alt) > PICTURE_KEPT
+        else one
+        for one in check.outcomes[:OUTCOMES_KEPT]
+    ]
+    return check.model_copy(update={"outcomes": kept})
 
 
 def _within(logs: list[NodeLog], characters: int) -> list[NodeLog]:
@@ -138,7 +132,7 @@ def _out_of_time(*_: object) -> None:
 
 
 def _out_of_cpu(*_: object) -> None:
-    raise TimeoutError("the check took more of the grader's own CPU time than it may: far too much came in to look at")
+    raise unusable.OutOfBudget("the check took more of the grader's own CPU time than it may")
 
 
 def _run_cell(

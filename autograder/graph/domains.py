@@ -84,7 +84,7 @@ def _is_unused(port: int) -> bool:
 def group_of(domain: int) -> str | None:
     """Return the multicast group in which this user's launch in a domain finds its programs; None if there is none.
 
-    Domain 0 is everybody's who says nothing: no launch ever claims it.
+    Every program that names no domain uses domain 0, so no launch claims it.
     """
     wanted = f":{_FIRST_PORT + _PORTS_PER_DOMAIN * domain + _DISCOVERY:04X}"
     with contextlib.suppress(OSError):

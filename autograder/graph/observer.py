@@ -75,7 +75,7 @@ class Observer:
         rclpy.init(context=self._context, domain_id=domain_id, args=[])
         leaving.callback(rclpy.try_shutdown, context=self._context)
         # The random end keeps a student's node from having this name by chance; what is the observer's own is told by
-        # its participant, for a name can be read off the graph and taken.
+        # its participant, because any program can read a name off the graph and use it.
         self.name = f"{OBSERVER_NAME}_{time.monotonic_ns() % 0xFFFFFF:06x}"
         self.node: Node = rclpy.create_node(
             self.name,
@@ -285,6 +285,10 @@ class Observer:
         """Make a publisher of the observer's; rclpy's own warnings about subscriptions that do not match are off."""
         quiet = PublisherEventCallbacks(use_default_callbacks=False)
         return self.node.create_publisher(msg_type, topic, qos, event_callbacks=quiet)
+
+    def sends_on(self) -> set[str]:
+        """Full names of the topics on which the observer itself publishes."""
+        return {publisher.topic_name for publisher in self.node.publishers}
 
 
 def leave_graph(node: Node) -> None:

@@ -131,6 +131,10 @@ class Recording:
         """What has arrived so far: a copy, so that it does not grow while it is looked at."""
         return list(self._messages)
 
+    def messages_from(self, number: int) -> list[Received]:
+        """Return what has arrived so far but for so many of the first."""
+        return self._messages[number:]
+
     @property
     def count(self) -> int:
         """Number of messages so far."""

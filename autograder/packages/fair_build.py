@@ -1,14 +1,16 @@
-"""Builds a package so that a failure is the student's only if it is known to be.
+"""Builds a package so that a failure counts against the student only if the package is known to have caused it.
 
 A build also fails where the machine does: its disk or its memory is full, a compiler is being replaced, a process is
 killed. The log of such a failure may look like any other, or be empty. So a failure is believed if the tools have said
 something of the package's own files that nothing else brings about, or if the build went over one of its limits. Any
 other one is put to the test: a package that is known to be good is built in the same way. If that fails, too, nothing
-is known of the student's package; otherwise it is built once more, and then its failure stands.
+is known of the student's package; otherwise it is built once more, and then its failure stands, unless it looks like
+one of a machine that lacks memory or disk.
 """
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 from autograder.core.errors import KitError
@@ -17,6 +19,12 @@ from autograder.packages.explain import first_error, not_described, said_of_file
 from autograder.sandbox.build import BuildRun, build_packages
 from autograder.sandbox.scratch import Scratch
 
+_BY_THE_SYSTEM = re.compile(
+    r"Killed signal terminated program \w+|died with <Signals.SIGKILL: 9>|\bError 137\b|exited with code (?:-9|137)\b"
+    r"|No space left on device|Cannot allocate memory"
+)
+"""What tools print where the system kills a process for want of memory, or refuses memory or disk. A build file can
+print it, too, so a person has to look."""
 _NAME = "known_good"
 _PACKAGE_XML = f"""<?xml version="1.0"?>
 <package format="3">
@@ -79,10 +87,12 @@ def build(sources: Path, package: str, isolation: Isolation) -> BuildRun:
         return run
     trial = _trial(with_interfaces=(sources / package / "CMakeLists.txt").is_file(), isolation=isolation)
     if trial.status != 0:
-        raise _cannot_build(package, trial)
+        raise _cannot_build(
+            package, f"A package that is known to be good could not be built here either ({_end(trial)})"
+        )
     again = _run(sources, package, isolation)
-    if again.killed_from_outside:
-        raise _cannot_build(package, again)
+    if again.killed_from_outside or (not _known(again, sources / package) and _BY_THE_SYSTEM.search(again.log)):
+        raise _cannot_build(package, f"The system ended what builds it, or had no room for it ({_end(again)})")
     return again
 
 
@@ -110,10 +120,15 @@ def _run(sources: Path, package: str, isolation: Isolation) -> BuildRun:
         raise KitError(f"The build of `{package}` cannot be started: {error}.", "Run `autograder doctor`.") from error
 
 
-def _cannot_build(package: str, run: BuildRun) -> KitError:
-    said = first_error(run.log) or f"it ended with status {run.status} and said nothing"
+def _end(run: BuildRun) -> str:
+    """What a build that failed said, or how it ended."""
+    by_the_system = _BY_THE_SYSTEM.search(run.log)
+    said = by_the_system[0] if by_the_system else first_error(run.log)
+    return said or f"it ended with status {run.status} and said nothing"
+
+
+def _cannot_build(package: str, why: str) -> KitError:
     return KitError(
-        f"`{package}` was not built, and it is not known why: this machine does not build packages at the moment"
-        f" ({said}).",
+        f"`{package}` could not be built. {why}, so this says nothing about `{package}`.",
         "Run it again; `autograder doctor` says what the machine lacks.",
     )

@@ -15,10 +15,12 @@ import sys
 import tarfile
 import threading
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from autograder.core.cpu_use import Withheld
 from autograder.core.errors import KitError
 from autograder.core.processes import cpu_time, descendants, memory, wants_cpu
 from autograder.core.results import Isolation
@@ -31,8 +33,9 @@ from autograder.sandbox.walls import bubblewrap, seccomp
 BUILD_SECONDS = 800.0
 """Seconds that a build may take at all. Interfaces take 10 on a quiet machine, and many times that on a crowded one.
 
-A build that gets this far has had too little of the machine: `_CPU` and `_IDLE` end all others before.
+One that takes longer has taken too long, unless others kept it from the CPUs for `_WITHHELD` of that time.
 """
+_WITHHELD = 0.5
 _INSTALLED = 32 * MIB
 """Bytes of all files together that a build may install."""
 _FILES = 3000
@@ -90,9 +93,9 @@ def build_packages(source: Path, packages: Sequence[str], isolation: Isolation) 
             command, env=environment, start_new_session=True, cwd=work,
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
         )  # fmt: skip
-        with _watched(process) as over:
+        with _watched(process) as watched:
             try:
-                return _finished(exchange(process, b"", BUILD_SECONDS), over)
+                return _finished(exchange(process, b"", BUILD_SECONDS), watched)
             finally:
                 _end_session(process)
 
@@ -106,27 +109,43 @@ def _in_sandbox(source: Path, packages: Sequence[str]) -> BuildRun:
         process = bubblewrap.start_bwrap(options, command, (rules,), stdin=pipe, stdout=pipe, stderr=pipe)
     finally:
         os.close(rules)
-    with _watched(process) as over:
+    with _watched(process) as watched:
         try:
-            return _finished(exchange(process, b"", BUILD_SECONDS), over)
+            return _finished(exchange(process, b"", BUILD_SECONDS), watched)
         finally:
             process.kill()  # in a PID namespace, everything with it
             process.wait()
 
 
+@dataclass
+class _Watched:
+    """What is known of a build that runs, or has run."""
+
+    over: list[str] = field(default_factory=list)
+    """What it took too much of, filled before it is ended."""
+    withheld: Withheld = field(default_factory=Withheld)
+    """The time for which others kept it from the CPUs."""
+
+    @property
+    def had_no_chance(self) -> bool:
+        """Whether it is the others' fault that it has not ended in time."""
+        return self.withheld.from_one(0.0) >= _WITHHELD * BUILD_SECONDS
+
+
 @contextlib.contextmanager
-def _watched(process: subprocess.Popen[bytes]) -> Iterator[list[str]]:
+def _watched(process: subprocess.Popen[bytes]) -> Iterator[_Watched]:
     """Hold a build to what all its processes may use together, which no limit of a single one does.
 
-    Gives what is filled with what it took too much of, before it is ended. Of time only its own counts: what it
-    computes, and what it waits for while nobody keeps it from computing.
+    Of time only its own counts: what it computes, and what it waits for while nobody keeps it from computing.
     """
     ended = threading.Event()
-    over: list[str] = []
+    watched = _Watched()
 
     def watch() -> None:
+        over = watched.over
         idle = used_before = 0.0
         while not ended.wait(_LOOK):
+            watched.withheld.measure()
             family = descendants(process.pid)
             used = sum(map(cpu_time, family))
             idle += _LOOK * (used == used_before and not any(map(wants_cpu, family)))
@@ -144,7 +163,7 @@ def _watched(process: subprocess.Popen[bytes]) -> Iterator[list[str]]:
     watcher = threading.Thread(target=watch, name="build", daemon=True)
     watcher.start()
     try:
-        yield over
+        yield watched
     finally:
         ended.set()
         watcher.join()
@@ -168,13 +187,15 @@ def _end_session(process: subprocess.Popen[bytes]) -> None:
     process.wait()
 
 
-def _finished(run: OuterRun, over: Sequence[str]) -> BuildRun:
-    if run.timed_out and not over:
-        raise KitError(
-            f"This machine was too busy to build a package: that did not end within {BUILD_SECONDS:.0f} s.",
-            "Run it again when the machine has less to do.",
-        )
-    too_much = [*over, *["output"] * (len(run.stdout) > OUTPUT_LIMIT)]
+def _finished(run: OuterRun, watched: _Watched) -> BuildRun:
+    too_much = [*watched.over, *["output"] * (len(run.stdout) > OUTPUT_LIMIT)]
+    if run.timed_out and not too_much:
+        if watched.had_no_chance:
+            raise KitError(
+                f"The package was not built within {BUILD_SECONDS:.0f} s, because this machine was too busy.",
+                "Run it again when the machine has less to do.",
+            )
+        too_much.append("time")
     try:
         installed = dict(_files(run.stdout))
     except (tarfile.TarError, ValueError, EOFError):

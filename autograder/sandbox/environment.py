@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import atexit
 import contextlib
 import functools
 import os
 import random
+import shutil
 import stat
 import sys
 import sysconfig
@@ -57,11 +59,24 @@ def _log_folder() -> Path:
     """Where ROS writes its logs: a folder that nobody but its owner can read, even if another user made it first."""
     folder = Path(tempfile.gettempdir()) / f"autograder-log-{os.getuid()}"
     with contextlib.suppress(OSError):  # where nothing can be written, ROS says so
-        folder.mkdir(mode=0o700, exist_ok=True)
+        with contextlib.suppress(FileExistsError):  # whatever it is
+            folder.mkdir(mode=0o700)
         found = folder.lstat()
         if not stat.S_ISDIR(found.st_mode) or found.st_uid != os.getuid():
-            return Path(tempfile.mkdtemp(prefix=f"{folder.name}-"))
+            return _own_log_folder(f"{folder.name}-")
         folder.chmod(0o700)
+    return folder
+
+
+def _own_log_folder(prefix: str) -> Path:
+    """A new folder for the logs of this process alone, which takes it away at its end."""
+    folder, made_by = Path(tempfile.mkdtemp(prefix=prefix)), os.getpid()
+
+    def remove() -> None:
+        if os.getpid() == made_by:  # a fork of it ends earlier
+            shutil.rmtree(folder, ignore_errors=True)
+
+    atexit.register(remove)
     return folder
 
 

@@ -153,7 +153,7 @@ class ProgramGroup:
                 return
             self._pipes.go_on()
             for program in programs:
-                watch.put_behind(program)
+                program.priority.look(program.pid)
             if not watch.enforce(self.pid, self._base, programs, self._limits):
                 signal.pidfd_send_signal(self._first, signal.SIGKILL)
             self.changed.notify_all()

@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import os
 import threading
+import time
 from collections.abc import Callable
 
 from autograder.sandbox.loop import Loop
@@ -19,7 +20,11 @@ _PIECE = 1 << 16
 _MOST_PIECES = 64
 """Of one pipe before others have their turn: more than is read at once."""
 _AT_ONCE = 1 << 18
-"""Bytes of one pipe that are read between two looks at the launch: some megabytes a second, a book a second."""
+"""Bytes of one pipe that may be read between two looks at the launch, however soon they follow each other."""
+_A_SECOND = 10 * _AT_ONCE
+"""Bytes of one pipe that may be read in a second: a book. How often a launch is looked at depends on the machine."""
+_LONGEST = 10.0
+"""Seconds between two looks that count at the most."""
 
 
 class ProgramPipes:
@@ -34,6 +39,9 @@ class ProgramPipes:
         """Begin with no program."""
         self._loop = loop
         self._changed = changed
+        self._looked = time.monotonic()
+        self._room = _AT_ONCE
+        """Bytes of a pipe that may be read until the next look: as many as in the time between the last two."""
         self._read: dict[int, int] = {}
         """Bytes that were read of a pipe since the last look."""
         self._paused: dict[int, Callable[[], None]] = {}
@@ -63,6 +71,9 @@ class ProgramPipes:
 
     def go_on(self) -> None:
         """Read on where more was written than is read at once; only from the sandbox's thread."""
+        now = time.monotonic()
+        self._room = max(_AT_ONCE, int(_A_SECOND * min(now - self._looked, _LONGEST)))
+        self._looked = now
         self._read.clear()
         for descriptor, read in self._paused.items():
             self._loop.when_readable(descriptor, read)
@@ -100,7 +111,7 @@ class ProgramPipes:
                     return
             if data:
                 self._read[descriptor] = self._read.get(descriptor, 0) + len(data)
-                if self._read[descriptor] >= _AT_ONCE:
+                if self._read[descriptor] >= self._room:
                     self._loop.forget(descriptor)
                     self._paused[descriptor] = read
                 with self._changed:

@@ -14,6 +14,7 @@ from typing import Any
 from autograder.core.processes import pid_of
 from autograder.sandbox.inside import thread_stacks
 from autograder.sandbox.limits import Limits
+from autograder.sandbox.priority import Priority
 
 _LONGEST_NOTE = 4096
 """Bytes; the probe's own are shorter."""
@@ -41,6 +42,7 @@ class RunningProgram:
         self._handle = -1
         self.pid = -1
         """Process id as this process sees it."""
+        self.priority = Priority()
         self.began = time.monotonic()
         self._head = bytearray()
         self._tail = bytearray()

@@ -1,7 +1,7 @@
 """Holds the programs of a launch to what they may use together, which no limit of a single process does.
 
-What has a size has a limit. The time of the CPUs has none: how much of it a program takes in how long says as much
-about the machine as about the program. One that computes on and on goes on, behind everyone else who wants to compute.
+Memory, processes and disk have limits. CPU time has none, because how fast a program uses it depends on the machine as
+well. One that computes on and on goes on, behind everyone else who wants to compute (`priority.py`).
 """
 
 from __future__ import annotations
@@ -11,13 +11,9 @@ import os
 import signal
 from collections.abc import Sequence
 
-from autograder.core.cpu_use import computes
-from autograder.core.processes import Process, descendants, memory, proportional_memory, threads
+from autograder.core.processes import Process, descendants, memory, proportional_memory
 from autograder.sandbox.limits import Limits
 from autograder.sandbox.running_program import RunningProgram
-
-_LAST = 19
-"""The nice value of whoever lets everyone else go first (sched(7))."""
 
 
 def enforce(first: int, base: int, programs: Sequence[RunningProgram], limits: Limits) -> bool:
@@ -43,20 +39,6 @@ def enforce(first: int, base: int, programs: Sequence[RunningProgram], limits: L
     if sum(process.threads for process in family.values()) >= limits.processes - 8:
         _end_biggest(programs, family, {pid: process.threads for pid, process in family.items()}, "process limit")
     return True
-
-
-def put_behind(program: RunningProgram) -> None:
-    """Give a program that computes on and on the lowest priority; where it has it already, nothing is done.
-
-    The programs of its launch, and of others, come before it then. Where each session has its share of the CPUs
-    (sched(7), the autogroup feature) it takes no more than one session's, with however many threads: each program is
-    a session of its own.
-    """
-    with contextlib.suppress(OSError):
-        if os.getpriority(os.PRIO_PROCESS, program.pid) < _LAST and computes(program.pid):
-            for thread in threads(program.pid):  # those that they start begin as they are
-                with contextlib.suppress(ProcessLookupError):
-                    os.setpriority(os.PRIO_PROCESS, thread, _LAST)
 
 
 def _end_biggest(

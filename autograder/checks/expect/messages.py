@@ -31,7 +31,7 @@ _UNDER_WAY = 0.15
 """Seconds for which a thread that was about to publish may still do so."""
 
 
-@dataclass(frozen=True)
+@dataclass
 class _Wanted:
     """The messages that one expectation asks for, and the recording in which they arrive."""
 
@@ -44,9 +44,16 @@ class _Wanted:
     saying: str
     hint: str
 
+    def __post_init__(self) -> None:
+        self._counted: list[Received] = []
+        self._looked_at = self.skip
+
     def counted(self) -> list[Received]:
-        where = self.where
-        return [r for r in self.recording.messages[self.skip :] if where is None or bool(where(r.msg))]
+        """Those of the messages so far that count; each is looked at once."""
+        where, new = self.where, self.recording.messages_from(self._looked_at)
+        self._counted += [r for r in new if where is None or bool(where(r.msg))]
+        self._looked_at += len(new)
+        return self._counted
 
     def enough(self) -> bool:
         return len(self.counted()) >= self.need
@@ -243,8 +250,9 @@ class MessageExpectations(SourceExpectations):
         if not wrong:
             outcomes.passed(wanted.title, observed=_number(len(received)))
             return received
-        said_by = [in_words(msg, values) for msg in received]
-        observed = shorten("; ".join(said_by if len(said_by) <= 4 else [*said_by[:2], "…", *said_by[-2:]]))
+        shown = received if len(received) <= 4 else [*received[:2], *received[-2:]]
+        said = [in_words(msg, values) for msg in shown]
+        observed = shorten("; ".join(said if len(received) <= 4 else [*said[:2], "…", *said[2:]]))
         self._fail(wanted.title, Diagnosis(wrong, "content"), observed=observed, hint=wanted.hint)
 
     def expect_silence(

@@ -1,7 +1,8 @@
 """Builds ROS packages with colcon; what is installed goes to standard output as a tar, what was said to standard error.
 
-What it runs is a student's, and must not write in its place: the descriptor of the tar is not handed on, and no process
-can open it in /proc, as this one is not dumpable. In its sandbox it is the first process, so nobody else has it either.
+setup.py and CMake files are the student's and must not be able to write the tar themselves: its descriptor is not
+handed on, and no process can open it in /proc, as this one is not dumpable. In its sandbox it is the first process, so
+nobody else has it either.
 
 Usage: `python build_packages.py SRC WORK PREFIX PACKAGE…`. SRC is the folder that holds the packages' sources, WORK an
 empty folder, PREFIX the environment whose `share` holds ament's CMake files. It stands alone, as all in this folder.
