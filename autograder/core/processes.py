@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import threading
 from dataclasses import dataclass
 
 
@@ -49,6 +50,29 @@ def threads(pid: int) -> list[int]:
         OSError: it has ended.
     """
     return [int(entry) for entry in os.listdir(f"/proc/{pid}/task")]
+
+
+def can_start(count: int) -> bool:
+    """Whether the system lets this process start so many more threads now; found out by starting them.
+
+    A limit may be the user's, a container's or the system's, and not each of them can be read.
+    """
+    over = threading.Event()
+    before = threading.stack_size(256 * 1024)
+    started = []
+    try:
+        for _ in range(count):
+            thread = threading.Thread(target=over.wait, daemon=True)
+            thread.start()
+            started.append(thread)
+    except RuntimeError:
+        return False
+    finally:
+        threading.stack_size(before)
+        over.set()
+        for thread in started:
+            thread.join()
+    return True
 
 
 def descendants(root: int) -> dict[int, Process]:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 
 from autograder.arguments import params_file, remap_rules
+from autograder.core.errors import KitError
+from autograder.core.processes import can_start
 from autograder.diagnosis import callbacks
 from autograder.diagnosis.inside import Inside
 from autograder.diagnosis.reason import Diagnosis
@@ -16,6 +18,10 @@ _WRONG_FIELD = re.compile(
     r"(\w{1,100}?)__(?:msg|srv|action)__\w{1,100}convert_from_py.{0,200}Assertion `Py(\w{1,9})_Check"
 )
 """What the C code of an interface prints when a field does not hold what it should."""
+_NO_THREAD = re.compile(r"Resource temporarily unavailable|can't start new thread|std::system_error")
+"""What Python, or the middleware's C++, prints when the system starts no thread for it."""
+_THREADS = 192
+"""As many as the programs of a launch may have together; with fewer to be had, it is the machine that lacks them."""
 _KINDS = {"Long": "int", "Float": "float", "Bool": "bool", "Unicode": "str"}
 
 
@@ -41,6 +47,11 @@ def program_trouble(scene: Scene) -> Diagnosis | None:
 
 
 def _death(inside: Inside) -> Diagnosis:
+    """Why a program has ended.
+
+    Raises:
+        KitError: the machine is the reason.
+    """
     program = inside.program
     limit = program.stopped_by()
     if limit:
@@ -48,6 +59,11 @@ def _death(inside: Inside) -> Diagnosis:
             f"`{program.name}` was ended because it went over the {limit}.",
             limit.replace(" ", "-"),
             "Look for a loop without an end, or for data that grows without a bound.",
+        )
+    if _NO_THREAD.search(program.output()[-10_000:]) and not can_start(_THREADS):
+        raise KitError(
+            f"This machine allows no more threads, so `{program.name}` could not go on.",
+            "Close what else is running, such as other notebooks, or raise the limit: `ulimit -u`, or the container's.",
         )
     found = callbacks.failed(inside) or last_traceback(program.output(), program.name)
     if found:
