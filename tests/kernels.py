@@ -46,13 +46,14 @@ class Notebook:
         self._client.start_channels()
         self._client.wait_for_ready(timeout=START)
 
-    def save(self, *cells: tuple[str, str, dict[str, Any]]) -> None:
-        """Save cells: id, source, metadata."""
+    def save(self, *cells: tuple[str, str, dict[str, Any]], answers: dict[str, str] | None = None) -> None:
+        """Save cells: id, source, metadata; and the answers' files by grade_id, as a released notebook says them."""
         made = [
             {"cell_type": "code", "id": i, "source": s, "metadata": m, "outputs": [], "execution_count": None}
             for i, s, m in cells
         ]
-        self.path.write_text(json.dumps({"cells": made, "metadata": {}, "nbformat": 4, "nbformat_minor": 5}))
+        metadata = {"autograder": {"answers": answers}} if answers else {}
+        self.path.write_text(json.dumps({"cells": made, "metadata": metadata, "nbformat": 4, "nbformat_minor": 5}))
 
     def run(self, source: str, cell_id: str = "", interrupt_after: float | None = None) -> Shown:
         """Run a cell, and interrupt it once so many seconds after it was sent, if it runs that long."""

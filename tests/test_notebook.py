@@ -25,7 +25,7 @@ from autograder.notebook import hints
 from autograder.notebook.kernel import NO_VERDICT, Kernel
 from autograder.notebook.program_folder import MANIFEST
 from autograder.notebook.saved_notebook import SavedNotebook
-from autograder.submission.copies import told_of_copies
+from autograder.submission.copies import SPLIT, told_of_copies, told_of_given_copies
 
 TALKER = """%%node talker
 import rclpy
@@ -400,6 +400,81 @@ def test_copies_of_an_answer_cell_are_told_as_grading_counts_them(notebook: Note
             flowing = " ".join(shown.split())
             assert copied in flowing and "Move your text" not in flowing
             assert (f"This report is about another one, cell [{number}]" in flowing) is not counts
+
+
+def said(notebook: Notebook) -> list[str]:
+    """What the check and `%lab` say, on one line."""
+    return [" ".join(notebook.run(cell).text.split()) for cell in (CHECK, "%lab")]
+
+
+FILES = {"talker": "talker.py", "listener": "listener.py"}
+
+
+def test_a_copy_with_the_name_of_another_answer_is_told(notebook: Notebook) -> None:
+    listener = answer("%%node listener\n# YOUR CODE HERE", "listener")
+    mine = ("copy", TALKER.replace("%%node talker", "%%node listener"), answer(TALKER)[2])
+    notebook.save(answer(TALKER), listener, mine, answers=FILES)
+    notebook.run(TALKER, "talker")
+    number = notebook.run(mine[1], "copy").number
+    for shown in (" ".join(notebook.run(CHECK.replace("talker", "listener")).text.split()), said(notebook)[1]):
+        assert f"This `listener` comes from a cell of your own, cell [{number}]. Grading ignores that cell" in shown
+    notebook.run(listener[1], "listener")
+
+
+@pytest.mark.parametrize(
+    ("cells", "expected"),
+    [
+        ([("talker", "", answer("")[2])], "The cell for this answer, `talker`, no longer begins with `%%node talker`"),
+        ([], "The lab's cell for this answer, `talker`, was deleted"),
+    ],
+)
+def test_an_answer_that_was_moved_out_of_the_labs_cell_is_told(
+    notebook: Notebook, cells: list[tuple[str, str, dict[str, Any]]], expected: str
+) -> None:
+    notebook.save(*cells, ("mine", TALKER, {}), answers=FILES)
+    notebook.run(TALKER, "mine")
+    for shown in said(notebook):
+        assert expected in shown
+
+
+def test_an_answer_that_is_no_code_cell_any_more_is_told(notebook: Notebook) -> None:
+    notebook.run(TALKER, "talker")
+    notebook.save(answer(TALKER), answers=FILES)
+    content = json.loads(notebook.path.read_text())
+    content["cells"][0]["cell_type"] = "markdown"
+    notebook.path.write_text(json.dumps(content))
+    for shown in said(notebook):
+        assert "The cell for this answer, `talker`, is no code cell any more" in shown
+
+
+def test_a_copy_that_was_run_and_deleted_leads_to_the_labs_cell(notebook: Notebook) -> None:
+    notebook.run(TALKER, "copy")
+    notebook.save(answer(TALKER.replace("0.05", "0.06")))
+    later(notebook)
+    for shown in said(notebook):
+        assert "This `talker` comes from a cell that is no longer in the notebook." in shown
+        assert "begins with `%%node talker`: run that one, then this check." in shown
+    write(notebook)
+    assert "no longer in the notebook" not in "".join(said(notebook))
+
+
+def test_an_id_that_no_notebook_has_says_nothing_of_the_cell(notebook: Notebook) -> None:
+    """As Visual Studio Code tells it: the address of a document of its own."""
+    notebook.run(TALKER, "vscode-notebook-cell:/home/ann/lab.ipynb#W2sZmlsZQ%3D%3D")
+    notebook.save(answer(TALKER.replace("0.05", "0.06")))
+    assert "which is not in the saved notebook" not in "".join(said(notebook))
+
+
+def test_copies_and_pieces_that_do_not_count_are_told_as_by_grading(notebook: Notebook) -> None:
+    piece = ("piece", "print('the second half')", answer("")[2])
+    notebook.save(answer(TALKER), piece, answers=FILES)
+    notebook.run(TALKER, "talker")
+    for shown in said(notebook):
+        assert SPLIT.format("%%node talker") in shown
+    identity, source, metadata = answer(TALKER)
+    given = {"nbgrader": metadata["nbgrader"] | {"solution": False, "locked": True}}
+    notebook.save((identity, source, given), ("copy", source, given))
+    assert told_of_given_copies("talker", 2) in said(notebook)[0]
 
 
 def later(notebook: Notebook) -> None:
