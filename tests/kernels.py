@@ -90,6 +90,29 @@ class Notebook:
                 if kind == "execute_result":
                     shown.result = content["data"]["text/plain"]
 
+    def open_subshell(self) -> str:
+        """Open a subshell, as JupyterLab does for what widgets say, and return its id."""
+        request = self._client.session.msg("create_subshell_request", {})
+        self._client.control_channel.send(request)
+        while True:
+            reply = self._client.get_control_msg(timeout=START)
+            if reply["parent_header"].get("msg_id") == request["header"]["msg_id"]:
+                return str(reply["content"]["subshell_id"])
+
+    def ask(self, subshell: str) -> None:
+        """Let a subshell answer a request, and wait until it has; a cell may run meanwhile."""
+        for _ in range(2):  # the first has been dealt with in full once the second is answered
+            request = self._client.session.msg("kernel_info_request", {})
+            request["header"]["subshell_id"] = subshell
+            self._client.shell_channel.send(request)
+            while True:
+                reply = self._client.get_shell_msg(timeout=START)
+                if reply["parent_header"].get("msg_id") == request["header"]["msg_id"]:
+                    break
+
+    def interrupt(self) -> None:
+        self._manager.interrupt_kernel()
+
     def restart(self) -> None:
         self._client.stop_channels()
         self._manager.restart_kernel(now=True)

@@ -6,10 +6,12 @@ import hashlib
 import json
 import os
 import random
+import signal
 import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor, wait
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +20,7 @@ from IPython.core.interactiveshell import InteractiveShell
 from kernels import START, Notebook
 
 import autograder.checks
-from autograder.core import front_end
+from autograder.core import front_end, interrupts
 from autograder.course.cell_file import parse
 from autograder.course.lab import blank_mark
 from autograder.notebook import hints
@@ -728,6 +730,41 @@ def test_an_interrupt_while_a_cell_explores_ends_what_it_started(notebook: Noteb
     waiting = 'with launch("talker") as ros:\n    ros.wait(lambda: False, within=600)'
     assert notebook.run(waiting, interrupt_after=2.0).error == "Interrupted."
     assert "✓ passed" in notebook.run(CHECK).text
+
+
+def test_what_a_subshell_answers_leaves_the_interrupts_of_the_cell_alone(notebook: Notebook) -> None:
+    """JupyterLab sends what widgets say over subshells, each a thread of the kernel, while a cell runs."""
+    write(notebook)
+    subshell = notebook.open_subshell()
+    cell = 'with launch("talker") as ros:\n    ros.expect_node("/talker")\n    ros.wait(lambda: False, within=60)'
+    with ThreadPoolExecutor() as pool:
+        ran = pool.submit(notebook.run, cell)
+        notebook.ask(subshell)
+        while not ran.done():
+            notebook.interrupt()
+            wait([ran], timeout=1)
+    shown = ran.result()
+    assert (shown.error, "passed" in shown.text) == (NO_VERDICT, False)
+
+
+def test_one_click_interrupts_once() -> None:
+    interrupts.begin({})
+    try:
+        os.kill(os.getpid(), signal.SIGINT)
+        signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # a reminder is under way and comes late
+        deadline = time.monotonic() + 60
+        while signal.SIGINT not in signal.sigpending() and time.monotonic() < deadline:
+            pass
+        with pytest.raises(interrupts.Interrupted):
+            interrupts.here()
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+        interrupts.here()
+        os.kill(os.getpid(), signal.SIGINT)
+        with pytest.raises(interrupts.Interrupted):
+            interrupts.here()
+    finally:
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+        interrupts.end()
 
 
 def test_an_interrupt_that_the_cell_catches_is_told_once(notebook: Notebook) -> None:
