@@ -154,7 +154,11 @@ class Launch(
             refuse_to_start(self._running.described)
             make_room()
             runtime.current.robot = robot = self._enter()
-            robot.wait_for_nodes()
+            try:
+                robot.wait_for_nodes()
+            except BaseException:  # the cell has no name for it yet, by which it could be stopped
+                robot.stop()
+                raise
             print(robot)
         elif self._group is not None:
             self._start(node)

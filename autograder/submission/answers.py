@@ -28,7 +28,8 @@ def take_answers(cells: list[dict[str, Any]], lab: Lab, submission: Submission) 
     released = {grade_id_of(cell): cell for cell in lab.released if grade_id_of(cell)}
     found = by_mark(cells)
     ours = lab.answers.keys() | {cell.grade_id for cell in lab.checks}
-    # Labs may call a few cells alike: of another one's, most are unknown here, and most of this one's answers missing.
+    # Labs may have names of cells in common. Of another lab's notebook most are unknown here, and most answers of
+    # this one are missing.
     known, answers = len(found.keys() & ours), len(found.keys() & lab.answers.keys())
     if not known or (2 * known < len(found.keys() - (released.keys() - ours)) and 2 * answers < len(lab.answers)):
         raise UnreadableError(
@@ -117,7 +118,7 @@ def _take_cell(
 
 
 def _compare(grade_id: str, copies: list[dict[str, Any]], lab: Lab, submission: Submission) -> None:
-    """Report an edited check cell; a deleted one does no harm, for the lab's own cell is run anyway.
+    """Report an edited check cell; a deleted one does no harm, because the lab's own cell is run anyway.
 
     Not edited is also the cell of the lab's source, hidden lines included: who writes a lab checks that notebook.
     """
