@@ -7,6 +7,11 @@ import os
 import threading
 from dataclasses import dataclass
 
+from autograder.core.errors import KitError
+
+_OF_A_LAUNCH = 192
+"""Threads that the programs of a launch may have together (`sandbox.limits`)."""
+
 
 @dataclass(frozen=True)
 class Process:
@@ -52,7 +57,21 @@ def threads(pid: int) -> list[int]:
     return [int(entry) for entry in os.listdir(f"/proc/{pid}/task")]
 
 
-def can_start(count: int) -> bool:
+def no_threads(who: str) -> KitError | None:
+    """Return what to say if the machine allows fewer threads than a launch may have; None if it allows them.
+
+    Args:
+        who: could not go on, such as "`talker`".
+    """
+    if _can_start(_OF_A_LAUNCH):
+        return None
+    return KitError(
+        f"This machine allows no more threads, so {who} could not go on.",
+        "Close what else is running, such as other notebooks, or raise the limit: `ulimit -u`, or the container's.",
+    )
+
+
+def _can_start(count: int) -> bool:
     """Whether the system lets this process start so many more threads now; found out by starting them.
 
     A limit may be the user's, a container's or the system's, and not each of them can be read.

@@ -5,8 +5,7 @@ from __future__ import annotations
 import re
 
 from autograder.arguments import params_file, remap_rules
-from autograder.core.errors import KitError
-from autograder.core.processes import can_start
+from autograder.core.processes import no_threads
 from autograder.diagnosis import callbacks
 from autograder.diagnosis.inside import Inside
 from autograder.diagnosis.reason import Diagnosis
@@ -20,8 +19,6 @@ _WRONG_FIELD = re.compile(
 """What the C code of an interface prints when a field does not hold what it should."""
 _NO_THREAD = re.compile(r"Resource temporarily unavailable|can't start new thread|std::system_error")
 """What Python, or the middleware's C++, prints when the system starts no thread for it."""
-_THREADS = 192
-"""As many as the programs of a launch may have together; with fewer to be had, it is the machine that lacks them."""
 _KINDS = {"Long": "int", "Float": "float", "Bool": "bool", "Unicode": "str"}
 
 
@@ -60,11 +57,8 @@ def _death(inside: Inside) -> Diagnosis:
             limit.replace(" ", "-"),
             "Look for a loop without an end, or for data that grows without a bound.",
         )
-    if _NO_THREAD.search(program.output()[-10_000:]) and not can_start(_THREADS):
-        raise KitError(
-            f"This machine allows no more threads, so `{program.name}` could not go on.",
-            "Close what else is running, such as other notebooks, or raise the limit: `ulimit -u`, or the container's.",
-        )
+    if _NO_THREAD.search(program.output()[-10_000:]) and (trouble := no_threads(f"`{program.name}`")):
+        raise trouble
     found = callbacks.failed(inside) or last_traceback(program.output(), program.name)
     if found:
         return found
