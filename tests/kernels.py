@@ -46,13 +46,14 @@ class Notebook:
         self._client.start_channels()
         self._client.wait_for_ready(timeout=START)
 
-    def save(self, *cells: tuple[str, str, dict[str, Any]]) -> None:
-        """Save cells: id, source, metadata."""
+    def save(self, *cells: tuple[str, str, dict[str, Any]], answers: dict[str, str] | None = None) -> None:
+        """Save cells: id, source, metadata; and the answers' files by grade_id, as a released notebook says them."""
         made = [
             {"cell_type": "code", "id": i, "source": s, "metadata": m, "outputs": [], "execution_count": None}
             for i, s, m in cells
         ]
-        self.path.write_text(json.dumps({"cells": made, "metadata": {}, "nbformat": 4, "nbformat_minor": 5}))
+        metadata = {"autograder": {"answers": answers}} if answers else {}
+        self.path.write_text(json.dumps({"cells": made, "metadata": metadata, "nbformat": 4, "nbformat_minor": 5}))
 
     def run(self, source: str, cell_id: str = "", interrupt_after: float | None = None) -> Shown:
         """Run a cell, and interrupt it once so many seconds after it was sent, if it runs that long."""
@@ -88,6 +89,29 @@ class Notebook:
                 shown.html += content["data"].get("text/html", "")
                 if kind == "execute_result":
                     shown.result = content["data"]["text/plain"]
+
+    def open_subshell(self) -> str:
+        """Open a subshell, as JupyterLab does for what widgets say, and return its id."""
+        request = self._client.session.msg("create_subshell_request", {})
+        self._client.control_channel.send(request)
+        while True:
+            reply = self._client.get_control_msg(timeout=START)
+            if reply["parent_header"].get("msg_id") == request["header"]["msg_id"]:
+                return str(reply["content"]["subshell_id"])
+
+    def ask(self, subshell: str) -> None:
+        """Let a subshell answer a request, and wait until it has; a cell may run meanwhile."""
+        for _ in range(2):  # the first has been dealt with in full once the second is answered
+            request = self._client.session.msg("kernel_info_request", {})
+            request["header"]["subshell_id"] = subshell
+            self._client.shell_channel.send(request)
+            while True:
+                reply = self._client.get_shell_msg(timeout=START)
+                if reply["parent_header"].get("msg_id") == request["header"]["msg_id"]:
+                    break
+
+    def interrupt(self) -> None:
+        self._manager.interrupt_kernel()
 
     def restart(self) -> None:
         self._client.stop_channels()

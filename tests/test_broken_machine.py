@@ -7,9 +7,11 @@ found out at another try.
 from __future__ import annotations
 
 import contextlib
+import os
 import shutil
 import signal
 import subprocess
+import sys
 import sysconfig
 import threading
 import time
@@ -19,9 +21,10 @@ from pathlib import Path
 import psutil
 import pytest
 from broken_machine import graded, job_of, lost, result_of, started
+from side_by_side import USERS, as_user
 from test_building import INTERFACES, SENSORS, changed, package
 
-from autograder.core.results import SubmissionResult
+from autograder.core.results import Isolation, SubmissionResult
 from autograder.grading.job import Job
 from autograder.sandbox.isolation import preflight
 
@@ -122,6 +125,48 @@ def test_files_of_etc_that_are_replaced_while_a_submission_is_graded_cost_nothin
 def test_where_a_process_may_open_too_few_files_nothing_is_held_against_the_program() -> None:
     result = graded(right_student("launch"), words=["prlimit", "--nofile=40"])
     assert points(result) == {"launch": None}, result
+
+
+SLEEPERS = """import threading, time
+for _ in range(180):
+    threading.Thread(target=time.sleep, args=(600,), daemon=True).start()
+print("all started", flush=True)
+time.sleep(600)"""
+MANY_THREADS = """import threading, time
+for _ in range(100):
+    threading.Thread(target=time.sleep, args=(60,), daemon=True).start()
+time.sleep(60)
+"""
+NO_ROOT = pytest.mark.skipif(os.getuid() != 0, reason="only root becomes another user, and has no such limit itself")
+
+
+@NO_ROOT
+def test_what_else_a_user_runs_takes_no_threads_from_the_programs_of_a_launch() -> None:
+    """With a browser open the kernel would allow no more, if it counted what runs outside of the launch."""
+    node = "import rclpy\nrclpy.init()\nrclpy.create_node('talk')\nprint('made')\n"
+    job = job_of({"talk.py": node}, {"launch": LAUNCH}, Isolation.REDUCED)
+    sleepers = subprocess.Popen([*as_user(USERS[0]), sys.executable, "-c", SLEEPERS], stdout=subprocess.PIPE, text=True)
+    try:
+        assert sleepers.stdout is not None and sleepers.stdout.readline()
+        result = graded(job, words=as_user(USERS[0]))
+    finally:
+        sleepers.kill()
+        sleepers.communicate()
+    assert points(result) == {"launch": 1.0}, result
+
+
+@NO_ROOT
+def test_where_the_machine_allows_too_few_threads_nothing_is_held_against_the_program() -> None:
+    job = job_of({"talk.py": MANY_THREADS}, {"launch": LAUNCH}, Isolation.NONE)
+    result = graded(job, words=[*as_user(USERS[0]), "prlimit", "--nproc=120"])
+    assert points(result) == {"launch": None}, result
+    assert "allows no more threads" in result.checks[0].outcomes[0].because
+
+
+def test_a_program_that_only_says_so_fails() -> None:
+    says = 'raise RuntimeError("can\'t start new thread")\n'
+    result = graded(job_of({"talk.py": says}, {"launch": LAUNCH}))
+    assert points(result) == {"launch": 0.0}, result
 
 
 REPLACED = ("ld.so.cache", "nsswitch.conf", "localtime", "passwd", "hosts")

@@ -321,3 +321,27 @@ def test_an_observer_that_hears_nothing_any_more_says_so(talking: Observer, monk
     monkeypatch.setattr(talking.record("/numbers", Int64), "_keep", lambda *_: 1 / 0)
     with pytest.raises(KitError, match="hears nothing any more: ZeroDivisionError"):
         talking.wait(lambda: False, 30)
+
+
+def test_an_observer_that_is_shut_down_with_all_of_rclpy_says_so() -> None:
+    """As by an interrupt once somebody has called rclpy.init() in a cell: from then on rclpy takes the signals."""
+    script = """
+import contextlib, os, signal, time
+import rclpy
+from autograder.core.errors import KitError
+from autograder.graph.domains import claim_domain
+from autograder.graph.observer import Observer
+domain = claim_domain()
+observer = Observer(domain.id, left=domain.release)
+rclpy.init()
+with contextlib.suppress(KeyboardInterrupt):
+    os.kill(os.getpid(), signal.SIGINT)
+    time.sleep(60)
+try:
+    observer.wait(lambda: False, 30)
+except KitError as error:
+    print(error.what)
+observer.close()
+"""
+    said = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=180, check=False)
+    assert "The observer hears nothing any more: RuntimeError('its ROS context was shut down')." in said.stdout, said

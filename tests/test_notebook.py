@@ -6,10 +6,12 @@ import hashlib
 import json
 import os
 import random
+import signal
 import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor, wait
 from pathlib import Path
 from typing import Any
 
@@ -18,14 +20,14 @@ from IPython.core.interactiveshell import InteractiveShell
 from kernels import START, Notebook
 
 import autograder.checks
-from autograder.core import front_end
+from autograder.core import front_end, interrupts
 from autograder.course.cell_file import parse
 from autograder.course.lab import blank_mark
 from autograder.notebook import hints
 from autograder.notebook.kernel import NO_VERDICT, Kernel
 from autograder.notebook.program_folder import MANIFEST
 from autograder.notebook.saved_notebook import SavedNotebook
-from autograder.submission.copies import told_of_copies
+from autograder.submission.copies import SPLIT, told_of_copies, told_of_given_copies
 
 TALKER = """%%node talker
 import rclpy
@@ -398,8 +400,83 @@ def test_copies_of_an_answer_cell_are_told_as_grading_counts_them(notebook: Note
         number = notebook.run(source, identity).number
         for shown in (notebook.run(CHECK).text, notebook.run("%lab").text):
             flowing = " ".join(shown.split())
-            assert copied in flowing and "Move your text" not in flowing
+            assert flowing.count(copied) == 1 and "Move your text" not in flowing
             assert (f"This report is about another one, cell [{number}]" in flowing) is not counts
+
+
+def said(notebook: Notebook) -> list[str]:
+    """What the check and `%lab` say, on one line."""
+    return [" ".join(notebook.run(cell).text.split()) for cell in (CHECK, "%lab")]
+
+
+FILES = {"talker": "talker.py", "listener": "listener.py"}
+
+
+def test_a_copy_with_the_name_of_another_answer_is_told(notebook: Notebook) -> None:
+    listener = answer("%%node listener\n# YOUR CODE HERE", "listener")
+    mine = ("copy", TALKER.replace("%%node talker", "%%node listener"), answer(TALKER)[2])
+    notebook.save(answer(TALKER), listener, mine, answers=FILES)
+    notebook.run(TALKER, "talker")
+    number = notebook.run(mine[1], "copy").number
+    for shown in (" ".join(notebook.run(CHECK.replace("talker", "listener")).text.split()), said(notebook)[1]):
+        assert f"This `listener` comes from a cell of your own, cell [{number}]. Grading ignores that cell" in shown
+    notebook.run(listener[1], "listener")
+
+
+@pytest.mark.parametrize(
+    ("cells", "expected"),
+    [
+        ([("talker", "", answer("")[2])], "The cell for this answer, `talker`, no longer begins with `%%node talker`"),
+        ([], "The lab's cell for this answer, `talker`, was deleted"),
+    ],
+)
+def test_an_answer_that_was_moved_out_of_the_labs_cell_is_told(
+    notebook: Notebook, cells: list[tuple[str, str, dict[str, Any]]], expected: str
+) -> None:
+    notebook.save(*cells, ("mine", TALKER, {}), answers=FILES)
+    notebook.run(TALKER, "mine")
+    for shown in said(notebook):
+        assert expected in shown
+
+
+def test_an_answer_that_is_no_code_cell_any_more_is_told(notebook: Notebook) -> None:
+    notebook.run(TALKER, "talker")
+    notebook.save(answer(TALKER), answers=FILES)
+    content = json.loads(notebook.path.read_text())
+    content["cells"][0]["cell_type"] = "markdown"
+    notebook.path.write_text(json.dumps(content))
+    for shown in said(notebook):
+        assert "The cell for this answer, `talker`, is no code cell any more" in shown
+
+
+def test_a_copy_that_was_run_and_deleted_leads_to_the_labs_cell(notebook: Notebook) -> None:
+    notebook.run(TALKER, "copy")
+    notebook.save(answer(TALKER.replace("0.05", "0.06")))
+    later(notebook)
+    for shown in said(notebook):
+        assert "This `talker` comes from a cell that is no longer in the notebook." in shown
+        assert "begins with `%%node talker`: run that one, then this check." in shown
+    write(notebook)
+    assert "no longer in the notebook" not in "".join(said(notebook))
+
+
+def test_an_id_that_no_notebook_has_says_nothing_of_the_cell(notebook: Notebook) -> None:
+    """As Visual Studio Code tells it: the address of a document of its own."""
+    notebook.run(TALKER, "vscode-notebook-cell:/home/ann/lab.ipynb#W2sZmlsZQ%3D%3D")
+    notebook.save(answer(TALKER.replace("0.05", "0.06")))
+    assert "which is not in the saved notebook" not in "".join(said(notebook))
+
+
+def test_copies_and_pieces_that_do_not_count_are_told_as_by_grading(notebook: Notebook) -> None:
+    piece = ("piece", "print('the second half')", answer("")[2])
+    notebook.save(answer(TALKER), piece, answers=FILES)
+    notebook.run(TALKER, "talker")
+    for shown in said(notebook):
+        assert SPLIT.format("%%node talker") in shown
+    identity, source, metadata = answer(TALKER)
+    given = {"nbgrader": metadata["nbgrader"] | {"solution": False, "locked": True}}
+    notebook.save((identity, source, given), ("copy", source, given))
+    assert told_of_given_copies("talker", 2) in said(notebook)[0]
 
 
 def later(notebook: Notebook) -> None:
@@ -631,9 +708,8 @@ def test_an_interrupted_check_has_no_verdict_wherever_that_finds_it(notebook: No
     """At any moment: in the kit's set-up, in a wait, in the check's own lines, at the end of the block."""
     write(notebook)
     whole = notebook.run(CHECK)
-    remains = "import threading\nfrom autograder.checks import runtime\n"
-    remains += "print(runtime.current.block, threading.active_count())"
-    before = notebook.run(remains).text
+    threads = "import os\nprint(len(os.listdir('/proc/self/task')))"  # with those of the middleware
+    before = int(notebook.run(threads).text)
     moments = random.Random(19)
     interrupted = 0
     while interrupted < 8:
@@ -644,7 +720,11 @@ def test_an_interrupted_check_has_no_verdict_wherever_that_finds_it(notebook: No
         else:  # it came when all was said; the machine is faster now
             assert shown.result == whole.result
             whole = shown
-    assert notebook.run(remains).text == before
+    deadline = time.monotonic() + 60
+    while int(notebook.run(threads).text) > before and time.monotonic() < deadline:
+        pass
+    assert int(notebook.run(threads).text) <= before
+    assert notebook.run("from autograder.checks import runtime\nprint(runtime.current.block)").text == "None\n"
     assert notebook.run(CHECK).result == whole.result
 
 
@@ -670,6 +750,59 @@ with launch("talker") as ros:
     ros.wait(waits.set, within=600)"""
     assert notebook.run(waiting).error == "Interrupted."
     assert "✓ passed" in notebook.run(CHECK).text
+
+
+def test_a_start_that_is_interrupted_leaves_nothing_running(notebook: Notebook) -> None:
+    """Nobody has a name for it by which it could be stopped."""
+    notebook.run("%%node quiet\nimport time\ntime.sleep(600)")
+    while not notebook.run('robot = launch("quiet").start()', interrupt_after=2.0).error:
+        pass  # it waits for five seconds for a node; the machine is slow
+    assert notebook.run("from autograder.checks import runtime\nprint(runtime.current.robot)").text == "None\n"
+
+
+def test_an_interrupted_command_ends_its_cell(notebook: Notebook) -> None:
+    write(notebook)
+    notebook.run('robot = launch("talker").start()')
+    for command in ("echo /silent std_msgs/msg/String", "pub --once -w 0 --keep-alive 600 /said std_msgs/msg/String"):
+        while not (shown := notebook.run(f"%ros2 topic {command}\nprint('after')", interrupt_after=2.0)).error:
+            assert "stopped after 10 s" in shown.text  # the machine is slow
+        assert "Interrupted" in shown.error and "after" not in shown.text.split()
+    notebook.run("robot.stop()")
+
+
+def test_what_a_subshell_answers_leaves_the_interrupts_of_the_cell_alone(notebook: Notebook) -> None:
+    """JupyterLab sends what widgets say over subshells, each a thread of the kernel, while a cell runs."""
+    write(notebook)
+    subshell = notebook.open_subshell()
+    cell = 'with launch("talker") as ros:\n    ros.expect_node("/talker")\n    ros.wait(lambda: False, within=60)'
+    with ThreadPoolExecutor() as pool:
+        ran = pool.submit(notebook.run, cell)
+        notebook.ask(subshell)
+        while not ran.done():
+            notebook.interrupt()
+            wait([ran], timeout=1)
+    shown = ran.result()
+    assert (shown.error, "passed" in shown.text) == (NO_VERDICT, False)
+
+
+def test_one_click_interrupts_once() -> None:
+    interrupts.begin({})
+    try:
+        os.kill(os.getpid(), signal.SIGINT)
+        signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # a reminder is under way and comes late
+        deadline = time.monotonic() + 60
+        while signal.SIGINT not in signal.sigpending() and time.monotonic() < deadline:
+            pass
+        with pytest.raises(interrupts.Interrupted):
+            interrupts.here()
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+        interrupts.here()
+        os.kill(os.getpid(), signal.SIGINT)
+        with pytest.raises(interrupts.Interrupted):
+            interrupts.here()
+    finally:
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+        interrupts.end()
 
 
 def test_an_interrupt_that_the_cell_catches_is_told_once(notebook: Notebook) -> None:
@@ -812,3 +945,8 @@ def test_lab_says_what_is_done_what_is_open_and_what_was_predicted(notebook: Not
     assert "<b>2. Ticks</b>" in said.html
     notebook.run(GUESSES, "c2")
     assert "passed, but a cell above was run again since" in notebook.run("%lab").text
+    for source in ("YOUR ANSWER HERE", "YOUR ANSWER HERE\n"):
+        made[-1] = made[-1] | {"source": source, "id": f"why-{len(source)}"}
+        made.append(made[-1])
+    notebook.path.write_text(json.dumps({"cells": made, "metadata": {}, "nbformat": 4, "nbformat_minor": 5}))
+    assert "3. Explain not written yet" in " ".join(notebook.run("%lab").text.split())

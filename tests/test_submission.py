@@ -272,6 +272,35 @@ def test_of_copies_of_an_answer_the_last_one_counts_and_of_a_text_all(lab: Lab, 
     assert told == [told_of_copies("%%node talker", 2), told_of_copies("why", 2, is_file=False)]
 
 
+def test_a_copied_answer_cell_with_the_name_of_another_answer_is_told(lab: Lab, tmp_path: Path) -> None:
+    cells = solved(lab)
+    mine = "%%file answers.yaml\nanswer: 41"
+    cells.append(copy.deepcopy(by_id(cells, "talker")) | {"source": mine, "id": "copied"})
+    submission = read(lab, tmp_path, cells)
+    assert codes(submission) == ["ignored-cell"]
+    assert "what counts is the cell for this answer, `answers`" in submission.problems[0].because
+    assert "41" not in submission.files["answers.yaml"]
+
+
+def test_an_answer_that_is_no_code_cell_any_more_is_no_program(lab: Lab, tmp_path: Path) -> None:
+    """As in the notebook, where nobody can run it."""
+    cells = json.loads(json.dumps(solved(lab)))
+    by_id(cells, "talker")["cell_type"] = "markdown"
+    submission = read(lab, tmp_path, cells)
+    assert codes(submission) == ["missing-cell"]
+    assert "no code cell any more" in submission.problems[0].because
+    assert submission.sources["talker"] == lab.answers["talker"].blank
+
+
+def test_the_piece_of_an_answer_that_was_split_off_is_told(lab: Lab, tmp_path: Path) -> None:
+    cells = json.loads(json.dumps(solved(lab)))
+    cells.append({**by_id(cells, "talker"), "id": "piece", "source": "print('the second half')"})
+    submission = read(lab, tmp_path, cells)
+    assert codes(submission) == ["split-cell"] and "Merge them" in submission.problems[0].because
+    cells[-1]["source"] = "\n"
+    assert codes(read(lab, tmp_path, cells)) == []
+
+
 def test_the_labs_own_source_is_a_notebook_without_defects(lab: Lab, tmp_path: Path) -> None:
     assert "HIDDEN TESTS" in json.dumps(lab.raw)
     submission = read(lab, tmp_path, lab.raw["cells"])

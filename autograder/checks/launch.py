@@ -33,6 +33,7 @@ from autograder.checks.starting import file_of, refuse_to_start, why_missing, wo
 from autograder.checks.try_out import Log, log_of, try_out
 from autograder.checks.waiting import NotLaunchedError, watched
 from autograder.core.front_end import Watcher
+from autograder.core.processes import no_threads
 from autograder.diagnosis import Diagnosis
 from autograder.graph.domains import claim_domain
 from autograder.graph.observer import ForgedGraph, Observer
@@ -97,7 +98,10 @@ class Launch(
         # The middleware reads its profile once, before the first participant of the process.
         os.environ.update(profile_environment())
         os.environ.pop("ROS_AUTOMATIC_DISCOVERY_RANGE", None)
-        self._running.observer = Observer(domain.id, findings.current.patience, domain.release)
+        try:
+            self._running.observer = Observer(domain.id, findings.current.patience, domain.release)
+        except RuntimeError as error:  # rclpy's RCLError is one
+            raise no_threads("the launch") or error from None
         self._entered = True
         findings.current.begin_block()
         try:
@@ -154,7 +158,11 @@ class Launch(
             refuse_to_start(self._running.described)
             make_room()
             runtime.current.robot = robot = self._enter()
-            robot.wait_for_nodes()
+            try:
+                robot.wait_for_nodes()
+            except BaseException:  # the cell has no name for it yet, by which it could be stopped
+                robot.stop()
+                raise
             print(robot)
         elif self._group is not None:
             self._start(node)

@@ -1,9 +1,9 @@
 """Interrupts of a notebook's cell: Jupyter's Interrupt, or Ctrl-C.
 
 Python raises KeyboardInterrupt between any two of its instructions. In the middle of the kit's work that would leave a
-participant, a program or a lock behind, and the next check would pay for it. So while a cell runs, an interrupt comes
-at once in the cell's own code only. Elsewhere it waits for one of the kit's safe places, which call `here`, or for the
-cell's own code.
+participant, a program or a lock behind, and the next check would pay for it. An interrupt that finds the cell's own
+code is raised at once. One that finds the kit at work waits until the kit reaches a safe place (`here`), or until the
+cell's own code runs again.
 """
 
 from __future__ import annotations
@@ -40,6 +40,8 @@ class CellInterrupts:
         self._variables = variables
         self._asked = False
         """Whether an interrupt waits. All that the handler may touch: whatever it interrupts may hold any lock."""
+        self._reminded = False
+        """Whether the next signal, or one that is on its way, is no new interrupt."""
         self._sending = threading.Lock()
         self._closing = threading.Event()
         self._before = signal.signal(signal.SIGINT, self._on_interrupt)
@@ -64,6 +66,9 @@ class CellInterrupts:
             raise Interrupted(self.sentence or "Interrupted.")
 
     def _on_interrupt(self, number: int, frame: FrameType | None) -> None:
+        reminded, self._reminded = self._reminded, False
+        if reminded and not self._asked:
+            return  # what this reminds of has been raised meanwhile
         self._asked = not self._in_cell(frame)
         if self._asked:
             return
@@ -87,6 +92,7 @@ class CellInterrupts:
         while not self._closing.wait(_AGAIN):
             with self._sending:
                 if self._asked:
+                    self._reminded = True
                     signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGINT)
 
 
@@ -95,6 +101,8 @@ _active: CellInterrupts | None = None
 
 def begin(variables: dict[str, Any]) -> None:
     """Hold interrupts from now on; without this, as in grading, they come as Python raises them.
+
+    Outside of the main thread, where no cell runs, nothing is done.
 
     Args:
         variables: of the cells.
@@ -111,11 +119,12 @@ def say(sentence: str) -> None:
 
 
 def end() -> None:
-    """Hold them no longer."""
+    """Hold them no longer. Kernels call it in other threads, too, for requests that come while a cell runs."""
     global _active
-    ended, _active = _active, None
-    if ended is not None:
-        ended.close()
+    if threading.current_thread() is threading.main_thread():
+        ended, _active = _active, None
+        if ended is not None:
+            ended.close()
 
 
 def held() -> bool:
@@ -124,7 +133,7 @@ def held() -> bool:
 
 
 def here() -> None:
-    """Say that this is a safe place, such as a wait: what an exception leaves here is complete.
+    """Mark a safe place, such as a wait: an exception raised here leaves nothing half done.
 
     Raises:
         Interrupted: somebody has interrupted the cell.

@@ -4,7 +4,13 @@ from __future__ import annotations
 
 import contextlib
 import os
+import threading
 from dataclasses import dataclass
+
+from autograder.core.errors import KitError
+
+_OF_A_LAUNCH = 192
+"""Threads that the programs of a launch may have together (`sandbox.limits`)."""
 
 
 @dataclass(frozen=True)
@@ -49,6 +55,43 @@ def threads(pid: int) -> list[int]:
         OSError: it has ended.
     """
     return [int(entry) for entry in os.listdir(f"/proc/{pid}/task")]
+
+
+def no_threads(who: str) -> KitError | None:
+    """Return what to say if the machine allows fewer threads than a launch may have; None if it allows them.
+
+    Args:
+        who: could not go on, such as "`talker`".
+    """
+    if _can_start(_OF_A_LAUNCH):
+        return None
+    return KitError(
+        f"This machine allows no more threads, so {who} could not go on.",
+        "Close what else is running, such as other notebooks, or raise the limit: `ulimit -u`, or the container's.",
+    )
+
+
+def _can_start(count: int) -> bool:
+    """Whether the system lets this process start so many more threads now; found out by starting them.
+
+    A limit may be the user's, a container's or the system's, and not each of them can be read.
+    """
+    over = threading.Event()
+    before = threading.stack_size(256 * 1024)
+    started = []
+    try:
+        for _ in range(count):
+            thread = threading.Thread(target=over.wait, daemon=True)
+            thread.start()
+            started.append(thread)
+    except RuntimeError:
+        return False
+    finally:
+        threading.stack_size(before)
+        over.set()
+        for thread in started:
+            thread.join()
+    return True
 
 
 def descendants(root: int) -> dict[int, Process]:

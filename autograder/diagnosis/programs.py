@@ -6,6 +6,7 @@ import re
 import signal
 
 from autograder.arguments import params_file, remap_rules
+from autograder.core.processes import no_threads
 from autograder.diagnosis import callbacks
 from autograder.diagnosis.inside import Inside
 from autograder.diagnosis.reason import Diagnosis
@@ -18,6 +19,8 @@ _WRONG_FIELD = re.compile(
     r"(\w{1,100}?)__(?:msg|srv|action)__\w{1,100}convert_from_py.{0,200}Assertion `Py(\w{1,9})_Check"
 )
 """What the C code of an interface prints when a field does not hold what it should."""
+_NO_THREAD = re.compile(r"Resource temporarily unavailable|can't start new thread|std::system_error")
+"""What Python, or the middleware's C++, prints when the system starts no thread for it."""
 _KINDS = {"Long": "int", "Float": "float", "Bool": "bool", "Unicode": "str"}
 
 
@@ -43,6 +46,11 @@ def program_trouble(scene: Scene) -> Diagnosis | None:
 
 
 def _death(inside: Inside) -> Diagnosis:
+    """Why a program has ended.
+
+    Raises:
+        KitError: the machine is the reason.
+    """
     program = inside.program
     limit = program.stopped_by()
     if limit:
@@ -51,6 +59,8 @@ def _death(inside: Inside) -> Diagnosis:
             limit.replace(" ", "-"),
             "Look for a loop without an end, or for data that grows without a bound.",
         )
+    if _NO_THREAD.search(program.output()[-10_000:]) and (trouble := no_threads(f"`{program.name}`")):
+        raise trouble
     found = callbacks.failed(inside) or last_traceback(program.output(), program.name)
     if found:
         return found

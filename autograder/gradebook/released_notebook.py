@@ -20,6 +20,7 @@ from nbgrader.preprocessors import (
 from autograder.course.lab import blank_mark
 from autograder.course.markers import without_hidden_tests
 from autograder.gradebook.migration import FitCells
+from autograder.submission.copies import named_file
 
 
 class HideTests(NbGraderPreprocessor):  # type: ignore[misc]
@@ -38,6 +39,7 @@ class StableNotebook(NbGraderPreprocessor):  # type: ignore[misc]
     def preprocess(self, nb: Any, resources: dict[str, Any]) -> tuple[Any, dict[str, Any]]:
         """Name the cells by grade_id or number and drop what editors leave behind."""
         ids: set[str] = set()
+        answers: dict[str, str] = {}
         for number, cell in enumerate(nb.cells, start=1):
             grade_id = cell.metadata.get("nbgrader", {}).get("grade_id", "")
             name = re.sub(r"[^A-Za-z0-9_-]", "-", grade_id)[:60] or f"text-{number:02d}"
@@ -49,8 +51,12 @@ class StableNotebook(NbGraderPreprocessor):  # type: ignore[misc]
                 cell.outputs, cell.execution_count = [], None
                 if utils.is_solution(cell):
                     cell.metadata["autograder"] = blank_mark(cell.source)
+                    file = named_file(cell)
+                    if file is not None:  # whoever deletes the cell is told so in the notebook
+                        answers[grade_id] = file.file_name
         kernel = {"display_name": "Python 3 (ipykernel)", "language": "python", "name": "python3"}
-        nb.metadata = nbformat.from_dict({"kernelspec": kernel, "language_info": {"name": "python"}})
+        mark = {"autograder": {"answers": answers}} if answers else {}
+        nb.metadata = nbformat.from_dict({"kernelspec": kernel, "language_info": {"name": "python"}} | mark)
         nb.nbformat, nb.nbformat_minor = 4, 5
         return nb, resources
 

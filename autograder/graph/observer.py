@@ -115,14 +115,16 @@ class Observer:
         raise KitError("The observer does not find itself in the ROS graph.", "Run the command again.")
 
     def _spin(self) -> None:
+        error: Exception = RuntimeError("its ROS context was shut down")
         try:
             self._executor.spin()
         except ExternalShutdownException:
-            pass
-        except Exception as error:
-            # An executor that is shut down as it begins to wait finds what it waits on gone.
-            if not self._closing:
-                self._error = error
+            pass  # by whoever shuts all contexts down, as rclpy does at Ctrl-C
+        except Exception as raised:
+            error = raised
+        # An executor that is shut down as it begins to wait finds what it waits on gone.
+        if not self._closing:
+            self._error = error
 
     def close(self) -> None:
         """Leave the domain. The thread is joined: a daemon thread that still spins at exit aborts the process."""

@@ -31,6 +31,8 @@ if TYPE_CHECKING:
 _SCORED = re.compile(r"\bscore\(")
 _EXPECTS = re.compile(r"\bscore\(|\.(expect_|require)")
 """How a cell that makes a check of something asks for a verdict."""
+_CELL_ID = re.compile(r"[A-Za-z0-9_-]{1,64}")
+"""A cell's id as notebooks save it (nbformat); Visual Studio Code tells the address of a document in its place."""
 NO_VERDICT = "Interrupted: this check has no verdict. Run its cell again."
 """What such a cell says that was interrupted, wherever that found it."""
 
@@ -58,7 +60,7 @@ class Kernel:
         self._warmed = threading.Thread(target=_warm_up, name="warm-up")
 
     def start(self) -> None:
-        """Begin to load; apart from the rest, for this needs `active`."""
+        """Begin to load; apart from the rest, because this needs `active`."""
         if self.updates_outputs:
             _hold_interrupts(self.shell)
         self._warmed.start()
@@ -76,7 +78,8 @@ class Kernel:
         """Note the cell that begins, and forget what the last one found."""
         self.cell = str(info.raw_cell or "")
         interrupts.say(NO_VERDICT if _EXPECTS.search(self.cell) else "")
-        self.cell_id = str(getattr(info, "cell_id", "") or "")
+        told = str(getattr(info, "cell_id", "") or "")
+        self.cell_id = told if _CELL_ID.fullmatch(told) else ""
         self._began = self.number
         if self._watch is not None:
             self._watch.new_cell()

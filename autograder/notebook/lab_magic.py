@@ -33,7 +33,9 @@ def magic(kernel: Kernel) -> Any:
         except UnreadableError as error:
             print(error.problem.because)
             return
-        state.notes += [said for said in kernel.remarks(set(kernel.folder.written)) if said not in state.notes]
+        remarks = kernel.remarks(set(kernel.folder.written))
+        # A remark may begin with what is said of the notebook's copies anyway.
+        state.notes = [note for note in state.notes if not any(one.startswith(note) for one in remarks)] + remarks
         from IPython.display import display
 
         from autograder.report.html import render

@@ -13,8 +13,8 @@ from autograder.core.results import CellResult
 from autograder.course.lab import TEXT_STUB, cell_digest, grade_id_of, headings, nbgrader_of, source_of
 from autograder.report import words
 from autograder.report.words import Verdict
-from autograder.submission.copies import DELETE_COPIES, copies_of, named_file, told_of_copies
-from autograder.submission.notebook_file import cells_of
+from autograder.submission.copies import answers_in, named_file
+from autograder.submission.notebook_file import cells_of, released_files
 
 _PART = 2
 """The level of the headings of a lab's parts."""
@@ -135,7 +135,7 @@ def lab_state(notebook: Path, reports: Mapping[str, Report], runs: Mapping[str, 
     """
     state = LabState()
     cells = cells_of(notebook)
-    texts, state.notes = _texts(cells)
+    texts, state.notes = _texts(cells, released_files(notebook))
     title, part, newest = "", "", 0
     seen: set[str] = set()
     for cell in cells:
@@ -163,25 +163,25 @@ def lab_state(notebook: Path, reports: Mapping[str, Report], runs: Mapping[str, 
     return state
 
 
-def _texts(cells: Sequence[dict[str, Any]]) -> tuple[dict[str, str], list[str]]:
-    """What the answers say that are no files, by their marks; and of which answers there are copies."""
-    marked: dict[str, list[dict[str, Any]]] = {}
-    for cell in cells:
-        if grade_id_of(cell) and nbgrader_of(cell).get("solution"):
-            marked.setdefault(grade_id_of(cell), []).append(cell)
+def _texts(cells: Sequence[dict[str, Any]], files: Mapping[str, str]) -> tuple[dict[str, str], list[str]]:
+    """What the answers say, by their marks; and of which answers there is more than what counts."""
     texts, notes = {}, []
-    for grade_id, copies in marked.items():
-        file = next((file for cell in copies if (file := named_file(cell)) is not None), None)
-        copies = copies_of(copies, file.file_name if file is not None else "")
-        if len(copies) > 1:
-            name = f"%%{file.magic} {file.name}" if file is not None else grade_id
-            notes.append(f"{told_of_copies(name, len(copies), is_file=file is not None)} {DELETE_COPIES}")
-        texts[grade_id] = "\n\n".join(dict.fromkeys(map(source_of, copies)))
+    for answer in answers_in(cells, files):
+        file = next((file for cell in answer.copies if (file := named_file(cell)) is not None), None)
+        told = answer.told(f"%%{file.magic} {file.name}" if file is not None else answer.grade_id)
+        if told:
+            notes.append(told)
+        sources = list(dict.fromkeys(map(source_of, answer.copies)))
+        texts[answer.grade_id] = "\n\n".join([text for text in sources if _is_written(text)] or sources[:1])
     return texts, notes
 
 
+def _is_written(text: str) -> bool:
+    return text.strip() not in ("", TEXT_STUB)
+
+
 def _text(title: str, source: str, full: float) -> Row:
-    written = source.strip() not in ("", TEXT_STUB)
+    written = _is_written(source)
     points = f"{full:g} point{'' if full == 1 else 's'}, given by a person"
     return Row(title, None, "written" if written else "not written yet", points, written)
 

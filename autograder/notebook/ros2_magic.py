@@ -77,8 +77,8 @@ def _run(kernel: Kernel, line: str) -> int:
             status = run(words, running.observer.domain_id, running.observer, seconds)
     except TimeIsUp:
         status = 2
-        because = "since a cell has to end; in a terminal it goes on until Ctrl-C"
-        silent = "for no answer came: a node answers only while something spins it"
+        because = "because a cell has to end; in a terminal it goes on until Ctrl-C"
+        silent = "because no answer came: a node answers only while something spins it"
         print(f"(stopped after {seconds:g} s, {because if endless else silent})")
     if status and looks:
         _help_on(words[2:], running.observer)

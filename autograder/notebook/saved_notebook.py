@@ -7,22 +7,33 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from autograder.course.cell_file import BadNameError, parse
 from autograder.course.lab import blank_mark_of, cell_digest, grade_id_of, nbgrader_of, source_of
 from autograder.notebook.program_folder import Written
-from autograder.submission.copies import DELETE_COPIES, told_of_copies
-from autograder.submission.notebook_file import UnreadableError, cells_of
+from autograder.submission.copies import DELETE_COPIES, AnswerCells, answers_in, named_file, told_of_given_copies
+from autograder.submission.notebook_file import UnreadableError, cells_of, released_files
 
 
 @dataclass(frozen=True)
 class _Cell:
+    raw: dict[str, Any]
     source: str
-    cell_id: str
-    grade_id: str
-    blank: str
     file_name: str
     altered: bool
     """Whether it is the lab's own, and no longer as students receive it."""
+
+    @property
+    def cell_id(self) -> str:
+        return str(self.raw.get("id", ""))
+
+    @property
+    def blank(self) -> str:
+        return blank_mark_of(self.raw)
+
+    @property
+    def given(self) -> str:
+        """The grade_id of a file of the lab's own; empty for every other cell."""
+        marks = nbgrader_of(self.raw)
+        return grade_id_of(self.raw) if marks.get("locked") and not marks.get("solution") else ""
 
 
 class SavedNotebook:
@@ -34,33 +45,24 @@ class SavedNotebook:
         self.cells: list[_Cell] = []
         self._ids: set[str] = set()
         """Of all cells."""
+        self._answers: dict[str, AnswerCells] = {}
+        """By the names of their files."""
         self.saved_at = 0.0
         self.readable = False
         try:
             self.saved_at = path.stat().st_mtime
             raw = cells_of(path)
+            answers = answers_in(raw, released_files(path))
         except (OSError, UnreadableError):
             return
         self.readable = True
+        self._ids = {str(cell.get("id", "")) for cell in raw}
+        self._answers = {answer.file_name: answer for answer in answers if answer.file_name}
         for cell in raw:
-            self._take(cell)
-
-    def _take(self, cell: dict[str, Any]) -> None:
-        self._ids.add(str(cell.get("id", "")))
-        if cell.get("cell_type") != "code":
-            return
-        try:
-            source = source_of(cell)
-            file = parse(source)
-        except (ValueError, BadNameError):
-            return
-        if file is None:
-            return
-        grade_id = grade_id_of(cell) if nbgrader_of(cell).get("solution") or nbgrader_of(cell).get("locked") else ""
-        altered = _altered(source, cell)
-        self.cells.append(
-            _Cell(source, str(cell.get("id", "")), grade_id, blank_mark_of(cell), file.file_name, altered)
-        )
+            file = named_file(cell)
+            if file is not None:
+                source = source_of(cell)
+                self.cells.append(_Cell(cell, source, file.file_name, _altered(source, cell)))
 
     def has(self, file_name: str) -> bool:
         """Whether a cell names this file."""
@@ -69,12 +71,18 @@ class SavedNotebook:
     def _graded(self, file_name: str) -> _Cell | None:
         """The cell that grading takes this file from."""
         naming = [cell for cell in self.cells if cell.file_name == file_name]
-        return next((cell for cell in reversed(naming) if cell.grade_id), naming[-1] if naming else None)
+        answer = self._answers.get(file_name)
+        if answer is not None:
+            return next((cell for cell in naming if any(cell.raw is counts for counts in answer.copies[-1:])), None)
+        return next((cell for cell in reversed(naming) if cell.given), naming[-1] if naming else None)
 
-    def _copies(self, graded: _Cell) -> list[_Cell]:
-        """The cells that have its grading mark and name its file."""
-        mark = (graded.grade_id, graded.file_name)
-        return [cell for cell in self.cells if graded.grade_id and (cell.grade_id, cell.file_name) == mark]
+    def _copied(self, graded: _Cell, first: str) -> str:
+        """Say that there are copies of a cell, and which of them counts; empty if there are none."""
+        answer = self._answers.get(graded.file_name)
+        if answer is not None:
+            return answer.told(first)
+        count = sum(cell.given == graded.given for cell in self.cells) if graded.given else 0
+        return f"{told_of_given_copies(graded.given, count)} {DELETE_COPIES}" if count > 1 else ""
 
     def is_answer(self, written: Written) -> bool:
         """Whether a student's answer is in this file."""
@@ -89,29 +97,30 @@ class SavedNotebook:
     def remark(self, written: Written) -> str:
         """Say why what was run is not what would be graded; empty if it is, or will be once it is saved."""
         graded = self._graded(written.file.file_name)
+        answer = self._answers.get(written.file.file_name)
         first = f"%%{written.file.magic} {written.file.name}"
-        if graded is None and self.readable and self.saved_at > written.at:
-            return (
-                f"No cell of the saved notebook begins with `{first}`, so grading has no `{written.file.name}`. That"
-                " line has to be the first one of its cell."
-            )
         if graded is None:
-            return ""
-        copies = self._copies(graded)
-        copied = f"{told_of_copies(first, len(copies))} {DELETE_COPIES}" if len(copies) > 1 else ""
+            return self._why_ungraded(written, answer, first) if self.readable else ""
+        copied = self._copied(graded, first)
         if _same(graded.source, written.source):
             theirs = f"The cell `{first}` is the lab's own and has been changed. Grading takes it as you received it."
             return theirs if graded.altered else copied
         known = written.cell_id and graded.cell_id
-        ran = next((cell for cell in self.cells if cell.cell_id == written.cell_id), None) if known else None
-        if ran in copies and ran is not graded:
+        ours = answer is not None or graded.given
+        copies = [str(cell.get("id", "")) for cell in answer.copies] if answer is not None else []
+        if known and written.cell_id != graded.cell_id and written.cell_id in copies:
             return f"{copied} This report is about another one, cell [{written.number}]."
-        if known and graded.grade_id and written.cell_id not in self._ids:
+        if known and ours and written.cell_id not in self._ids and self.saved_at > written.at:
+            return (
+                f"This `{written.file.name}` comes from a cell that is no longer in the notebook. Grading takes the"
+                f" lab's cell that begins with `{first}`: run that one, then this check."
+            )
+        if known and ours and written.cell_id not in self._ids:
             return (
                 f"This `{written.file.name}` comes from cell [{written.number}], which is not in the saved notebook, so"
                 " nobody can say whether grading takes that cell. Save the notebook, and run this cell again."
             )
-        if known and graded.cell_id != written.cell_id and graded.grade_id:
+        if known and graded.cell_id != written.cell_id and ours:
             return (
                 f"This `{written.file.name}` comes from a cell of your own, cell [{written.number}]. Grading ignores"
                 f" that cell: it takes the lab's cell that begins with `{first}`. Move your text there."
@@ -122,6 +131,29 @@ class SavedNotebook:
                 " that cell, then this one."
             )
         return ""
+
+    def _why_ungraded(self, written: Written, answer: AnswerCells | None, first: str) -> str:
+        """Say why grading finds no cell for what was run."""
+        none = f"so grading has no `{written.file.name}`."
+        if answer is None:
+            unnamed = f"No cell of the saved notebook begins with `{first}`, {none}"
+            return f"{unnamed} That line has to be the first one of its cell." if self.saved_at > written.at else ""
+        if not answer.marked:
+            return (
+                f"The lab's cell for this answer, `{answer.grade_id}`, was deleted, {none} It ignores a cell of your"
+                " own. Undo the deletion, or copy the cell from a fresh copy of the lab's notebook."
+            )
+        if not answer.copies:
+            return (
+                f"The cell for this answer, `{answer.grade_id}`, is no code cell any more, {none} Select the cell and"
+                " make it a code cell again (key Y)."
+            )
+        if self.saved_at <= written.at and written.cell_id in {cell.get("id") for cell in answer.copies}:
+            return ""  # it has its first line again, and is not saved yet
+        return (
+            f"The cell for this answer, `{answer.grade_id}`, no longer begins with `{first}`, {none} Grading ignores"
+            " every other cell: move your text into that one, below this line."
+        )
 
     def lacks(self, written: Written) -> bool:
         """Whether what was run is not in the saved notebook, because nothing has been saved since."""

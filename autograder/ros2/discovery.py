@@ -59,7 +59,7 @@ class Seen:
         return bool(self.nodes or self.ends)
 
     def is_complete(self) -> bool:
-        """Whether of no participant that was heard of anything is known to be missing."""
+        """Whether nothing is known to be missing from any participant that was heard of."""
         if not set(self.nodes) <= {end.node for end in self.ends.values()}:
             return False
         by_participant: dict[bytes, list[_End]] = {}
@@ -73,8 +73,8 @@ def _is_whole(ends: list[_End]) -> bool:
     own = [end for end in ends if end.topic != _WHO_HAS_WHAT]
     if not own or any(end.node.endswith(UNKNOWN_NODE) for end in own):
         return False
-    # Writers come in their order, and so do readers: of what is not there, the numbers up to the last of both lists
-    # belong to what was destroyed, and those after it may belong to what has not been heard of.
+    # Writers arrive in order, and so do readers. A number that is missing below the last of both lists belongs to
+    # something destroyed; one above may not have been heard of yet.
     last = [max((end.number for end in ends if end.writes == writes), default=0) for writes in (True, False)]
     return {end.number for end in ends} >= set(range(min(last) + 1, max(last)))
 

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from autograder.core import interrupts
 from autograder.ros2.failure import Failure, TimeIsUp
 
 if TYPE_CHECKING:
@@ -31,12 +32,12 @@ ELSEWHERE = {
     "run": 'A program is started by `python nodes/NOTEBOOK/NAME.py --ros-args …`, or in a notebook by launch("NAME").',
     "launch": 'A launch file is started in a notebook by launch_file("NAME.launch.yaml", package=…), and after '
     "`autograder package` by an installed Jazzy.",
-    "doctor": "What this machine offers says `autograder doctor`.",
-    "wtf": "What this machine offers says `autograder doctor`.",
+    "doctor": "`autograder doctor` says what this machine offers.",
+    "wtf": "`autograder doctor` says what this machine offers.",
     "daemon": "There is no daemon: each command joins the graph itself.",
     "bag": "Recording needs rosbag2, which only an installed Jazzy has.",
     "component": "Components are C++ libraries, which only an installed Jazzy loads.",
-    "multicast": "Whether multicast works on this machine is nothing that the course relies on.",
+    "multicast": "`autograder doctor` says what this machine offers.",
     "security": "Keys and certificates need SROS 2, which only an installed Jazzy has.",
     "extension_points": "The kit's commands are fixed: nothing extends them.",
     "extensions": "The kit's commands are fixed: nothing extends them.",
@@ -83,6 +84,8 @@ def run(
             print(failure, file=sys.stderr)
         return 1
     except KeyboardInterrupt:
+        if interrupts.held():  # the rest of the cell is not to run
+            raise
         return int(signal.SIGINT)
     finally:
         session.close()

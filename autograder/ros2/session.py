@@ -184,6 +184,17 @@ class Session:
                 self._joined.spin_once(timeout_sec=max(0.0, min([0.1, *left])))
         return True
 
+    def stay(self, seconds: float) -> None:
+        """Stay on the graph for so long, and do nothing.
+
+        Raises:
+            TimeIsUp: the verb has to end.
+        """
+        deadline = time.monotonic() + seconds
+        while (left := deadline - time.monotonic()) > 0:
+            self._go_on(time.monotonic())
+            time.sleep(min(left, _POLL))
+
     def answer(self, future: Any, within: float | None = None) -> Any:
         """What a future gives, or None if nothing came in time."""
         return future.result() if self.spin_until(future.done, within) else None

@@ -72,7 +72,7 @@ def _pub(session: Session, options: Any) -> None:
 
     session.node.create_timer(1 / options.rate, publish)
     session.spin_until(lambda: times and count >= times)
-    time.sleep(options.keep_alive)  # for the middleware to send what it still holds
+    session.stay(options.keep_alive)  # for the middleware to send what it still holds
 
 
 def _dictionary(text: str) -> dict[str, Any]:

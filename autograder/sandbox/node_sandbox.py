@@ -111,8 +111,8 @@ class NodeSandbox:
                 raise KitError("The node sandbox is closed.")
             full = self.isolation is Isolation.FULL
             limits = bubblewrap.rlimits(self.limits)
-            if self.isolation is Isolation.NONE:
-                # The kernel counts all that a user runs: with a browser, or a few notebooks, nothing would start.
+            if not full:
+                # Without a user namespace the kernel counts all that a user runs: beside a browser nothing would start.
                 del limits["RLIMIT_NPROC"]  # what a launch has too many of, `watch` counts and ends
             request = {
                 "namespaces": full,

@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
 from typing import Any
 
 from autograder.course.cell_file import CELL_BYTES
 from autograder.course.lab import Lab, grade_id_of, nbgrader_of, source_of
-from autograder.submission.copies import DELETE_COPIES, copies_of, told_of_copies
+from autograder.submission.copies import (
+    DELETE_COPIES,
+    SPLIT,
+    by_mark,
+    copies_of,
+    pieces_of,
+    told_of_copies,
+    told_of_given_copies,
+)
 from autograder.submission.notebook_file import UnreadableError, problem
 from autograder.submission.submission import Submission
 
@@ -19,12 +26,10 @@ def take_answers(cells: list[dict[str, Any]], lab: Lab, submission: Submission) 
         UnreadableError: no cell of it belongs to the lab.
     """
     released = {grade_id_of(cell): cell for cell in lab.released if grade_id_of(cell)}
-    found: dict[str, list[dict[str, Any]]] = defaultdict(list)
-    for cell in cells:
-        if grade_id_of(cell):
-            found[grade_id_of(cell)].append(cell)
+    found = by_mark(cells)
     ours = lab.answers.keys() | {cell.grade_id for cell in lab.checks}
-    # Labs may call a few cells alike: of another one's, most are unknown here, and most of this one's answers missing.
+    # Labs may have names of cells in common. Of another lab's notebook most are unknown here, and most answers of
+    # this one are missing.
     known, answers = len(found.keys() & ours), len(found.keys() & lab.answers.keys())
     if not known or (2 * known < len(found.keys() - (released.keys() - ours)) and 2 * answers < len(lab.answers)):
         raise UnreadableError(
@@ -51,16 +56,20 @@ def take_answers(cells: list[dict[str, Any]], lab: Lab, submission: Submission) 
 
 
 def _take_cell(
-    grade_id: str, original: dict[str, Any], copies: list[dict[str, Any]], lab: Lab, submission: Submission
+    grade_id: str, original: dict[str, Any], marked: list[dict[str, Any]], lab: Lab, submission: Submission
 ) -> None:
     answer = lab.answers.get(grade_id)
     file = answer.file if answer is not None else None
+    name = f"%%{file.magic} {file.name}" if file is not None else grade_id
+    copies = marked
     if answer is not None:
-        copies = copies_of(copies, file.file_name if file is not None else "")
+        copies = copies_of(marked, file.file_name if file is not None else "")
+    if file is not None and pieces_of(marked, file.file_name):
+        title = f"the cell `{grade_id}` is in one piece"
+        submission.problems.append(problem("split-cell", title, SPLIT.format(name)))
     if len(copies) > 1:
-        because = f"There are {len(copies)} copies of the cell `{grade_id}`: the lab's own cell is run."
+        because = told_of_given_copies(grade_id, len(copies))
         if answer is not None:
-            name = f"%%{file.magic} {file.name}" if file is not None else grade_id
             because = told_of_copies(name, len(copies), is_file=file is not None)
         submission.problems.append(
             problem("duplicated-cell", f"there is one cell `{grade_id}`", because, DELETE_COPIES)
@@ -79,14 +88,12 @@ def _take_cell(
         _compare(grade_id, copies, lab, submission)
         return
     if not copies:
-        submission.problems.append(
-            problem(
-                "missing-cell",
-                f"the answer cell `{grade_id}` is there",
-                f"The answer cell `{grade_id}` was deleted: there is no answer to grade.",
-                f"Copy the cell from a fresh labs/{lab.name}/{lab.name}.ipynb.",
-            )
-        )
+        because = f"The answer cell `{grade_id}` was deleted: there is no answer to grade."
+        hint = f"Copy the cell from a fresh labs/{lab.name}/{lab.name}.ipynb."
+        if marked:
+            because = f"The answer cell `{grade_id}` is no code cell any more: there is no answer to grade."
+            hint = "Select the cell and make it a code cell again (key Y)."
+        submission.problems.append(problem("missing-cell", f"the answer cell `{grade_id}` is there", because, hint))
         return
     try:
         # A text may have been split or begun anew: whoever reads it decides.
@@ -111,7 +118,7 @@ def _take_cell(
 
 
 def _compare(grade_id: str, copies: list[dict[str, Any]], lab: Lab, submission: Submission) -> None:
-    """Report an edited check cell; a deleted one does no harm, for the lab's own cell is run anyway.
+    """Report an edited check cell; a deleted one does no harm, because the lab's own cell is run anyway.
 
     Not edited is also the cell of the lab's source, hidden lines included: who writes a lab checks that notebook.
     """

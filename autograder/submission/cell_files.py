@@ -8,7 +8,7 @@ from typing import Any
 from autograder.core.results import Outcome
 from autograder.course.cell_file import BadNameError, CellFile, check_free, parse
 from autograder.course.lab import Lab, grade_id_of
-from autograder.submission.copies import named_file
+from autograder.submission.copies import by_mark, copies_of, named_file
 from autograder.submission.notebook_file import problem
 from autograder.submission.submission import Submission
 
@@ -67,14 +67,21 @@ def take_own_files(cells: list[dict[str, Any]], lab: Lab, submission: Submission
     answers = {answer.file.file_name: answer.grade_id for answer in lab.answers.values() if answer.file is not None}
     taken = dict(submission.files)
     places = _Places(taken)
+    marked = by_mark(cells)
+    counted = [
+        cell
+        for answer in lab.answers.values()
+        for cell in copies_of(marked.get(answer.grade_id, []), answer.file.file_name if answer.file is not None else "")
+    ]
+    looked_at = {id(cell) for cell in counted}
     own: dict[str, str] = {}
     for cell in cells:
         file = named_file(cell)
         if file is None or taken.get(file.file_name) == file.text:
             continue
         if file.file_name in taken or file.file_name in answers:
-            # Cells with a grading mark have been looked at: as copies, as forged ones, as answers.
-            if not grade_id_of(cell):
+            # Something has been said already of copies, and of marks that are no answer's.
+            if id(cell) not in looked_at and (not grade_id_of(cell) or grade_id_of(cell) in lab.answers):
                 submission.problems.append(_ignored(file, answers.get(file.file_name, ""), lab, submission))
             continue
         try:

@@ -37,6 +37,20 @@ def cells_of(path: Path) -> list[dict[str, Any]]:
     return _cells(_bytes(path))
 
 
+def released_files(path: Path) -> dict[str, str]:
+    """Return the files of a released notebook's answers by grade_id; none if it does not say them.
+
+    Raises:
+        UnreadableError: it is no notebook.
+    """
+    content = _bytes(path)
+    _cells(content)
+    metadata = json.loads(content.decode("utf-8-sig")).get("metadata")
+    mark = metadata.get("autograder") if isinstance(metadata, dict) else None
+    answers = mark.get("answers") if isinstance(mark, dict) else None
+    return {str(key): str(name) for key, name in answers.items()} if isinstance(answers, dict) else {}
+
+
 def grade_ids_in(path: Path) -> set[str]:
     """Return the grade_ids in a notebook; none if it cannot be read."""
     try:

@@ -69,7 +69,5 @@ def limit(name: str, value: int) -> None:
     _, hard = resource.getrlimit(which)
     if hard != resource.RLIM_INFINITY:
         value = min(value, hard)
-    # Of CPU time one second more: at the soft limit comes a signal that says so, at the hard one the end.
-    most = value + 1 if which == resource.RLIMIT_CPU and hard == resource.RLIM_INFINITY else value
     with contextlib.suppress(ValueError, OSError):
-        resource.setrlimit(which, (value, most))
+        resource.setrlimit(which, (value, value))
