@@ -218,6 +218,7 @@ def test_outside_of_a_course_nbgrader_executes_nothing(environment: Environment,
     cell = {"cell_type": "code", "id": "a", "metadata": {}, "source": "open('executed', 'w')", "outputs": [],
             "execution_count": None}  # fmt: skip
     notebook.write_text(json.dumps({"cells": [cell], "metadata": {}, "nbformat": 4, "nbformat_minor": 5}))
+    (tmp_path / "argcomplete.py").write_text("open('executed', 'w')\n")  # nbgrader looks for it here
     told = environment.run(tmp_path, "python", "-m", "nbgrader", "validate", notebook)
     assert "Start it in the folder of your course" in told and not (tmp_path / "executed").exists()
 

@@ -21,6 +21,7 @@ from autograder.setup.jupyter import lead_jupyter
 from autograder.setup.labs import put_labs
 from autograder.setup.packages import fill, install_wheel, say
 from autograder.setup.places import DEV_LOCK, MARKER, PYTHON, ROOT, STUDENT_LOCK, VENV, WHEEL
+from autograder.setup.python import lead_python
 from autograder.setup.refusals import SetUpError, refuse_closed_folder, refuse_foreign_ros, refuse_other_machines
 
 
@@ -39,6 +40,7 @@ def make_ready(dev: bool, wanted: str) -> None:
     locks = [STUDENT_LOCK, DEV_LOCK] if dev or DEV_LOCK in known else [STUDENT_LOCK]
     sources = locks + [WHEEL] if WHEEL else locks  # noqa: RUF005  Python 3.6 is to understand it
     if all(known.get(source) == digest(source) for source in sources):
+        lead_python()
         write_commands()
         lead_jupyter()
         return
