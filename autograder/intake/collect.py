@@ -9,6 +9,7 @@ said that this is right.
 from __future__ import annotations
 
 import contextlib
+import re
 import unicodedata
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -16,6 +17,7 @@ from pathlib import Path
 
 from autograder.core.errors import KitError
 from autograder.core.files import read_plain, write_beside
+from autograder.course.lab import lab_names
 from autograder.course.paths import CoursePaths
 from autograder.intake.asked import Accepted
 from autograder.intake.choosing import Chosen, beside, choose, read
@@ -39,6 +41,10 @@ import sys
 sys.exit("This folder is not a course: start nbgrader in the folder above it. Nothing was executed.")
 """
 """nbgrader's configuration in the folder of what was taken in."""
+
+
+_ONCE = re.compile(r"([.;] [Ii]t was left out)?\.$")
+"""The end of a sentence about what was left out, which goes without saying in a list of such."""
 
 
 @dataclass
@@ -78,7 +84,7 @@ class Collected:
         if unused:
             told += f" Not used: {some(unused, '; ')}."
         if self.refused:
-            told += f" LEFT OUT: {some([one.removesuffix('.') for one in self.refused], '; ')}."
+            told += f" LEFT OUT: {some([_ONCE.sub('', one) for one in self.refused], '; ')}."
         return told if unused or self.refused else f"{told} All are used."
 
 
@@ -101,19 +107,20 @@ def collect(
     """
     roster = read_roster(root / FILE_NAME) if (root / FILE_NAME).is_file() else None
     before = taken_before(root, lab)
-    reading = read_class(source, lab, format_name, _known(roster, before))
+    reading = read_class(source, lab, format_name, _known(source, root, roster, before))
     recognised = reading.recognised
     students = named(recognised.claims, roster, known_persons(root, lab))
     missing = gone(source, students, roster, before)
     stop(source, students, reading, missing.lost, before, accepted)
     collected = Collected(_title(reading), reading.around, notes=list(reading.notes))
+    others = [name for name in lab_names(root) if name != lab]
     collected.refused += [f"{sentence} It was left out." for sentence in recognised.strange]
     handed_in = {
         student.name: (student, *found)
         for student in _one_each(students, reading, collected)
-        if (found := _handed_in(student, lab, reading, collected)) is not None
+        if (found := _handed_in(student, lab, others, reading, collected)) is not None
     }
-    collected.students = len({id(student.claims[0]) for student in students})
+    collected.students = len({file_name(student.name) for student in students})
     collected.files = len(recognised.strange) + sum(
         _number_of_files(entry) for entry in {claim.entry: None for claim in recognised.claims}
     )
@@ -155,12 +162,13 @@ def _number_of_files(entry: Entry) -> int:
         return 1
 
 
-def _known(roster: Roster | None, before: Mapping[str, Taken]) -> Known:
+def _known(source: Path, root: Path, roster: Roster | None, before: Mapping[str, Taken]) -> Known:
     def is_student(name: str) -> bool:
         ways = dict.fromkeys(("id", "email", "name", "github"), name)
         return name in before or (roster is not None and roster.student(ways) is not None)
 
-    return Known(is_student, roster is not None, {taken.around for taken in before.values()} if before else None)
+    around = {taken.around for taken in before.values()} if before else None
+    return Known(is_student, roster is not None, source.resolve() == CoursePaths(root).submitted.resolve(), around)
 
 
 def _one_each(students: Sequence[Student], reading: Reading, collected: Collected) -> list[Student]:
@@ -191,11 +199,13 @@ def _one_each(students: Sequence[Student], reading: Reading, collected: Collecte
     return [found[name] for name in sorted(found)]
 
 
-def _handed_in(student: Student, lab: str, reading: Reading, collected: Collected) -> tuple[Chosen, bytes] | None:
+def _handed_in(
+    student: Student, lab: str, others: Collection[str], reading: Reading, collected: Collected
+) -> tuple[Chosen, bytes] | None:
     """What of a student's counts, and its bytes; None if nobody can say, which is told."""
     who = student.name[:80]
     try:
-        chosen = choose(student.claims, lab)
+        chosen = choose(student.claims, lab, others)
         notebook = read(chosen.member) if chosen.member is not None else b""
     except NotUnderstoodError as reason:
         collected.refused.append(f"{who!r} {reason}; it was left out.")
@@ -217,10 +227,13 @@ def _handed_in(student: Student, lab: str, reading: Reading, collected: Collecte
         )
     for other in chosen.others:
         collected.unused.append(f"{'/'.join(other.path)[-200:]!r} ({chosen.member.name[:80]!r} of {who!r} counts)")
-    for claim in chosen.replaced:
+    for claim, why in chosen.replaced:
         names = f"{chosen.claim.entry.name[:100]!r} replaces {claim.entry.name[:100]!r}"
         collected.notes.append(f"{who}: {names}.")
-        collected.unused.append(f"{claim.entry.name[:100]!r} (a later one of {who!r} counts)")
+        collected.unused.append(f"{claim.entry.name[:100]!r} of {who!r} ({why})")
+    for claim, trouble in chosen.not_understood:
+        told = f"{chosen.claim.entry.name[:100]!r} of {who!r} counts"
+        collected.unused.append(f"{claim.entry.name[:100]!r}, which {trouble} ({told})")
     if chosen.claim.late:
         collected.notes.append(f"{who}: {reading.format.title} has marked it as late.")
     return chosen, notebook

@@ -14,7 +14,7 @@ from autograder.core.errors import KitError
 from autograder.intake.choosing import choose, is_of_lab
 from autograder.intake.claims import Claim, Recognised
 from autograder.intake.entries import Entry, Kind, NotUnderstoodError, listed
-from autograder.intake.formats import PLAIN, PLATFORMS, Format, owner_of
+from autograder.intake.formats import PLAIN, PLATFORMS, Format, by_lab, owner_of
 from autograder.intake.members import is_hidden, is_notebook
 
 _MOST_AROUND = 3
@@ -48,6 +48,8 @@ class Known:
     """Whether the roster has a student of that name, or one was taken in before."""
     roster: bool = False
     """There is a roster, so that whoever is not in it is no student."""
+    own: bool = False
+    """The source is the course's own folder of what was taken in, which holds the work for every lab."""
     around: Collection[str] | None = None
     """The folders and zips that lay around the class when it was taken in before; None: it was not."""
 
@@ -75,6 +77,8 @@ def read_class(source: Path, lab: str, format_name: str = "", known: Known | Non
     """
     named = {**PLATFORMS, PLAIN.name: PLAIN}.get(format_name)
     found = listed(source, lab)
+    if known is not None and known.own:
+        return Reading(PLAIN, by_lab(found.entries, lab))
     reading = _read(found.entries, (), _Asked(source, lab, named, known or Known()))
     reading.recognised.strange += found.bad_names()
     return reading

@@ -17,7 +17,6 @@ from autograder.setup.python import lead_python
 from autograder.setup.refusals import SetUpError, refuse_full_disk, tail
 
 
-
 def digest(lock: str) -> str:
     """Return the SHA-256 of the file `lock` of the course: a lock, or the wheel of a student's kit."""
     return hashlib.sha256((ROOT / lock).read_bytes()).hexdigest()
