@@ -122,6 +122,11 @@ def all_full(result: SubmissionResult) -> SubmissionResult:
     )
 
 
+def none_full(result: SubmissionResult) -> SubmissionResult:
+    """What an executor makes of a result that takes no check for passed."""
+    return result.model_copy(update={"checks": [check.model_copy(update={"points": 0.0}) for check in result.checks]})
+
+
 def test_known_answers_run_among_a_class_and_are_recorded_nowhere(course: Course) -> None:
     course.hand_in("ann", "bob")
     run = course.grade(Settings(isolation=Isolation.NONE))
@@ -164,7 +169,7 @@ def test_a_class_has_as_many_as_a_tenth_of_it_but_at_least_a_pair(
     mixed = [job.student for job in canaries.among(jobs)]
     assert [name for name in mixed if name in jobs] == names
     expected = [number % 2 == 0 for number, count in enumerate(groups) for _ in range(count)]
-    assert [canaries.has(name) for name in mixed] == expected
+    assert [name not in jobs for name in mixed] == expected
 
 
 def test_a_wrong_answer_that_passes_towards_the_end_stops_the_run_before_any_grade(
@@ -292,6 +297,28 @@ def test_after_an_interruption_the_known_answers_of_the_next_run_decide(judged: 
     judged.grade()
     assert {name for name in judged.names if name != "?"} == {"ann", "bob", "cem"} - kept
     assert judged.names.count("?") == 2
+    assert set(judged.recorded()) == {"ann", "bob", "cem"}
+
+
+def test_a_flip_before_an_interruption_is_told_and_the_results_beside_it_are_run_again(
+    judged: Course, capsys: pytest.CaptureFixture[str]
+) -> None:
+    judged.hand_in("ann", "bob", "cem")
+
+    def meddle(number: int, result: SubmissionResult) -> SubmissionResult:
+        if number == 3:
+            raise KeyboardInterrupt
+        return none_full(result) if number == 0 else result
+
+    judged.meddle = meddle
+    with pytest.raises(KeyboardInterrupt):
+        judged.grade()
+    told = capsys.readouterr().err
+    assert "The results of 3 students are doubtful and will be run again, because answers with known points" in told
+    assert judged.files(judged.paths.tried) == set()
+    judged.meddle = lambda _, result: result
+    judged.grade()
+    assert {name for name in judged.names if name != "?"} == {"ann", "bob", "cem"}
     assert set(judged.recorded()) == {"ann", "bob", "cem"}
 
 

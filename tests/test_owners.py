@@ -199,6 +199,12 @@ def test_whatever_lies_among_nbgraders_folders_is_taken_or_named(tmp_path: Path)
     assert "'mal' cannot be anybody's work" in told and "lin is a link" in told and len(collected.refused) == 2
 
 
+def test_too_many_files_are_said_however_often_they_are_looked_at(tmp_path: Path) -> None:
+    files = {f"a-mal/{number}.txt": b"" for number in range(MOST + 1)} | {"a-bob/labs/toy/toy.ipynb": b"bob"}
+    taken, collected = taken_from(files, tmp_path)  # first as what GitHub Classroom gives out
+    assert taken == {"a-bob": "bob"} and "'a-mal' cannot be anybody's work" in collected.refused[0]
+
+
 BROKEN = b"PK\x03\x04 and no more"
 BESIDE = {
     "a damaged zip": {"ann_1_11_pics.zip": BROKEN},

@@ -28,6 +28,7 @@ from autograder.grading.runner import Settings
 from autograder.grading.store import ResultStore
 from autograder.intake.asked import Accepted
 from autograder.intake.collect import Collected, collect
+from autograder.intake.objections import count
 
 
 @dataclass
@@ -118,9 +119,13 @@ def try_class(root: Path, lab_name: str, source: Path, settings: Settings, intak
         console = Console(file=sys.stderr, highlight=False)
         canaries = _canaries(root, lab, settings)
         with Steps(len(collected.notebooks), console) as steps:
-            after = run_class(
-                collected.notebooks, root, lab, settings, steps.finished, steps.started, tried=True, canaries=canaries
-            )
+            try:
+                after = run_class(
+                    collected.notebooks, root, lab, settings, steps.finished, steps.started, True, canaries
+                )
+            except KeyboardInterrupt:
+                _tell_flips(canaries, settings, steps)
+                raise
     _refuse_flipped(canaries, root, settings, len(after))
     return Tried(
         before={student: result for student, result in before.items() if result is not None},
@@ -139,6 +144,12 @@ def _canaries(root: Path, lab: Lab, settings: Settings) -> Canaries | None:
 def _refuse_flipped(canaries: Canaries | None, root: Path, settings: Settings, results: int) -> None:
     if canaries is not None and canaries.flips and not settings.despite_canaries:
         raise canaries.refusal(root, results - len(canaries.doubtful))
+
+
+def _tell_flips(canaries: Canaries | None, settings: Settings, steps: Steps) -> None:
+    if canaries is not None and canaries.flips and not settings.despite_canaries:
+        again = count(len(canaries.doubtful), "student")
+        steps.say(f"The results of {again} are doubtful and will be run again, because {canaries.flipped()}")
 
 
 def _graded(root: Path, lab: Lab, source: Path, settings: Settings, intake: Intake) -> ClassRun:
@@ -181,6 +192,7 @@ def _graded(root: Path, lab: Lab, source: Path, settings: Settings, intake: Inta
                 where = (paths.results if canaries is None else paths.tried) / lab.name
                 kept = f"{steps.done} of {steps.total} results are kept in {where}"
                 steps.say(f"\n{kept}; run again to go on.")
+                _tell_flips(canaries, settings, steps)
             raise
     return ClassRun(
         results=list(results.values()),
