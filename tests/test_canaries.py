@@ -196,7 +196,7 @@ def test_a_wrong_answer_that_passes_towards_the_end_stops_the_run_before_any_gra
     assert "`check_talker`" not in error.value.what
     for advice in ("top", "autograder doctor", "--jobs 1", "0 can be believed", "2 will be", "--despite-canaries"):
         assert advice in error.value.do
-    assert not course.paths.gradebook.exists()
+    assert course.recorded() == {}
     assert not course.paths.grades.exists()
     assert course.files(course.paths.results) == set()
     flag.unlink()
@@ -290,7 +290,7 @@ def test_after_an_interruption_the_known_answers_of_the_next_run_decide(judged: 
     with pytest.raises(KeyboardInterrupt):
         judged.grade()
     assert judged.files(judged.paths.results) == set()
-    assert not judged.paths.gradebook.exists()
+    assert judged.recorded() == {}
     kept = judged.files(judged.paths.tried)
     assert len(kept) >= 2
     judged.meddle = lambda _, result: result
@@ -387,7 +387,7 @@ def test_the_command_says_what_flipped_and_the_options_do_what_they_say(course: 
     assert "gradebook" not in refused.stdout  # what intake says comes before
     assert "a wrong answer must get 1 point, and got 0 of 3" in refused.stderr
     assert "Traceback" not in refused.stderr
-    assert not course.paths.gradebook.exists()
+    assert course.recorded() == {}
     assert command("--despite-canaries").returncode == 0
     assert course.recorded() == {"ann": 5.0}
     quiet = command("--no-canaries", "--force")

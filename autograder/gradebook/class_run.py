@@ -113,6 +113,7 @@ def try_class(root: Path, lab_name: str, source: Path, settings: Settings, intak
     """
     lab = load_lab(root, lab_name)
     with only_one(CoursePaths(root).lock, "A grading"):
+        grades = {grade.student: grade for grade in read_grades(root, lab.name)}  # first: it may be unusable
         collected = intake.collect(source, lab.name, root)
         store = ResultStore(root)
         before = {student: store.last(lab.name, student) for student in collected.notebooks}
@@ -130,7 +131,7 @@ def try_class(root: Path, lab_name: str, source: Path, settings: Settings, intak
     return Tried(
         before={student: result for student, result in before.items() if result is not None},
         after=list(after.values()),
-        grades={grade.student: grade for grade in read_grades(root, lab.name)},
+        grades=grades,
         collected=collected,
     )
 
@@ -157,6 +158,7 @@ def _graded(root: Path, lab: Lab, source: Path, settings: Settings, intake: Inta
     collected = intake.collect(source, lab.name, root)
     began = time.monotonic()
     recorder = Recorder(root, lab, settings.force)
+    recorder.begin()
     canaries = _canaries(root, lab, settings)
     recorded: set[str] = set()
 
@@ -187,6 +189,8 @@ def _graded(root: Path, lab: Lab, source: Path, settings: Settings, intake: Inta
             recording.finish()
         except BaseException as error:
             recording.give_up()
+            for sentence in recorder.told:
+                steps.say(sentence)
             if isinstance(error, KeyboardInterrupt):
                 paths = CoursePaths(root)
                 where = (paths.results if canaries is None else paths.tried) / lab.name
