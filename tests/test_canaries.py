@@ -361,6 +361,25 @@ def test_what_is_wrong_with_the_file_is_told(course: Course, text: str, said: st
     assert any(said in str(one) and not one.warning for one in read_findings(course.root, toy.LAB))
 
 
+def test_a_broken_file_stops_a_class_before_it_is_taken_in_and_the_switch_is_named(course: Course) -> None:
+    course.hand_in("ann")
+    course.wrong_answers("a: [")
+    for run in (grade_class, try_class):
+        with pytest.raises(KitError, match="is no YAML") as refused:
+            run(course.root, toy.LAB, course.class_, ALONE)
+        assert "--no-canaries" in refused.value.do and not course.paths.submitted.exists()
+
+
+def test_lint_says_what_grading_would_say_of_entries_that_change_one_place(course: Course) -> None:
+    notebook = course.paths.solutions / toy.LAB / f"{toy.LAB}.ipynb"
+    raw = json.loads(notebook.read_text(encoding="utf-8"))
+    check = 'with answers("answers.yaml") as table:\n    table.expect_answer("answer", 42)\ntable.score(1)'
+    raw["cells"].append(toy.cell("code", check, 11, grade_id="check_more", grade=True, locked=True, points=1))
+    notebook.write_text(json.dumps(raw), encoding="utf-8")
+    course.wrong_answers(WRONG + "- {answer: talker, instead_of: print('hello'), write: x, points: {check_more: 0}}\n")
+    assert any("change the same place" in str(one) for one in read_findings(course.root, toy.LAB) if not one.warning)
+
+
 def test_lint_says_which_check_has_no_wrong_answer_and_which_gets_other_points(course: Course) -> None:
     first = WRONG.strip().splitlines()[0]
     course.wrong_answers(first.replace("check_talker: 0", "check_talker: 1"))

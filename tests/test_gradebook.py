@@ -10,7 +10,9 @@ from pathlib import Path
 
 import pytest
 import toy
+from typer.testing import CliRunner
 
+from autograder.cli.main import app
 from autograder.core.errors import KitError
 from autograder.core.results import Isolation, SubmissionResult
 from autograder.course.paths import CoursePaths
@@ -141,3 +143,26 @@ def test_a_disk_that_fills_while_the_gradebook_is_made_leaves_none_that_is_half(
     course.grade()
     assert [grade.student for grade in read_grades(course.root)] == ["ann"]
     assert [path.name for path in course.paths.gradebook.parent.iterdir()] == ["gradebook.db"]
+
+
+def test_what_grading_would_change_is_found_out_without_changing_anything(course: Course) -> None:
+    course.hand_in("cem")
+    course.grade()
+    (course.class_ / "ann" / "toy.ipynb").unlink()
+    (course.class_ / "ann").rmdir()
+    (course.class_ / "bob" / "toy.ipynb").write_text("{")
+    (course.class_ / "dan.pdf").touch()
+    before = files(course.root)
+    done = CliRunner().invoke(
+        app,
+        ["grade", toy.LAB, str(course.class_), "--diff", "--accept", "smaller", "--course", str(course.root)]
+        + ["--isolation", "none"],
+    )
+    assert done.exit_code == 3 and "Nothing was recorded" in done.output
+    assert files(course.root) == before
+
+
+def files(root: Path) -> dict[Path, bytes]:
+    """What lies in a course, but for results that do not count."""
+    folders = [root / "gradebook", *(root / "build" / name for name in ("submitted", "taken", "feedback", "results"))]
+    return {path: path.read_bytes() for folder in folders for path in folder.rglob("*") if path.is_file()}

@@ -269,3 +269,13 @@ def test_what_is_said_of_files_that_do_not_count_is_true(tmp_path: Path) -> None
     assert "'ann_111_999_scratch.ipynb' of 'ann' ('toy.ipynb' counts, because it has the lab's name)" in collected.line
     assert "'ann_111_850_toy-1.ipynb' of 'ann' (a later file counts)" in collected.line
     assert collected.line.endswith("LEFT OUT: 'readme.txt' is no student's folder, notebook or zip.")
+
+
+def test_a_record_that_nobody_understands_stops_the_next_class(tmp_path: Path) -> None:
+    taken_from(PLAIN, tmp_path)
+    (record,) = (tmp_path / "course" / "build" / "taken").iterdir()
+    record.write_text('{"ann": ')
+    (tmp_path / "in" / "ann" / "toy.ipynb").unlink()
+    (tmp_path / "in" / "ann").rmdir()
+    with pytest.raises(KitError, match="says who was in the class the last time, cannot be read"):
+        taken_from({}, tmp_path)

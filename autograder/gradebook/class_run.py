@@ -7,9 +7,11 @@ import time
 from collections.abc import Callable, Collection
 from dataclasses import dataclass, field
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from rich.console import Console
 
+from autograder.core.errors import KitError
 from autograder.core.files import remove_unfinished
 from autograder.core.grades import Grade
 from autograder.core.lock import only_one
@@ -75,9 +77,9 @@ class Intake:
     told: Callable[[Collected], None] = lambda _: None
     """Called as soon as the class is taken in, before anything is run."""
 
-    def collect(self, source: Path, lab: str, root: Path) -> Collected:
+    def collect(self, source: Path, lab: str, root: Path, tried_in: Path | None = None) -> Collected:
         """Take in a class; raises as the function of that name."""
-        collected = collect(source, lab, root, self.format, self.accepted)
+        collected = collect(source, lab, root, self.format, self.accepted, tried_in)
         self.told(collected)
         return collected
 
@@ -112,13 +114,13 @@ def try_class(root: Path, lab_name: str, source: Path, settings: Settings, intak
         KitError: as `grade_class`.
     """
     lab = load_lab(root, lab_name)
-    with only_one(CoursePaths(root).lock, "A grading"):
+    with only_one(CoursePaths(root).lock, "A grading"), TemporaryDirectory(prefix="class-") as folder:
         grades = {grade.student: grade for grade in read_grades(root, lab.name)}  # first: it may be unusable
-        collected = intake.collect(source, lab.name, root)
+        canaries = _canaries(root, lab, settings)
+        collected = intake.collect(source, lab.name, root, Path(folder))
         store = ResultStore(root)
         before = {student: store.last(lab.name, student) for student in collected.notebooks}
         console = Console(file=sys.stderr, highlight=False)
-        canaries = _canaries(root, lab, settings)
         with Steps(len(collected.notebooks), console) as steps:
             try:
                 after = run_class(
@@ -138,7 +140,12 @@ def try_class(root: Path, lab_name: str, source: Path, settings: Settings, intak
 
 def _canaries(root: Path, lab: Lab, settings: Settings) -> Canaries | None:
     """The known answers for a run; None if they are switched off, or the course cannot have any."""
-    known = known_answers(root, lab) if settings.canaries else []
+    try:
+        known = known_answers(root, lab) if settings.canaries else []
+    except KitError as error:
+        raise KitError(
+            f"{error.what} Nothing was graded.", f"{error.do} Or grade without known answers: --no-canaries."
+        ) from error
     return Canaries(lab, known, settings) if known else None
 
 
@@ -155,11 +162,11 @@ def _tell_flips(canaries: Canaries | None, settings: Settings, steps: Steps) -> 
 
 def _graded(root: Path, lab: Lab, source: Path, settings: Settings, intake: Intake) -> ClassRun:
     console = Console(file=sys.stderr, highlight=False)
+    canaries = _canaries(root, lab, settings)
     collected = intake.collect(source, lab.name, root)
     began = time.monotonic()
     recorder = Recorder(root, lab, settings.force)
     recorder.begin()
-    canaries = _canaries(root, lab, settings)
     recorded: set[str] = set()
 
     with Steps(len(collected.notebooks), console) as steps:

@@ -23,7 +23,8 @@ MARK = ".grades"
 """The file beside a feedback page that says which grades it shows."""
 _NO_ROOM = re.compile(
     r"(No space left on device|database or disk is full|database is locked|disk I/O error|Disk quota exceeded"
-    r"|readonly database|file is not a database|disk image is malformed|Read-only file system|unable to open database file)"
+    r"|readonly database|file is not a database|disk image is malformed|Read-only file system"
+    r"|unable to open database file)"
 )
 """What the machine says, through nbgrader, that will not be otherwise for the next student."""
 

@@ -159,7 +159,8 @@ class Canaries:
         without = sum(all(one.points[check.grade_id] == check.points for one in self.known) for check in checks)
         if any(None in one.points.values() for one in self.known):
             sentences.append(
-                f"There is no {name}, so their wrong answers are the notebook as students receive it: they show little."
+                f"There is no {name}, so the notebook as students receive it serves as the wrong answer, which shows"
+                " little."
             )
         elif without:
             sentences.append(f"{name} has no wrong answer for {without} of {len(checks)} checks.")

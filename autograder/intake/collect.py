@@ -89,7 +89,12 @@ class Collected:
 
 
 def collect(
-    source: Path, lab: str, root: Path, format_name: str = "", accepted: Collection[Accepted] = ()
+    source: Path,
+    lab: str,
+    root: Path,
+    format_name: str = "",
+    accepted: Collection[Accepted] = (),
+    tried_in: Path | None = None,
 ) -> Collected:
     """Take in a class.
 
@@ -100,6 +105,7 @@ def collect(
         root: of the course. A file `roster.csv` there joins the platforms' names to those of the gradebook.
         format_name: as what to read it; empty: as what it is.
         accepted: what somebody has said to be right.
+        tried_in: a folder that gets the notebooks in place of the course, of which nothing is changed then.
 
     Raises:
         KitError: there is nothing to take in, or it can be read in two ways, or somebody would be lost or replaced. In
@@ -129,7 +135,7 @@ def collect(
         raise KitError(
             f"There are no submissions in {source}.{why}", f"Each student needs a folder that holds {lab}.ipynb."
         )
-    paths = CoursePaths(root)
+    paths = CoursePaths(tried_in or root)
     if not (paths.build / "nbgrader_config.py").is_file():
         write_beside(paths.build / "nbgrader_config.py", CLOSED)
     taken: dict[str, Taken] = {}
@@ -144,8 +150,9 @@ def collect(
             owner=dict(student.claims[0].owner) if platform else {},
             late=claim.late,
         )
-    keep_class(root, lab, taken, {**missing.lost, **missing.renamed})
-    collected.notes += _farewells(missing, before)
+    if tried_in is None:
+        keep_class(root, lab, taken, {**missing.lost, **missing.renamed})
+        collected.notes += _farewells(missing, before)
     return collected
 
 
@@ -181,7 +188,7 @@ def _one_each(students: Sequence[Student], reading: Reading, collected: Collecte
             collected.refused.append("A submission without a student's name was left out.")
         elif not student.listed and reading.format is not PLAIN and not student.claims[0].by_hand:
             who = ", ".join(student.claims[0].owner.values())[:100]
-            collected.refused.append(f"{who!r} is no student of the roster, or more than one; it was left out.")
+            collected.refused.append(f"{who!r} fits no student of the roster, or several; it was left out.")
         elif name in found:
             # What somebody has added beside a platform's files is the later one.
             kept, left = (here, found[name]) if student.claims[0].by_hand else (found[name], here)

@@ -77,9 +77,7 @@ def stop(
     strangers = [repr(student.name[:100]) for student in students if not student.listed]
     objections = {
         Accepted.SMALLER: _missing(source, sorted(lost)),
-        Accepted.ROSTER: f"No student of the roster, or more than one, is {some(strangers, ', ')}."
-        if strangers
-        else "",
+        Accepted.ROSTER: _strangers(strangers),
         Accepted.REPLACED: some(_replaced(students, before), " "),
     }
     open_ones = {kind: sentence for kind, sentence in objections.items() if sentence and kind not in accepted}
@@ -93,6 +91,11 @@ def stop(
         " Nothing was graded.",
         f"Look at the submissions and at who is meant. If this is right, go on with {options}.",
     )
+
+
+def _strangers(names: Sequence[str]) -> str:
+    fits = "fits" if len(names) == 1 else "fit"
+    return f"{some(names, ', ')} {fits} no student of the roster, or several." if names else ""
 
 
 def _missing(source: Path, lost: Sequence[str]) -> str:
