@@ -72,16 +72,18 @@ def main() -> int:
     parser.add_argument("--dev", action="store_true", help="with what tests and lectures need")
     parser.add_argument("--python", default="", help="the Python to build on, instead of the first good one on PATH")
     options = parser.parse_args()
+    failed = ".venv could not be made"
     try:
         # Two commands in two terminals must not make one environment at once. The checkout itself is the lock.
         fcntl.flock(os.open(str(ROOT), os.O_RDONLY), fcntl.LOCK_EX)
         make_ready(options.dev, options.python)
         if WHEEL:
+            failed = ".venv is ready, but the labs could not be put into %s" % (ROOT / "labs")
             put_labs()
     except SetUpError as error:
         say("\n%s\n\nWhat to do: %s" % (error.what, error.do))
     except OSError as error:
-        say("\n.venv could not be made: %s\n\nWhat to do: see that the folder is yours and the disk has room." % error)
+        say("\n%s: %s\n\nWhat to do: see that the folder is yours and the disk has room." % (failed, error))
     except KeyboardInterrupt:
         say("\nInterrupted. The next run starts over.")
     else:
