@@ -279,3 +279,48 @@ def test_a_record_that_nobody_understands_stops_the_next_class(tmp_path: Path) -
     (tmp_path / "in" / "ann").rmdir()
     with pytest.raises(KitError, match="says who was in the class the last time, cannot be read"):
         taken_from({}, tmp_path)
+
+
+KIT = {f"{top}/README.md": b"" for top in ("kit", "labs", "lectures")} | {"labs/toy/toy.ipynb": b"mine"}
+KIT |= {"kit/labs/toy/toy.ipynb": b"as handed out", "lectures/a.ipynb": b"a lecture"}
+ONE: dict[str, tuple[dict[str, bytes], str]] = {
+    # name: (files, who it is with --format plain)
+    "a folder in a folder": ({"hw/ann/toy.ipynb": b"mine"}, "ann"),
+    "a zip in a folder": ({"hw/ann.zip": class_forms.zipped({"toy.ipynb": b"mine", "a.txt": b""})}, "ann"),
+    "a repository": ({"lab-2-submissions/lab-2-ann/labs/toy/toy.ipynb": b"mine"}, "lab-2-ann"),
+}
+
+
+@pytest.mark.parametrize(("files", "owner"), ONE.values(), ids=ONE)
+def test_a_class_of_one_is_asked_about_by_its_names_and_the_advice_holds(
+    tmp_path: Path, files: dict[str, bytes], owner: str
+) -> None:
+    outer = next(iter(files)).partition("/")[0]
+    source = class_forms.lay_out(files, tmp_path, False)
+    try:
+        collected = collect(source, class_forms.LAB, tmp_path / "unasked")
+    except KitError as stopped:
+        assert f"holds only {outer!r}" in stopped.what and f"a class of 1: {owner!r}" in stopped.what
+        assert f"If {owner!r} is a student, add --format plain. If {outer!r} is a student" in stopped.do
+    else:
+        assert list(collected.notebooks) == [owner]  # the name around it is a platform's
+    assert list(collect(source, class_forms.LAB, tmp_path / "plain", "plain").notebooks) == [owner]
+    (tmp_path / "roster").mkdir()
+    (tmp_path / "roster" / "roster.csv").write_text(f"id\n{outer}\n")
+    if owner != "lab-2-ann":
+        assert list(collect(source, class_forms.LAB, tmp_path / "roster").notebooks) == [outer]
+
+
+def test_a_single_repository_is_read_where_somebody_names_the_format(tmp_path: Path) -> None:
+    source = class_forms.lay_out({"lab-2-ann/labs/toy/toy.ipynb": b"mine"}, tmp_path, False)
+    assert list(collect(source, class_forms.LAB, tmp_path / "course", "classroom").notebooks) == ["lab-2-ann"]
+    (tmp_path / "roster").mkdir()
+    (tmp_path / "roster" / "roster.csv").write_text("id,github\njd01,ann\n")
+    assert list(collect(source, class_forms.LAB, tmp_path / "roster", "classroom").notebooks) == ["jd01"]
+
+
+def test_a_packed_kit_is_one_students(tmp_path: Path) -> None:
+    taken, collected = taken_from({f"zoe/{name}": text for name, text in KIT.items()}, tmp_path)
+    assert taken == {"zoe": "mine"} and collected.students == 1
+    source = class_forms.lay_out({"eve.zip": class_forms.zipped(KIT)}, tmp_path / "course", False)
+    assert list(collect(source, class_forms.LAB, tmp_path / "other", "plain").notebooks) == ["eve"]

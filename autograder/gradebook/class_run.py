@@ -30,7 +30,7 @@ from autograder.grading.runner import Settings
 from autograder.grading.store import ResultStore
 from autograder.intake.asked import Accepted
 from autograder.intake.collect import Collected, collect
-from autograder.intake.objections import count
+from autograder.intake.words import count
 
 
 @dataclass

@@ -43,10 +43,3 @@ class Recognised:
     """Sentences about what was recognised and is nobody's."""
     aside: list[Entry] = field(default_factory=list)
     """What is of another lab, or tells whose the others are: it is not used, and needs not be."""
-
-    @property
-    def entries(self) -> list[Entry]:
-        """Those that the format has recognised and that may hold a notebook."""
-        return [claim.entry for claim in self.claims if claim.entry.is_work] + [
-            entry for entry in self.aside if entry.is_work
-        ]

@@ -25,11 +25,12 @@ from autograder.intake.entries import Entry, NotUnderstoodError
 from autograder.intake.formats import PLAIN
 from autograder.intake.members import is_notebook
 from autograder.intake.naming import Student, file_name, named
-from autograder.intake.objections import Gone, count, gone, some, stop
+from autograder.intake.objections import Gone, gone, stop
 from autograder.intake.reading import Known, Reading, read_class
 from autograder.intake.record import Taken, keep_class, known_persons
 from autograder.intake.record import read_class as taken_before
 from autograder.intake.roster import FILE_NAME, Roster, read_roster
+from autograder.intake.words import count, some
 from autograder.submission import exchange_secret, timestamp
 from autograder.submission.notebook_file import NOTEBOOK_BYTES
 

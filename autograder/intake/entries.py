@@ -30,11 +30,10 @@ from autograder.intake.members import (
     packed_in,
     unpacked,
 )
+from autograder.intake.words import some
 
 _MOST_OF_CLASS = 500_000
 """Files in a zip; a class of five thousand repositories has fewer."""
-_NAMED = 5
-"""Of more bad names than this only their number is said."""
 
 
 class NotUnderstoodError(Exception):
@@ -123,9 +122,8 @@ class Listed:
         """Return a sentence about the bad names, if there are any."""
         if not self.bad:
             return []
-        names = ", ".join(repr(name[:60]) for name in self.bad[:_NAMED])
-        more = f" and {len(self.bad) - _NAMED} more" if len(self.bad) > _NAMED else ""
-        return [f"The zip has entries whose names lead nowhere in it; they were left out: {names}{more}."]
+        names = some([repr(name[:60]) for name in self.bad], ", ")
+        return [f"The zip has entries whose names lead nowhere in it; they were left out: {names}."]
 
 
 def listed(source: Path, lab: str) -> Listed:

@@ -180,6 +180,15 @@ def classroom(entries: Sequence[Entry], lab: str) -> Recognised:
     return found
 
 
+def repositories(entries: Sequence[Entry], lab: str) -> Recognised:
+    """GitHub Classroom, if somebody says so: also a single repository, whose whole name is the student's then."""
+    found = classroom(entries, lab)
+    single = [entry for entry in entries if entry.kind in (Kind.FOLDER, Kind.ZIP) and _has_labs(entry, lab)]
+    if not found.claims and len(single) == 1:
+        found.claims.append(Claim(single[0], {"github": single[0].stem, "repository": single[0].stem}))
+    return found
+
+
 def _has_labs(entry: Entry, lab: str) -> bool:
     """Whether it is laid out as the repository that students get."""
     with contextlib.suppress(NotUnderstoodError):
@@ -287,3 +296,5 @@ PLATFORMS: Mapping[str, Format] = {
     )
 }
 """Those that give names of their own."""
+CLASSROOM = replace(PLATFORMS["classroom"], read=repositories)
+"""The same, where somebody has named it."""
