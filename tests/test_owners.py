@@ -262,6 +262,14 @@ def test_of_what_the_course_has_taken_in_only_the_labs_folder_is_read(tmp_path: 
     assert taken == {"ann": "ann/toy/toy.ipynb", "cem": "cem/toy/mine.ipynb"} and not collected.refused
 
 
+def test_grading_what_was_taken_in_once_more_forgets_nothing_that_the_platform_said(tmp_path: Path) -> None:
+    taken_from(CANVAS, tmp_path)
+    record = tmp_path / "course" / "build" / "taken" / "toy.json"
+    before = record.read_bytes()
+    collect(tmp_path / "course" / "build" / "submitted", class_forms.LAB, tmp_path / "course")
+    assert record.read_bytes() == before
+
+
 def test_what_is_said_of_files_that_do_not_count_is_true(tmp_path: Path) -> None:
     files = CANVAS | {"ann_111_999_scratch.ipynb": b"no", "ann_111_850_toy-1.ipynb": b"no", "readme.txt": b""}
     taken, collected = taken_from(files, tmp_path)

@@ -114,7 +114,8 @@ def collect(
     """
     roster = read_roster(root / FILE_NAME) if (root / FILE_NAME).is_file() else None
     before = taken_before(root, lab)
-    reading = read_class(source, lab, format_name, _known(source, root, roster, before))
+    own = source.resolve() == CoursePaths(root).submitted.resolve()
+    reading = read_class(source, lab, format_name, _known(own, roster, before))
     recognised = reading.recognised
     students = named(recognised.claims, roster, known_persons(root, lab))
     missing = gone(source, students, roster, before)
@@ -144,6 +145,9 @@ def collect(
         collected.notebooks[name] = _write(paths, name, lab, chosen, notebook, collected)
         claim = chosen.claim
         platform = reading.format is not PLAIN and not claim.by_hand
+        if own and name in before:  # what the platform says of it still holds
+            taken[name] = before[name].model_copy(update={"left": False})
+            continue
         taken[name] = Taken(
             source=str(source.resolve()),
             around="/".join(reading.around),
@@ -170,13 +174,13 @@ def _number_of_files(entry: Entry) -> int:
         return 1
 
 
-def _known(source: Path, root: Path, roster: Roster | None, before: Mapping[str, Taken]) -> Known:
+def _known(own: bool, roster: Roster | None, before: Mapping[str, Taken]) -> Known:
     def is_student(name: str) -> bool:
         ways = dict.fromkeys(("id", "email", "name", "github"), name)
         return name in before or (roster is not None and roster.student(ways) is not None)
 
     around = {taken.around for taken in before.values()} if before else None
-    return Known(is_student, roster is not None, source.resolve() == CoursePaths(root).submitted.resolve(), around)
+    return Known(is_student, roster is not None, own, around)
 
 
 def _one_each(students: Sequence[Student], reading: Reading, collected: Collected) -> list[Student]:
