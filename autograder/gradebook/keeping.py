@@ -135,11 +135,12 @@ def bring_up_to_date(root: Path) -> None:
     scripts = ScriptDirectory(ALEMBIC_DIR)
     if version == scripts.get_current_head():
         return
-    place = gradebook_place(root)
+    place, file = gradebook_place(root), gradebook_file(root)
+    copies = f" If it held grades, put one of {file.parent / BACKUPS} in its place." if file is not None else ""
     if version is None:
         raise KitError(
             f"The gradebook {place} does not say which version it has: it was left unfinished when it was made.",
-            f"Move it away, and run again. If it held grades, put one of {Path(place).parent / BACKUPS} in its place.",
+            f"Move it away, and run again.{copies}",
         )
     if version not in {one.revision for one in scripts.walk_revisions()}:
         raise KitError(
