@@ -153,11 +153,8 @@ def test_what_grading_would_change_is_found_out_without_changing_anything(course
     (course.class_ / "bob" / "toy.ipynb").write_text("{")
     (course.class_ / "dan.pdf").touch()
     before = files(course.root)
-    done = CliRunner().invoke(
-        app,
-        ["grade", toy.LAB, str(course.class_), "--diff", "--accept", "smaller", "--course", str(course.root)]
-        + ["--isolation", "none"],
-    )
+    options = ["--diff", "--accept", "smaller", "--isolation", "none", "--course", str(course.root)]
+    done = CliRunner().invoke(app, ["grade", toy.LAB, str(course.class_), *options])
     assert done.exit_code == 3 and "Nothing was recorded" in done.output
     assert files(course.root) == before
 

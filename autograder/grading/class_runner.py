@@ -56,25 +56,15 @@ def run_class(
     results: dict[str, SubmissionResult] = {}
     jobs: dict[str, Job] = {}
     for student, path in submissions.items():
-        submission = read_submission(path, lab)
-        result = stores.known(student, submission)
-        if result is None:
-            job = job_of(submission, student, lab, settings)
-            if submission.readable:
-                jobs[student] = job
-                continue
-            result = without_running(submission, job)
-            stores.told.save(result)
-        results[student] = result.without_pictures()
-        on_result(result)
+        told = _without_running(student, path, lab, settings, stores)
+        if isinstance(told, Job):
+            jobs[student] = told
+            continue
+        results[student] = told.without_pictures()
+        on_result(told)
     mixed = canaries.among(jobs) if canaries is not None and stores.watched(jobs) else list(jobs.values())
-
-    def started(name: str) -> None:
-        if name in jobs:
-            on_start(name)
-
     try:
-        with closing(_believed(executor, mixed, jobs, stores, started)) as ran:
+        with closing(_believed(executor, mixed, jobs, stores, on_start)) as ran:
             for result in ran:
                 if canaries is not None and result.student not in jobs:
                     canaries.take(result)
@@ -92,18 +82,37 @@ def run_class(
     return {student: results[student] for student in submissions}
 
 
+def _without_running(student: str, path: Path, lab: Lab, settings: Settings, stores: _Stores) -> SubmissionResult | Job:
+    """What is known of a submission already, or can be told of it unrun; or else what is to run."""
+    submission = read_submission(path, lab)
+    known = stores.known(student, submission)
+    if known is not None:
+        return known
+    job = job_of(submission, student, lab, settings)
+    if submission.readable:
+        return job
+    result = without_running(submission, job)
+    stores.told.save(result)
+    return result
+
+
 def _believed(
     executor: executors.Executor,
     jobs: Sequence[Job],
     students: Collection[str],
     stores: _Stores,
-    started: Callable[[str], None],
+    on_start: Callable[[str], None],
 ) -> Generator[SubmissionResult]:
     """Run jobs, and yield what may be believed of each result: it may come from another machine.
 
     Checks whose programs others kept from the CPUs are run again when all have run, alone, before they are believed.
     What they came to first is kept until then, so that an interrupted run does not lose it.
     """
+
+    def started(name: str) -> None:
+        if name in students:
+            on_start(name)
+
     by_student = {job.student: job for job in jobs}
     to_run_again = {job.student: first for job in jobs if (first := stores.first_result(job)) is not None}
     with closing(executor.run([job for job in jobs if job.student not in to_run_again], started)) as ran:

@@ -129,36 +129,36 @@ def collect(
         if (found := _handed_in(student, lab, others, reading, collected)) is not None
     }
     collected.students = len({file_name(student.name) for student in students})
-    collected.files = len(recognised.strange) + sum(
-        _number_of_files(entry) for entry in {claim.entry: None for claim in recognised.claims}
-    )
+    collected.files = len(recognised.strange) + sum(map(_number_of_files, {one.entry for one in recognised.claims}))
     if not handed_in:
         why = f" {collected.refused[0]}" if collected.refused else ""
-        raise KitError(
-            f"There are no submissions in {source}.{why}", f"Each student needs a folder that holds {lab}.ipynb."
-        )
+        do = f"Each student needs a folder that holds {lab}.ipynb."
+        raise KitError(f"There are no submissions in {source}.{why}", do)
     paths = CoursePaths(tried_in or root)
     if not (paths.build / "nbgrader_config.py").is_file():
         write_beside(paths.build / "nbgrader_config.py", CLOSED)
     taken: dict[str, Taken] = {}
     for name, (student, chosen, notebook) in handed_in.items():
         collected.notebooks[name] = _write(paths, name, lab, chosen, notebook, collected)
-        claim = chosen.claim
-        platform = reading.format is not PLAIN and not claim.by_hand
-        if own and name in before:  # what the platform says of it still holds
+        if own and name in before:  # what the platform said of it still holds
             taken[name] = before[name].model_copy(update={"left": False})
-            continue
-        taken[name] = Taken(
-            source=str(source.resolve()),
-            around="/".join(reading.around),
-            file="/".join(chosen.member.path) if platform and chosen.member is not None else "",
-            owner=dict(student.claims[0].owner) if platform else {},
-            late=claim.late,
-        )
+        else:
+            taken[name] = _taken(source, reading, student, chosen)
     if tried_in is None:
         keep_class(root, lab, taken, {**missing.lost, **missing.renamed})
         collected.notes += _farewells(missing, before)
     return collected
+
+
+def _taken(source: Path, reading: Reading, student: Student, chosen: Chosen) -> Taken:
+    platform = reading.format is not PLAIN and not chosen.claim.by_hand
+    return Taken(
+        source=str(source.resolve()),
+        around="/".join(reading.around),
+        file="/".join(chosen.member.path) if platform and chosen.member is not None else "",
+        owner=dict(student.claims[0].owner) if platform else {},
+        late=chosen.claim.late,
+    )
 
 
 def _title(reading: Reading) -> str:
