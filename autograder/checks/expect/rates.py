@@ -55,7 +55,7 @@ def in_time(received: Sequence[Received], rate: float, tolerance: float, every: 
     """Whether messages are so many that the median tells their rate, or a timer of this rate was in time for a while.
 
     A timer that is held up less and less long makes short gaps, but it keeps its beat: from the first to the last of n
-    calls at least n - 2 of its periods go by (rcl, `rcl_timer_call`). A slower one never looks in time for four periods.
+    calls at least n - 2 of its periods go by (rcl, `rcl_timer_call`). A slower one is never in time for four periods.
     The arguments are those of `at_rate`.
     """
     gaps = _gaps(received, every)
