@@ -88,6 +88,10 @@ def built(seed: int) -> Built:
         # Who gives these names sees to it that no two are one.
         students = list({student.name.replace(" ", ""): student for student in students}.values())
     files = FORMS[form](students, dice)
+    if hostile and form.startswith("plain") and seed % 5 == 0:  # one student twice, as where a zip was unpacked
+        again = Student(students[0].name, 0, "", {"toy.ipynb": b"not the work that counts"})
+        for two in (_plain_folders, _plain_zips, _plain_files):
+            files = two([again], dice) | files
     return Built(form, _packed(files, form, dice), students, hostile)
 
 

@@ -122,6 +122,11 @@ def all_full(result: SubmissionResult) -> SubmissionResult:
     )
 
 
+def none_full(result: SubmissionResult) -> SubmissionResult:
+    """What an executor makes of a result that takes no check for passed."""
+    return result.model_copy(update={"checks": [check.model_copy(update={"points": 0.0}) for check in result.checks]})
+
+
 def test_known_answers_run_among_a_class_and_are_recorded_nowhere(course: Course) -> None:
     course.hand_in("ann", "bob")
     run = course.grade(Settings(isolation=Isolation.NONE))
@@ -164,7 +169,7 @@ def test_a_class_has_as_many_as_a_tenth_of_it_but_at_least_a_pair(
     mixed = [job.student for job in canaries.among(jobs)]
     assert [name for name in mixed if name in jobs] == names
     expected = [number % 2 == 0 for number, count in enumerate(groups) for _ in range(count)]
-    assert [canaries.has(name) for name in mixed] == expected
+    assert [name not in jobs for name in mixed] == expected
 
 
 def test_a_wrong_answer_that_passes_towards_the_end_stops_the_run_before_any_grade(
@@ -191,7 +196,7 @@ def test_a_wrong_answer_that_passes_towards_the_end_stops_the_run_before_any_gra
     assert "`check_talker`" not in error.value.what
     for advice in ("top", "autograder doctor", "--jobs 1", "0 can be believed", "2 will be", "--despite-canaries"):
         assert advice in error.value.do
-    assert not course.paths.gradebook.exists()
+    assert course.recorded() == {}
     assert not course.paths.grades.exists()
     assert course.files(course.paths.results) == set()
     flag.unlink()
@@ -285,13 +290,35 @@ def test_after_an_interruption_the_known_answers_of_the_next_run_decide(judged: 
     with pytest.raises(KeyboardInterrupt):
         judged.grade()
     assert judged.files(judged.paths.results) == set()
-    assert not judged.paths.gradebook.exists()
+    assert judged.recorded() == {}
     kept = judged.files(judged.paths.tried)
     assert len(kept) >= 2
     judged.meddle = lambda _, result: result
     judged.grade()
     assert {name for name in judged.names if name != "?"} == {"ann", "bob", "cem"} - kept
     assert judged.names.count("?") == 2
+    assert set(judged.recorded()) == {"ann", "bob", "cem"}
+
+
+def test_a_flip_before_an_interruption_is_told_and_the_results_beside_it_are_run_again(
+    judged: Course, capsys: pytest.CaptureFixture[str]
+) -> None:
+    judged.hand_in("ann", "bob", "cem")
+
+    def meddle(number: int, result: SubmissionResult) -> SubmissionResult:
+        if number == 3:
+            raise KeyboardInterrupt
+        return none_full(result) if number == 0 else result
+
+    judged.meddle = meddle
+    with pytest.raises(KeyboardInterrupt):
+        judged.grade()
+    told = capsys.readouterr().err
+    assert "The results of 3 students are doubtful and will be run again, because answers with known points" in told
+    assert judged.files(judged.paths.tried) == set()
+    judged.meddle = lambda _, result: result
+    judged.grade()
+    assert {name for name in judged.names if name != "?"} == {"ann", "bob", "cem"}
     assert set(judged.recorded()) == {"ann", "bob", "cem"}
 
 
@@ -334,6 +361,25 @@ def test_what_is_wrong_with_the_file_is_told(course: Course, text: str, said: st
     assert any(said in str(one) and not one.warning for one in read_findings(course.root, toy.LAB))
 
 
+def test_a_broken_file_stops_a_class_before_it_is_taken_in_and_the_switch_is_named(course: Course) -> None:
+    course.hand_in("ann")
+    course.wrong_answers("a: [")
+    for run in (grade_class, try_class):
+        with pytest.raises(KitError, match="is no YAML") as refused:
+            run(course.root, toy.LAB, course.class_, ALONE)
+        assert "--no-canaries" in refused.value.do and not course.paths.submitted.exists()
+
+
+def test_lint_says_what_grading_would_say_of_entries_that_change_one_place(course: Course) -> None:
+    notebook = course.paths.solutions / toy.LAB / f"{toy.LAB}.ipynb"
+    raw = json.loads(notebook.read_text(encoding="utf-8"))
+    check = 'with answers("answers.yaml") as table:\n    table.expect_answer("answer", 42)\ntable.score(1)'
+    raw["cells"].append(toy.cell("code", check, 11, grade_id="check_more", grade=True, locked=True, points=1))
+    notebook.write_text(json.dumps(raw), encoding="utf-8")
+    course.wrong_answers(WRONG + "- {answer: talker, instead_of: print('hello'), write: x, points: {check_more: 0}}\n")
+    assert any("change the same place" in str(one) for one in read_findings(course.root, toy.LAB) if not one.warning)
+
+
 def test_lint_says_which_check_has_no_wrong_answer_and_which_gets_other_points(course: Course) -> None:
     first = WRONG.strip().splitlines()[0]
     course.wrong_answers(first.replace("check_talker: 0", "check_talker: 1"))
@@ -360,7 +406,7 @@ def test_the_command_says_what_flipped_and_the_options_do_what_they_say(course: 
     assert "gradebook" not in refused.stdout  # what intake says comes before
     assert "a wrong answer must get 1 point, and got 0 of 3" in refused.stderr
     assert "Traceback" not in refused.stderr
-    assert not course.paths.gradebook.exists()
+    assert course.recorded() == {}
     assert command("--despite-canaries").returncode == 0
     assert course.recorded() == {"ann": 5.0}
     quiet = command("--no-canaries", "--force")

@@ -205,7 +205,7 @@ def test_a_class_is_graded_once_and_only_what_changed_again(root: Path) -> None:
     hand_in(root, "bob", "print('hello')")
     table = (root / "build" / "grades.csv").read_text()
     status, out, _ = run(root, "grade", "toy", "class", "--diff")
-    assert status == 0 and "0/3 → 3/3" in out and "1 of 4 students would have more points, 0 fewer, 3 as many" in out
+    assert status == 3 and "0/3 → 3/3" in out and "1 of 4 students would have more points, 0 fewer, 3 as many" in out
     assert {path: path.stat().st_mtime_ns for path in stamps} == stamps
     assert (root / "build" / "grades.csv").read_text() == table
     status, out, _ = run(root, "grade", "toy", "class", "--json")

@@ -79,6 +79,7 @@ class Course:
 
     def record(self, *students: str, force: bool = False) -> None:
         recorder = Recorder(self.root, self.lab, force)
+        recorder.begin()
         for student in students:
             recorder.record(student)
         assert recorder.failures == {}

@@ -18,6 +18,7 @@ import toy
 from served import address_of
 
 from autograder.course.lab import load_lab
+from autograder.gradebook.own_courses import TEMPLATE
 from autograder.gradebook.preparation import prepare_nbgrader
 from autograder.intake.collect import collect
 
@@ -106,12 +107,21 @@ PLANTED = {
     "nbgrader_config.py": "{write}",
     "nbgrader_config.json": '{{"Application": {{"log_level": 10}}, "ExportApp": {{"plugin_class": "planted.Plugin"}}}}',
     "planted.py": "{write}",
+    "argcomplete.py": "{write}",
     "course.toml": 'title = "A course"',
     "sitecustomize.py": "{write}",
     "jupyter_config.py": "{write}",
     "jupyter_server_config.py": "{write}",
     "ipython_config.py": "{write}",
 }
+
+
+def test_a_configuration_as_a_new_course_gets_it_is_passed_over_in_a_submission(tmp_path: Path) -> None:
+    """It would put the folder in which it lies before all others in which modules are looked for."""
+    folder = toy.hand_in(tmp_path, "eve", toy.CELLS).parent
+    shutil.copy(TEMPLATE, folder / "nbgrader_config.py")
+    _, told = nbgrader(folder, "validate", "toy.ipynb")
+    assert f"{folder / 'nbgrader_config.py'} is passed over" in told and "was not checked" in told
 
 
 @pytest.mark.parametrize(

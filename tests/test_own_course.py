@@ -12,8 +12,10 @@ from pathlib import Path
 
 import pytest
 from linked import link_tree
+from typer.testing import CliRunner
 
 from autograder.authoring.new import new_course
+from autograder.cli.main import app
 from autograder.core.errors import KitError
 from autograder.core.version import VERSION
 from autograder.course.paths import CoursePaths
@@ -194,6 +196,14 @@ def test_a_course_is_begun_in_no_folder_that_holds_something_and_keeps_grades_ou
         assert subprocess.run(["git", "-C", course, "check-ignore", "--quiet", path]).returncode == 0, path
 
 
+def test_a_course_is_begun_where_nothing_can_be_noted_about_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "config").write_text("a file, so that no folder can be made here")
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "config"))
+    done = CliRunner().invoke(app, ["new", "course", str(tmp_path / "course")])
+    assert done.exit_code == 0, done.output
+    assert f"autograder trust {tmp_path / 'course'}" in done.output.replace("\n", " ") and "Next:" in done.output
+
+
 def test_the_doctor_speaks_of_the_course_and_of_no_checkout(environment: Environment, course: Path) -> None:
     told = environment.run(course, "autograder", "doctor", "--json")
     findings = {one["name"]: one for one in json.loads(told)["findings"]}
@@ -218,6 +228,7 @@ def test_outside_of_a_course_nbgrader_executes_nothing(environment: Environment,
     cell = {"cell_type": "code", "id": "a", "metadata": {}, "source": "open('executed', 'w')", "outputs": [],
             "execution_count": None}  # fmt: skip
     notebook.write_text(json.dumps({"cells": [cell], "metadata": {}, "nbformat": 4, "nbformat_minor": 5}))
+    (tmp_path / "argcomplete.py").write_text("open('executed', 'w')\n")  # nbgrader looks for it here
     told = environment.run(tmp_path, "python", "-m", "nbgrader", "validate", notebook)
     assert "Start it in the folder of your course" in told and not (tmp_path / "executed").exists()
 

@@ -15,6 +15,7 @@ import toy
 
 from autograder.core.results import CheckResult, Isolation, NodeLog, Outcome, Status, SubmissionResult
 from autograder.course.lab import load_lab
+from autograder.course.paths import CoursePaths
 from autograder.grading import executors, once_more
 from autograder.grading.class_runner import run_class
 from autograder.grading.job import Cell, Job
@@ -154,3 +155,25 @@ def test_what_lost_nothing_is_not_run_again() -> None:
     assert once_more.is_open(check.model_copy(update={"points": 1.0}))
     assert once_more.is_open(check.model_copy(update={"points": None}))
     assert not once_more.is_open(check.model_copy(update={"points": 0.0, "starved": 0.0}))
+
+
+def test_an_interruption_while_checks_are_run_again_loses_no_first_result(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lab = load_lab(toy.make_course(tmp_path / "course"), toy.LAB)
+    machine = Machine({"ann": 2.0, "bob": 3.0}, {})
+    monkeypatch.setattr(executors, "chosen", lambda *_: machine)
+    class_ = {who: toy.hand_in(tmp_path, who, lab.clean_notebook({})["cells"]) for who in ("ann", "bob", "eve")}
+
+    def interrupted(result: SubmissionResult) -> None:
+        if result.student == "ann":
+            raise KeyboardInterrupt
+
+    settings = Settings(Isolation.NONE)
+    with pytest.raises(KeyboardInterrupt):
+        run_class(class_, tmp_path / "course", lab, settings, interrupted)
+    machine.asked.clear()
+    results = run_class(class_, tmp_path / "course", lab, settings, lambda _: None)
+    assert [asked for asked in machine.asked if asked] == [[("bob", ["check_talker"], True)]]
+    assert [check.run_again for check in results["bob"].checks] == [True, False]
+    assert not list(CoursePaths(tmp_path / "course").to_run_again.rglob("*.json"))

@@ -21,7 +21,8 @@ from pathlib import Path
 
 import pytest
 
-from autograder.setup import refusals
+from autograder.setup import bootstrap, refusals
+from autograder.setup.labs import put_labs
 from autograder.setup.packages import pin
 from autograder.setup.places import MARKER
 
@@ -413,3 +414,40 @@ def test_a_full_disk_is_explained(tmp_path: Path) -> None:
     assert done.returncode == 2
     assert "no space left" in done.stderr and "Free 1.5 GB" in done.stderr
     assert "python3-venv" not in done.stderr
+
+
+def handed_out(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Lay out a student's kit with one lab, and let set-up take it for the one that it belongs to."""
+    (root / "kit" / "labs" / "toy").mkdir(parents=True)
+    (root / "kit" / "labs" / "toy" / "toy.ipynb").write_text("as handed out")
+    for module in ("labs", "bootstrap"):
+        monkeypatch.setattr(f"autograder.setup.{module}.ROOT", root)
+
+
+def test_a_lab_that_another_first_start_puts_there_meanwhile_counts(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    handed_out(tmp_path, monkeypatch)
+    copy = shutil.copytree
+
+    def slower(source: str, target: str) -> None:
+        copy(source, target)
+        copy(source, tmp_path / "labs" / "toy")
+        (tmp_path / "labs" / "toy" / "toy.ipynb").write_text("begun")
+
+    monkeypatch.setattr("autograder.setup.labs.shutil.copytree", slower)
+    put_labs()
+    assert (tmp_path / "labs" / "toy" / "toy.ipynb").read_text() == "begun"
+    assert [path.name for path in (tmp_path / "labs").iterdir()] == ["toy"]
+
+
+def test_labs_that_cannot_be_put_there_are_not_said_to_be_the_environment(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    handed_out(tmp_path, monkeypatch)
+    (tmp_path / "labs").touch()
+    monkeypatch.setattr("autograder.setup.bootstrap.WHEEL", "kit/some.whl")
+    monkeypatch.setattr("autograder.setup.bootstrap.make_ready", lambda *_: None)
+    monkeypatch.setattr("sys.argv", ["setup"])
+    assert bootstrap.main() == 2
+    assert f".venv is ready, but the labs could not be put into {tmp_path / 'labs'}" in capsys.readouterr().err

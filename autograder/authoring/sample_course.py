@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 from pathlib import Path
 
 from autograder.core.files import write_beside
 from autograder.course.paths import CoursePaths
 from autograder.course.settings import SETTINGS_FILE
-from autograder.gradebook.own_courses import TEMPLATE
+from autograder.gradebook.own_courses import TEMPLATE, trust
 from autograder.gradebook.settings import CONFIG_FILE
 
 
@@ -22,4 +23,6 @@ def sample_course(root: Path) -> Path:
     settings = root / SETTINGS_FILE
     write_beside(sample / SETTINGS_FILE, settings.read_bytes() if settings.is_file() else b"")
     write_beside(sample / CONFIG_FILE, TEMPLATE.read_bytes())
+    with contextlib.suppress(OSError):  # the kit's own commands do not need it
+        trust(sample)
     return sample

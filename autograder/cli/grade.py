@@ -24,13 +24,14 @@ if TYPE_CHECKING:
 
 FormatOption = Annotated[
     FormatName | None,
-    typer.Option("--format", help="As what to read the submissions, where names can be read in two ways."),
+    typer.Option("--format", help="The format of the submissions, if their names fit two formats."),
 ]
 AcceptOption = Annotated[
     list[Accepted] | None,
     typer.Option(
-        help="Go on although the class is smaller than the roster or the last time, one submission would take the"
-        " place of another one, or somebody is not in the roster; may be given several times."
+        help="Go on although something stopped the run. smaller: students of the roster, or of the last time, are"
+        " missing. replaced: one submission would take the place of another one. roster: somebody is not in the roster."
+        " The option may be given several times."
     ),
 ]
 LEFT_OUT = 3
@@ -87,13 +88,17 @@ def grade(
         from autograder.gradebook.differences import difference_view
         from autograder.report.terminal import console
 
-        console().print(difference_view(try_class(root, lab, source, settings, intake)))
-        return
+        tried = try_class(root, lab, source, settings, intake)
+        console().print(difference_view(tried))
+        raise typer.Exit(_status(tried.collected, tried.after, submissions))
     run = grade_class(root, lab, source, settings, intake)
     _show(run, CoursePaths(root), lab, as_json)
+    raise typer.Exit(2 if run.unrecorded else _status(run.collected, run.results, submissions))
+
+
+def _status(collected: Collected, results: Sequence[SubmissionResult], submissions: Path | None) -> int:
     # The sample class has somebody on purpose whose notebook cannot be read.
-    left_out = run.collected.refused or (submissions and _unread(run))
-    raise typer.Exit(2 if run.unrecorded else LEFT_OUT if left_out else 0)
+    return LEFT_OUT if collected.refused or (submissions and _unread(results)) else 0
 
 
 def _places(course: Path | None, lab: str, submissions: Path | None) -> tuple[Path, Path]:
@@ -133,11 +138,11 @@ def _show_intake(as_json: bool, collected: Collected) -> None:
         console().print(plain(collected.line), markup=False, soft_wrap=True)
 
 
-def _unread(run: ClassRun) -> list[str]:
+def _unread(results: Sequence[SubmissionResult]) -> list[str]:
     """Sentences about those whose notebook nobody could read: a person has to look at it."""
     from autograder.grading.runner import not_understood
 
-    reasons = {result.student: not_understood(result) for result in run.results}
+    reasons = {result.student: not_understood(result) for result in results}
     return [f"{student}: {why} There are no points yet: a person decides." for student, why in reasons.items() if why]
 
 
@@ -147,7 +152,7 @@ def _show(run: ClassRun, paths: CoursePaths, lab: str, as_json: bool) -> None:
     from autograder.report.terminal import class_view, console, plain, undecided_view
 
     left_out = [plain(sentence) for sentence in (*run.told, *run.collected.notes, *run.collected.refused)]
-    left_out += map(plain, _unread(run))
+    left_out += map(plain, _unread(run.results))
     left_out += [f"{plain(name)} is not in the gradebook: {plain(why)}" for name, why in run.unrecorded.items()]
     if as_json:
         store = ResultStore(paths.root)
@@ -198,9 +203,10 @@ def _run_again(results: Sequence[SubmissionResult]) -> str:
     checks = [check for result in results for check in result.checks]
     again = [check for check in checks if check.run_again]
     unknown = sum(check.points is None for check in again)
+    decided = f"{unknown} of them could not be decided then." if unknown else "all of them were decided then."
     return (
         f"{len(again)} of {len(checks)} checks ({len(again) / len(checks):.1%}) lost points while others kept their"
-        f" programs from the CPUs, and were run again alone; {unknown or 'none'} of them could not be decided then."
+        f" programs from the CPUs, and were run again alone; {decided}"
     )
 
 

@@ -26,7 +26,13 @@ def new_course(
 
     for path in write(folder):
         print(path)
-    note(folder)
+    try:
+        note(folder)
+    except OSError as error:
+        print(
+            f"\nThe folder could not be noted as a course of yours ({error.filename}: {error.strerror}), so nbgrader's"
+            f" own commands will pass over its settings. Once that can be written, say: autograder trust {folder}"
+        )
     print(f"\nNext:\n  cd {shlex.quote(str(folder))}\n  autograder lint {FIRST_LAB}\n  autograder release")
 
 

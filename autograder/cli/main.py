@@ -56,6 +56,10 @@ def main() -> None:
             print(f"error: The gradebook cannot be used: {getattr(error, 'orig', error)}.", file=sys.stderr)
             print(f"  {GRADEBOOK_REFUSED}", file=sys.stderr)
             sys.exit(2)
+        if type(error).__name__ == "DatabaseError":  # a sentence with the place was given where it is known
+            print(f"error: The gradebook is damaged: {getattr(error, 'orig', error)}.", file=sys.stderr)
+            print("  Put a copy of it in its place: earlier ones are in gradebook/backups.", file=sys.stderr)
+            sys.exit(2)
         import traceback
 
         last = traceback.extract_tb(error.__traceback__)[-1]

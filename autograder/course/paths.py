@@ -57,6 +57,11 @@ class CoursePaths:
         return self.build / "tried"
 
     @property
+    def to_run_again(self) -> Path:
+        """The same of what has run once, with checks that are to be run again alone."""
+        return self.build / "to_run_again"
+
+    @property
     def doubtful(self) -> Path:
         """The same of what ran while a known answer got another verdict than it must."""
         return self.build / "doubtful"

@@ -7,9 +7,11 @@ import time
 from collections.abc import Callable, Collection
 from dataclasses import dataclass, field
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from rich.console import Console
 
+from autograder.core.errors import KitError
 from autograder.core.files import remove_unfinished
 from autograder.core.grades import Grade
 from autograder.core.lock import only_one
@@ -28,6 +30,7 @@ from autograder.grading.runner import Settings
 from autograder.grading.store import ResultStore
 from autograder.intake.asked import Accepted
 from autograder.intake.collect import Collected, collect
+from autograder.intake.words import count
 
 
 @dataclass
@@ -74,9 +77,9 @@ class Intake:
     told: Callable[[Collected], None] = lambda _: None
     """Called as soon as the class is taken in, before anything is run."""
 
-    def collect(self, source: Path, lab: str, root: Path) -> Collected:
+    def collect(self, source: Path, lab: str, root: Path, tried_in: Path | None = None) -> Collected:
         """Take in a class; raises as the function of that name."""
-        collected = collect(source, lab, root, self.format, self.accepted)
+        collected = collect(source, lab, root, self.format, self.accepted, tried_in)
         self.told(collected)
         return collected
 
@@ -111,28 +114,38 @@ def try_class(root: Path, lab_name: str, source: Path, settings: Settings, intak
         KitError: as `grade_class`.
     """
     lab = load_lab(root, lab_name)
-    with only_one(CoursePaths(root).lock, "A grading"):
-        collected = intake.collect(source, lab.name, root)
+    with only_one(CoursePaths(root).lock, "A grading"), TemporaryDirectory(prefix="class-") as folder:
+        grades = {grade.student: grade for grade in read_grades(root, lab.name)}  # first: it may be unusable
+        canaries = _canaries(root, lab, settings)
+        collected = intake.collect(source, lab.name, root, Path(folder))
         store = ResultStore(root)
         before = {student: store.last(lab.name, student) for student in collected.notebooks}
         console = Console(file=sys.stderr, highlight=False)
-        canaries = _canaries(root, lab, settings)
         with Steps(len(collected.notebooks), console) as steps:
-            after = run_class(
-                collected.notebooks, root, lab, settings, steps.finished, steps.started, tried=True, canaries=canaries
-            )
+            try:
+                after = run_class(
+                    collected.notebooks, root, lab, settings, steps.finished, steps.started, True, canaries
+                )
+            except KeyboardInterrupt:
+                _tell_flips(canaries, settings, steps)
+                raise
     _refuse_flipped(canaries, root, settings, len(after))
     return Tried(
         before={student: result for student, result in before.items() if result is not None},
         after=list(after.values()),
-        grades={grade.student: grade for grade in read_grades(root, lab.name)},
+        grades=grades,
         collected=collected,
     )
 
 
 def _canaries(root: Path, lab: Lab, settings: Settings) -> Canaries | None:
     """The known answers for a run; None if they are switched off, or the course cannot have any."""
-    known = known_answers(root, lab) if settings.canaries else []
+    try:
+        known = known_answers(root, lab) if settings.canaries else []
+    except KitError as error:
+        raise KitError(
+            f"{error.what} Nothing was graded.", f"{error.do} Or grade without known answers: --no-canaries."
+        ) from error
     return Canaries(lab, known, settings) if known else None
 
 
@@ -141,12 +154,19 @@ def _refuse_flipped(canaries: Canaries | None, root: Path, settings: Settings, r
         raise canaries.refusal(root, results - len(canaries.doubtful))
 
 
+def _tell_flips(canaries: Canaries | None, settings: Settings, steps: Steps) -> None:
+    if canaries is not None and canaries.flips and not settings.despite_canaries:
+        again = count(len(canaries.doubtful), "student")
+        steps.say(f"The results of {again} are doubtful and will be run again, because {canaries.flipped()}")
+
+
 def _graded(root: Path, lab: Lab, source: Path, settings: Settings, intake: Intake) -> ClassRun:
     console = Console(file=sys.stderr, highlight=False)
+    canaries = _canaries(root, lab, settings)
     collected = intake.collect(source, lab.name, root)
     began = time.monotonic()
     recorder = Recorder(root, lab, settings.force)
-    canaries = _canaries(root, lab, settings)
+    recorder.begin()
     recorded: set[str] = set()
 
     with Steps(len(collected.notebooks), console) as steps:
@@ -176,11 +196,14 @@ def _graded(root: Path, lab: Lab, source: Path, settings: Settings, intake: Inta
             recording.finish()
         except BaseException as error:
             recording.give_up()
+            for sentence in recorder.told:
+                steps.say(sentence)
             if isinstance(error, KeyboardInterrupt):
                 paths = CoursePaths(root)
                 where = (paths.results if canaries is None else paths.tried) / lab.name
                 kept = f"{steps.done} of {steps.total} results are kept in {where}"
                 steps.say(f"\n{kept}; run again to go on.")
+                _tell_flips(canaries, settings, steps)
             raise
     return ClassRun(
         results=list(results.values()),

@@ -23,7 +23,8 @@ MARK = ".grades"
 """The file beside a feedback page that says which grades it shows."""
 _NO_ROOM = re.compile(
     r"(No space left on device|database or disk is full|database is locked|disk I/O error|Disk quota exceeded"
-    r"|readonly database|Read-only file system|unable to open database file)"
+    r"|readonly database|file is not a database|disk image is malformed|Read-only file system"
+    r"|unable to open database file)"
 )
 """What the machine says, through nbgrader, that will not be otherwise for the next student."""
 
@@ -48,6 +49,14 @@ class Recorder:
         self.told: list[str] = []
         """What was changed about the gradebook itself, as sentences."""
 
+    def begin(self) -> None:
+        """Have a gradebook that can be written, with the lab's cells in it, before anything is run for it.
+
+        Raises:
+            KitError: there can be none.
+        """
+        self.told += register(self._root, self._lab.name)
+
     def record(self, student: str) -> None:
         """Record one student's result.
 
@@ -60,7 +69,6 @@ class Recorder:
         if not steps:
             return
         if self._api is None:
-            self.told += register(self._root, self._lab.name)
             self._api = open_api(self._root)
         page.unlink(missing_ok=True)
         for step in steps:

@@ -8,7 +8,7 @@ from pathlib import Path
 from autograder.core.errors import GRADEBOOK_REFUSED, KitError
 from autograder.course.lab import load_lab
 from autograder.gradebook.api import answered, last_error, open_api
-from autograder.gradebook.keeping import bring_up_to_date, make_room, name_course
+from autograder.gradebook.keeping import make_usable
 from autograder.gradebook.settings import gradebook_address
 
 
@@ -68,9 +68,7 @@ def register(root: Path, lab: str) -> list[str]:
     Raises:
         KitError: nbgrader refuses.
     """
-    make_room(root)
-    bring_up_to_date(root)
-    name_course(root)
+    make_usable(root)
     if knows(root, lab):
         return []
     with tempfile.TemporaryDirectory() as folder:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
 from autograder.core.grades import Grade
+from autograder.gradebook.keeping import damage_told
 from autograder.gradebook.reading import grades_in
 from autograder.gradebook.settings import gradebook_address, gradebook_file
 from autograder.intake.record import left_class
@@ -26,7 +27,7 @@ def ask(root: Path, question: Callable[[Connection], Answer], nothing: Answer) -
 
     engine = create_engine(gradebook_address(root))
     try:
-        with engine.connect() as connection:
+        with damage_told(root), engine.connect() as connection:
             return question(connection) if inspect(connection).has_table("grade") else nothing
     finally:
         engine.dispose()

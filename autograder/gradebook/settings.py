@@ -38,7 +38,9 @@ def settings_of(root: Path) -> Any:
         try:
             config.merge(PyFileConfigLoader(CONFIG_FILE, str(root)).load_config())
         except (Exception, SystemExit) as error:
-            raise KitError(f"{root / CONFIG_FILE} cannot be used: {error}", "Repair that line of it.") from error
+            raise KitError(
+                f"{root / CONFIG_FILE} cannot be used: {error}", "Correct the line that the error names."
+            ) from error
         finally:  # it takes the working folder out, which may be the one that the kit is imported from
             sys.path += [folder for folder in before if folder == _KIT and folder not in sys.path]
     return config
@@ -99,7 +101,7 @@ def _says_more(root: Path) -> bool:
         KitError: it has, and they may be a program of somebody else's.
     """
     own = root / CONFIG_FILE
-    if not own.is_file() or own.read_text(encoding="utf-8") == TEMPLATE.read_text(encoding="utf-8"):
+    if not own.is_file() or own.read_text(encoding="utf-8", errors="replace") == TEMPLATE.read_text(encoding="utf-8"):
         return False
     if not may_run(own):
         raise KitError(

@@ -134,10 +134,6 @@ class Canaries:
         name = uuid.uuid4().hex[:12]
         return self._new_name(taken) if name in taken else name
 
-    def has(self, name: str) -> bool:
-        """Whether a job of this name is a known answer."""
-        return name in self._placed
-
     def take(self, result: SubmissionResult) -> None:
         """Compare the result of a known answer with what it must be."""
         placed = self._placed[result.student]
@@ -163,7 +159,8 @@ class Canaries:
         without = sum(all(one.points[check.grade_id] == check.points for one in self.known) for check in checks)
         if any(None in one.points.values() for one in self.known):
             sentences.append(
-                f"There is no {name}, so their wrong answers are the notebook as students receive it: they show little."
+                f"There is no {name}, so the notebook as students receive it serves as the wrong answer, which shows"
+                " little."
             )
         elif without:
             sentences.append(f"{name} has no wrong answer for {without} of {len(checks)} checks.")
@@ -178,6 +175,12 @@ class Canaries:
             sentences.append(f"The grader could not find out about {self.undecided} of their {checks} checks.")
         return " ".join(sentences) or "Each check gave them the points that it must."
 
+    def flipped(self) -> str:
+        """Return the flips as the rest of a sentence."""
+        lines = [f"\n  {flip}" for flip in self.flips[:_LISTED]]
+        lines += [f"\n  and {len(self.flips) - _LISTED} more"] if len(self.flips) > _LISTED else []
+        return f"answers with known points got other points in this run:{''.join(lines)}"
+
     def refusal(self, root: Path, believed: int) -> KitError:
         """Return why nothing is recorded after a flip, and what a person should do.
 
@@ -185,11 +188,9 @@ class Canaries:
             root: of the course.
             believed: as many results of the class are kept.
         """
-        lines = [f"\n  {flip}" for flip in self.flips[:_LISTED]]
-        lines += [f"\n  and {len(self.flips) - _LISTED} more"] if len(self.flips) > _LISTED else []
         name = self.lab.name
         return KitError(
-            f"No grade was written, because answers with known points got other points in this run:{''.join(lines)}",
+            f"No grade was written, because {self.flipped()}",
             "Points must not depend on the machine, so the results of whoever ran beside such an answer are doubtful.\n"
             "  1. See what else runs on this machine (`top`), and what it lacks (`autograder doctor`).\n"
             "  2. Grade again with fewer runs at once, such as --jobs"

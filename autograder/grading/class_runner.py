@@ -15,7 +15,7 @@ from autograder.grading.canaries import Canaries
 from autograder.grading.job import Job
 from autograder.grading.runner import Settings, job_of, stored, without_running
 from autograder.grading.store import ResultStore
-from autograder.grading.validation import validated
+from autograder.grading.validation import lacks_a_result, validated
 from autograder.submission.reader import read_submission
 from autograder.submission.submission import Submission
 
@@ -56,54 +56,81 @@ def run_class(
     results: dict[str, SubmissionResult] = {}
     jobs: dict[str, Job] = {}
     for student, path in submissions.items():
-        submission = read_submission(path, lab)
-        result = stores.known(student, submission)
-        if result is None:
-            job = job_of(submission, student, lab, settings)
-            if submission.readable:
-                jobs[student] = job
-                continue
-            result = without_running(submission, job)
-            stores.told.save(result)
-        results[student] = result.without_pictures()
-        on_result(result)
+        told = _without_running(student, path, lab, settings, stores)
+        if isinstance(told, Job):
+            jobs[student] = told
+            continue
+        results[student] = told.without_pictures()
+        on_result(told)
     mixed = canaries.among(jobs) if canaries is not None and stores.watched(jobs) else list(jobs.values())
-    with closing(_believed(executor, mixed, lambda name: on_start(name) if name in jobs else None)) as ran:
-        for result in ran:
-            if canaries is not None and result.student not in jobs:
-                canaries.take(result)
-                continue
-            stores.run.save(result)
-            results[result.student] = result.without_pictures()
-            on_result(result)
+    try:
+        with closing(_believed(executor, mixed, jobs, stores, on_start)) as ran:
+            for result in ran:
+                if canaries is not None and result.student not in jobs:
+                    canaries.take(result)
+                    continue
+                stores.save(result)
+                results[result.student] = result.without_pictures()
+                on_result(result)
+    except BaseException:
+        if canaries is not None:
+            stores.put_away(jobs, canaries)
+        raise
     if canaries is not None:
         canaries.class_seconds = sum(results[student].seconds.get("total", 0.0) for student in jobs)
         stores.settle(jobs, canaries)
     return {student: results[student] for student in submissions}
 
 
+def _without_running(student: str, path: Path, lab: Lab, settings: Settings, stores: _Stores) -> SubmissionResult | Job:
+    """What is known of a submission already, or can be told of it unrun; or else what is to run."""
+    submission = read_submission(path, lab)
+    known = stores.known(student, submission)
+    if known is not None:
+        return known
+    job = job_of(submission, student, lab, settings)
+    if submission.readable:
+        return job
+    result = without_running(submission, job)
+    stores.told.save(result)
+    return result
+
+
 def _believed(
-    executor: executors.Executor, jobs: Sequence[Job], started: Callable[[str], None]
+    executor: executors.Executor,
+    jobs: Sequence[Job],
+    students: Collection[str],
+    stores: _Stores,
+    on_start: Callable[[str], None],
 ) -> Generator[SubmissionResult]:
     """Run jobs, and yield what may be believed of each result: it may come from another machine.
 
     Checks whose programs others kept from the CPUs are run again when all have run, alone, before they are believed.
+    What they came to first is kept until then, so that an interrupted run does not lose it.
     """
+
+    def started(name: str) -> None:
+        if name in students:
+            on_start(name)
+
     by_student = {job.student: job for job in jobs}
-    to_run_again: list[tuple[Job, SubmissionResult]] = []
-    with closing(executor.run(jobs, started)) as ran:
+    to_run_again = {job.student: first for job in jobs if (first := stores.first_result(job)) is not None}
+    with closing(executor.run([job for job in jobs if job.student not in to_run_again], started)) as ran:
         for result in ran:
             job = by_student[result.student]
             believed = validated(result, job.checks)
-            again = once_more.open_checks(job, believed)
-            if again is None:
+            if once_more.open_checks(job, believed) is None:
                 yield believed
-            else:
-                to_run_again.append((again, believed))
-    for job, first in to_run_again:
-        with closing(executor.run([job], started)) as ran:
+                continue
+            to_run_again[job.student] = believed
+            if job.student in students:
+                stores.first.save(believed)
+    for student, first in to_run_again.items():
+        again = once_more.open_checks(by_student[student], first)
+        assert again is not None
+        with closing(executor.run([again], started)) as ran:
             for result in ran:
-                yield once_more.settled(job, first, validated(result, job.checks))
+                yield once_more.settled(again, first, validated(result, again.checks))
 
 
 class _Stores:
@@ -126,8 +153,9 @@ class _Stores:
         self._waiting: list[str] = []
         self.told = self._apart if tried else self._counting
         """Of what can be told without running anything."""
-        self.run = self._apart if self._waits else self._counting
-        """Of what runs now."""
+        self._run = self._apart if self._waits else self._counting
+        self.first = ResultStore(root, paths.to_run_again)
+        """Of what has run once, and has checks to be run again."""
 
     def known(self, student: str, submission: Submission) -> SubmissionResult | None:
         """Return the result of a submission if running it again could say nothing new."""
@@ -144,15 +172,37 @@ class _Stores:
             self._apart.move(lab.name, student, self._counting)
         return result
 
+    def first_result(self, job: Job) -> SubmissionResult | None:
+        """Return what a job came to when it was run first, if an interrupted run was to run checks of it again."""
+        settings = self._settings
+        result = self.first.fitting(self._lab, job.student, job.digest, settings.isolation, settings.seed)
+        if result is None or settings.force or lacks_a_result(result) or once_more.open_checks(job, result) is None:
+            return None
+        return result
+
+    def save(self, result: SubmissionResult) -> None:
+        """Keep a result of this run."""
+        self._run.save(result)
+        self.first.remove(result.lab, result.student)
+
     def watched(self, jobs: Collection[str]) -> bool:
         """Whether anything runs, or has run in an earlier run that did not come to its end."""
         return bool(jobs) or (bool(self._waiting) and not self._settings.despite_canaries)
 
     def settle(self, ran: Collection[str], canaries: Canaries) -> None:
         """Let the results of a run count if its canaries allow it, and put away those that are doubtful."""
-        flipped = bool(canaries.flips) and not self._settings.despite_canaries
+        self.put_away(ran, canaries)
+        flipped = self._flipped(canaries)
         for student in (*self._waiting, *ran):
-            if flipped and student in canaries.doubtful:
-                self._apart.move(self._lab.name, student, self._doubtful)
-            elif not self._tried and not (flipped and student in self._waiting):
+            if not self._tried and not (flipped and student in (*self._waiting, *canaries.doubtful)):
                 self._apart.move(self._lab.name, student, self._counting)
+
+    def put_away(self, ran: Collection[str], canaries: Canaries) -> None:
+        """Move the results that are doubtful to where no later run takes them from."""
+        for student in (*self._waiting, *ran) if self._flipped(canaries) else ():
+            if student in canaries.doubtful:
+                self._apart.move(self._lab.name, student, self._doubtful)
+                self.first.remove(self._lab.name, student)
+
+    def _flipped(self, canaries: Canaries) -> bool:
+        return bool(canaries.flips) and not self._settings.despite_canaries

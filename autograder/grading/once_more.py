@@ -22,7 +22,7 @@ def open_checks(job: Job, result: SubmissionResult) -> Job | None:
     """Return the job that runs the open checks of a result again, alone; None if it has none."""
     wanted = {check.grade_id for check in result.checks if is_open(check)}
     cells = [cell for cell in job.cells if cell.points is None or cell.grade_id in wanted]
-    return job.model_copy(update={"cells": cells, "alone": True}) if wanted else None
+    return job.model_copy(update={"cells": cells, "alone": True, "seed": result.seed}) if wanted else None
 
 
 def settled(job: Job, first: SubmissionResult, again: SubmissionResult) -> SubmissionResult:

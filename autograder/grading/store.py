@@ -17,7 +17,7 @@ class ResultStore:
 
     Args:
         root: of the course.
-        folder: where they are, if they do not count: `CoursePaths.tried` or `CoursePaths.doubtful`.
+        folder: where they are, if they do not count: `tried`, `to_run_again` or `doubtful` of `CoursePaths`.
     """
 
     def __init__(self, root: Path, folder: Path | None = None) -> None:
@@ -43,6 +43,10 @@ class ResultStore:
         there.parent.mkdir(parents=True, exist_ok=True)
         with contextlib.suppress(FileNotFoundError):
             self.path(lab, student).replace(there)
+
+    def remove(self, lab: str, student: str) -> None:
+        """Remove a result, if there is one."""
+        self.path(lab, student).unlink(missing_ok=True)
 
     def fitting(
         self, lab: Lab, student: str, digest: str, isolation: Isolation | None = None, seed: int | None = None

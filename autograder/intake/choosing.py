@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 
 from autograder.intake.claims import Claim
@@ -24,8 +24,10 @@ class Chosen:
     claim: Claim
     member: Member | None
     """None: the student handed in nothing at all."""
-    replaced: list[Claim] = field(default_factory=list)
-    """Of the same student's, with a notebook each in whose place this one came."""
+    replaced: list[tuple[Claim, str]] = field(default_factory=list)
+    """Of the same student's, with a notebook each in whose place this one came, and why, in a few words."""
+    not_understood: list[tuple[Claim, NotUnderstoodError]] = field(default_factory=list)
+    """Of the same student's, beside the one that counts."""
     others: list[Member] = field(default_factory=list)
     """Notebooks beside the one that counts that have other names."""
     doubtful: list[Member] = field(default_factory=list)
@@ -44,33 +46,57 @@ def is_of_lab(name: str, lab: str) -> bool:
     return lab.casefold() in (name.casefold().removesuffix(".ipynb"), plain_name(name))
 
 
-def choose(claims: Sequence[Claim], lab: str) -> Chosen:
+def choose(claims: Sequence[Claim], lab: str, others: Collection[str] = ()) -> Chosen:
     """Return the notebook that counts: in the last attempt the one with the lab's name, or else the only one.
 
     Args:
         claims: what one student handed in.
         lab: whose notebook is wanted.
+        others: the other labs of the course; a notebook with the name of one never counts.
 
     Raises:
         NotUnderstoodError: nothing says which it is, or there are only other files.
     """
-    seen = [_in_entry(claim, lab) for claim in claims]
+    seen: list[Chosen] = []
+    not_understood: list[tuple[Claim, NotUnderstoodError]] = []
+    for claim in claims:
+        try:
+            seen.append(_in_entry(claim, lab, others))
+        except NotUnderstoodError as reason:
+            not_understood.append((claim, reason))
     companions = sum(one.companions for one in seen)
     with_notebook = [one for one in seen if one.member is not None]
-    if not with_notebook:
+    if not with_notebook and not not_understood:
         if companions:
             raise NotUnderstoodError(f"holds {_first_file(claims)[:80]!r} and no notebook")
         return seen[-1]
-    attempt = max(one.claim.attempt for one in with_notebook)
+    attempt = max([one.claim.attempt for one in with_notebook] + [claim.attempt for claim, _ in not_understood])
     among = [one for one in with_notebook if one.claim.attempt == attempt]
     named = [one for one in among if is_of_lab(_called(one), lab)]
+    unclear = next((reason for claim, reason in not_understood if claim.attempt == attempt), None)
+    if not named and unclear is not None:  # the lab's notebook may be in there
+        raise unclear
     if not named and len({plain_name(_called(one)) for one in among}) > 1:
         names = " and ".join(sorted(repr(_called(one)[:100]) for one in among)[:2])
         raise NotUnderstoodError(f"handed in {names}, none called {lab}.ipynb")
     last = max(named or among, key=lambda one: one.claim.turn)
-    last.replaced = [one.claim for one in with_notebook if one is not last]
+    last.replaced = [(one.claim, _why(one, last, lab)) for one in with_notebook if one is not last]
+    last.not_understood = not_understood
     last.companions = companions
     return last
+
+
+def _why(one: Chosen, last: Chosen, lab: str) -> str:
+    """Why another notebook of the same student counts."""
+    if one.claim.attempt != last.claim.attempt:
+        return "a later attempt counts"
+    called = _called(last)
+    if is_of_lab(called, lab) and not is_of_lab(_called(one), lab):
+        return f"{called[:80]!r} counts, because it has the lab's name"
+    if one.claim.number != last.claim.number:
+        return "a later file counts"
+    why = "it has exactly the lab's name" if called == f"{lab}.ipynb" else "its name is the last one"
+    return f"{called[:80]!r} counts, because {why}"
 
 
 def _called(one: Chosen) -> str:
@@ -84,7 +110,7 @@ def _first_file(claims: Sequence[Claim]) -> str:
     return next((name for name in names if name not in _BESIDE and not name.startswith(".")), names[0])
 
 
-def _in_entry(claim: Claim, lab: str) -> Chosen:
+def _in_entry(claim: Claim, lab: str, others: Collection[str]) -> Chosen:
     """What counts in one folder, zip or file.
 
     Raises:
@@ -92,7 +118,9 @@ def _in_entry(claim: Claim, lab: str) -> Chosen:
     """
     entry = claim.entry
     if entry.kind is Kind.NOTEBOOK:
-        return Chosen(claim, entry.files[0])
+        chosen = Chosen(claim, entry.files[0])
+        _refuse_other_lab(_called(chosen), lab, others)
+        return chosen
     if entry.kind is Kind.OTHER:
         return Chosen(claim, None, companions=1)
     files = {member: entry.below(member) for member in entry.files}
@@ -107,8 +135,15 @@ def _in_entry(claim: Claim, lab: str) -> Chosen:
             raise NotUnderstoodError("holds no notebook but a hidden one, such as a checkpoint of JupyterLab's")
         return Chosen(claim, None, companions=companions)
     member, doubtful = _of_notebooks(notebooks, lab)
-    others = [other for other in notebooks if other is not member and other not in doubtful]
-    return Chosen(claim, member, others=others, doubtful=doubtful, companions=companions)
+    _refuse_other_lab(member.name, lab, others)
+    beside = [other for other in notebooks if other is not member and other not in doubtful]
+    return Chosen(claim, member, others=beside, doubtful=doubtful, companions=companions)
+
+
+def _refuse_other_lab(name: str, lab: str, others: Collection[str]) -> None:
+    other = next((other for other in others if is_of_lab(name, other)), None)
+    if other is not None and not is_of_lab(name, lab):
+        raise NotUnderstoodError(f"handed in {name[:80]!r} only, the notebook of {other}")
 
 
 def _unwrapped(files: dict[Member, tuple[str, ...]], lab: str) -> dict[Member, tuple[str, ...]]:

@@ -20,8 +20,10 @@ class Claim:
     """A file's name as the student gave it, without what the platform put before it."""
     attempt: tuple[Any, ...] = ()
     """Of two attempts of one student, the greater one is the later."""
+    number: int = 0
+    """The same for the files of one attempt, where the platform counts them."""
     turn: tuple[Any, ...] = ()
-    """The same for the files of one attempt."""
+    """Of the files of one attempt, the one with the greatest counts."""
     handed_in: str = ""
     """Date and time, as nbgrader reads them; empty if nothing says so."""
     late: bool = False
@@ -41,10 +43,3 @@ class Recognised:
     """Sentences about what was recognised and is nobody's."""
     aside: list[Entry] = field(default_factory=list)
     """What is of another lab, or tells whose the others are: it is not used, and needs not be."""
-
-    @property
-    def entries(self) -> list[Entry]:
-        """Those that the format has recognised and that may hold a notebook."""
-        return [claim.entry for claim in self.claims if claim.entry.is_work] + [
-            entry for entry in self.aside if entry.is_work
-        ]

@@ -9,6 +9,7 @@ said that this is right.
 from __future__ import annotations
 
 import contextlib
+import re
 import unicodedata
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -16,6 +17,7 @@ from pathlib import Path
 
 from autograder.core.errors import KitError
 from autograder.core.files import read_plain, write_beside
+from autograder.course.lab import lab_names
 from autograder.course.paths import CoursePaths
 from autograder.intake.asked import Accepted
 from autograder.intake.choosing import Chosen, beside, choose, read
@@ -23,11 +25,12 @@ from autograder.intake.entries import Entry, NotUnderstoodError
 from autograder.intake.formats import PLAIN
 from autograder.intake.members import is_notebook
 from autograder.intake.naming import Student, file_name, named
-from autograder.intake.objections import Gone, count, gone, some, stop
+from autograder.intake.objections import Gone, gone, stop
 from autograder.intake.reading import Known, Reading, read_class
 from autograder.intake.record import Taken, keep_class, known_persons
 from autograder.intake.record import read_class as taken_before
 from autograder.intake.roster import FILE_NAME, Roster, read_roster
+from autograder.intake.words import count, some
 from autograder.submission import exchange_secret, timestamp
 from autograder.submission.notebook_file import NOTEBOOK_BYTES
 
@@ -39,6 +42,10 @@ import sys
 sys.exit("This folder is not a course: start nbgrader in the folder above it. Nothing was executed.")
 """
 """nbgrader's configuration in the folder of what was taken in."""
+
+
+_ONCE = re.compile(r"([.;] [Ii]t was left out)?\.$")
+"""The end of a sentence about what was left out, which goes without saying in a list of such."""
 
 
 @dataclass
@@ -78,12 +85,17 @@ class Collected:
         if unused:
             told += f" Not used: {some(unused, '; ')}."
         if self.refused:
-            told += f" LEFT OUT: {some([one.removesuffix('.') for one in self.refused], '; ')}."
+            told += f" LEFT OUT: {some([_ONCE.sub('', one) for one in self.refused], '; ')}."
         return told if unused or self.refused else f"{told} All are used."
 
 
 def collect(
-    source: Path, lab: str, root: Path, format_name: str = "", accepted: Collection[Accepted] = ()
+    source: Path,
+    lab: str,
+    root: Path,
+    format_name: str = "",
+    accepted: Collection[Accepted] = (),
+    tried_in: Path | None = None,
 ) -> Collected:
     """Take in a class.
 
@@ -94,6 +106,7 @@ def collect(
         root: of the course. A file `roster.csv` there joins the platforms' names to those of the gradebook.
         format_name: as what to read it; empty: as what it is.
         accepted: what somebody has said to be right.
+        tried_in: a folder that gets the notebooks in place of the course, of which nothing is changed then.
 
     Raises:
         KitError: there is nothing to take in, or it can be read in two ways, or somebody would be lost or replaced. In
@@ -101,45 +114,51 @@ def collect(
     """
     roster = read_roster(root / FILE_NAME) if (root / FILE_NAME).is_file() else None
     before = taken_before(root, lab)
-    reading = read_class(source, lab, format_name, _known(roster, before))
+    own = source.resolve() == CoursePaths(root).submitted.resolve()
+    reading = read_class(source, lab, format_name, _known(own, roster, before))
     recognised = reading.recognised
     students = named(recognised.claims, roster, known_persons(root, lab))
     missing = gone(source, students, roster, before)
     stop(source, students, reading, missing.lost, before, accepted)
     collected = Collected(_title(reading), reading.around, notes=list(reading.notes))
+    others = [name for name in lab_names(root) if name != lab]
     collected.refused += [f"{sentence} It was left out." for sentence in recognised.strange]
     handed_in = {
         student.name: (student, *found)
         for student in _one_each(students, reading, collected)
-        if (found := _handed_in(student, lab, reading, collected)) is not None
+        if (found := _handed_in(student, lab, others, reading, collected)) is not None
     }
-    collected.students = len({id(student.claims[0]) for student in students})
-    collected.files = len(recognised.strange) + sum(
-        _number_of_files(entry) for entry in {claim.entry: None for claim in recognised.claims}
-    )
+    collected.students = len({file_name(student.name) for student in students})
+    collected.files = len(recognised.strange) + sum(map(_number_of_files, {one.entry for one in recognised.claims}))
     if not handed_in:
         why = f" {collected.refused[0]}" if collected.refused else ""
-        raise KitError(
-            f"There are no submissions in {source}.{why}", f"Each student needs a folder that holds {lab}.ipynb."
-        )
-    paths = CoursePaths(root)
+        do = f"Each student needs a folder that holds {lab}.ipynb."
+        raise KitError(f"There are no submissions in {source}.{why}", do)
+    paths = CoursePaths(tried_in or root)
     if not (paths.build / "nbgrader_config.py").is_file():
         write_beside(paths.build / "nbgrader_config.py", CLOSED)
     taken: dict[str, Taken] = {}
     for name, (student, chosen, notebook) in handed_in.items():
         collected.notebooks[name] = _write(paths, name, lab, chosen, notebook, collected)
-        claim = chosen.claim
-        platform = reading.format is not PLAIN and not claim.by_hand
-        taken[name] = Taken(
-            source=str(source.resolve()),
-            around="/".join(reading.around),
-            file="/".join(chosen.member.path) if platform and chosen.member is not None else "",
-            owner=dict(student.claims[0].owner) if platform else {},
-            late=claim.late,
-        )
-    keep_class(root, lab, taken, {**missing.lost, **missing.renamed})
-    collected.notes += _farewells(missing, before)
+        if own and name in before:  # what the platform said of it still holds
+            taken[name] = before[name].model_copy(update={"left": False})
+        else:
+            taken[name] = _taken(source, reading, student, chosen)
+    if tried_in is None:
+        keep_class(root, lab, taken, {**missing.lost, **missing.renamed})
+        collected.notes += _farewells(missing, before)
     return collected
+
+
+def _taken(source: Path, reading: Reading, student: Student, chosen: Chosen) -> Taken:
+    platform = reading.format is not PLAIN and not chosen.claim.by_hand
+    return Taken(
+        source=str(source.resolve()),
+        around="/".join(reading.around),
+        file="/".join(chosen.member.path) if platform and chosen.member is not None else "",
+        owner=dict(student.claims[0].owner) if platform else {},
+        late=chosen.claim.late,
+    )
 
 
 def _title(reading: Reading) -> str:
@@ -155,12 +174,13 @@ def _number_of_files(entry: Entry) -> int:
         return 1
 
 
-def _known(roster: Roster | None, before: Mapping[str, Taken]) -> Known:
+def _known(own: bool, roster: Roster | None, before: Mapping[str, Taken]) -> Known:
     def is_student(name: str) -> bool:
         ways = dict.fromkeys(("id", "email", "name", "github"), name)
         return name in before or (roster is not None and roster.student(ways) is not None)
 
-    return Known(is_student, roster is not None, {taken.around for taken in before.values()} if before else None)
+    around = {taken.around for taken in before.values()} if before else None
+    return Known(is_student, roster is not None, own, around)
 
 
 def _one_each(students: Sequence[Student], reading: Reading, collected: Collected) -> list[Student]:
@@ -173,7 +193,7 @@ def _one_each(students: Sequence[Student], reading: Reading, collected: Collecte
             collected.refused.append("A submission without a student's name was left out.")
         elif not student.listed and reading.format is not PLAIN and not student.claims[0].by_hand:
             who = ", ".join(student.claims[0].owner.values())[:100]
-            collected.refused.append(f"{who!r} is no student of the roster, or more than one; it was left out.")
+            collected.refused.append(f"{who!r} fits no student of the roster, or several; it was left out.")
         elif name in found:
             # What somebody has added beside a platform's files is the later one.
             kept, left = (here, found[name]) if student.claims[0].by_hand else (found[name], here)
@@ -191,11 +211,13 @@ def _one_each(students: Sequence[Student], reading: Reading, collected: Collecte
     return [found[name] for name in sorted(found)]
 
 
-def _handed_in(student: Student, lab: str, reading: Reading, collected: Collected) -> tuple[Chosen, bytes] | None:
+def _handed_in(
+    student: Student, lab: str, others: Collection[str], reading: Reading, collected: Collected
+) -> tuple[Chosen, bytes] | None:
     """What of a student's counts, and its bytes; None if nobody can say, which is told."""
     who = student.name[:80]
     try:
-        chosen = choose(student.claims, lab)
+        chosen = choose(student.claims, lab, others)
         notebook = read(chosen.member) if chosen.member is not None else b""
     except NotUnderstoodError as reason:
         collected.refused.append(f"{who!r} {reason}; it was left out.")
@@ -217,10 +239,13 @@ def _handed_in(student: Student, lab: str, reading: Reading, collected: Collecte
         )
     for other in chosen.others:
         collected.unused.append(f"{'/'.join(other.path)[-200:]!r} ({chosen.member.name[:80]!r} of {who!r} counts)")
-    for claim in chosen.replaced:
+    for claim, why in chosen.replaced:
         names = f"{chosen.claim.entry.name[:100]!r} replaces {claim.entry.name[:100]!r}"
         collected.notes.append(f"{who}: {names}.")
-        collected.unused.append(f"{claim.entry.name[:100]!r} (a later one of {who!r} counts)")
+        collected.unused.append(f"{claim.entry.name[:100]!r} of {who!r} ({why})")
+    for claim, trouble in chosen.not_understood:
+        told = f"{chosen.claim.entry.name[:100]!r} of {who!r} counts"
+        collected.unused.append(f"{claim.entry.name[:100]!r}, which {trouble} ({told})")
     if chosen.claim.late:
         collected.notes.append(f"{who}: {reading.format.title} has marked it as late.")
     return chosen, notebook

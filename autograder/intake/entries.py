@@ -19,6 +19,7 @@ from autograder.intake.members import (
     MOST,
     Member,
     TooManyError,
+    bad_names,
     empty_folders,
     in_folder,
     in_zip,
@@ -29,11 +30,10 @@ from autograder.intake.members import (
     packed_in,
     unpacked,
 )
+from autograder.intake.words import some
 
 _MOST_OF_CLASS = 500_000
 """Files in a zip; a class of five thousand repositories has fewer."""
-_NAMED = 5
-"""Of more bad names than this only their number is said."""
 
 
 class NotUnderstoodError(Exception):
@@ -122,9 +122,8 @@ class Listed:
         """Return a sentence about the bad names, if there are any."""
         if not self.bad:
             return []
-        names = ", ".join(repr(name[:60]) for name in self.bad[:_NAMED])
-        more = f" and {len(self.bad) - _NAMED} more" if len(self.bad) > _NAMED else ""
-        return [f"The zip has entries whose names lead nowhere in it; they were left out: {names}{more}."]
+        names = some([repr(name[:60]) for name in self.bad], ", ")
+        return [f"The zip has entries whose names lead nowhere in it; they were left out: {names}."]
 
 
 def listed(source: Path, lab: str) -> Listed:
@@ -161,21 +160,21 @@ def _of_folder(source: Path, parts: tuple[str, ...]) -> list[Entry]:
             shown = str(path).encode("utf-8", "replace").decode()
             entries.append(Entry(where, Kind.LINK, list, list, shown))
         elif path.is_dir():
-            listing = partial(_few, in_folder(source, where))
+            listing = partial(_few, partial(in_folder, source, where))
             entries.append(Entry(where, Kind.FOLDER, listing, partial(_of_folder, source, where)))
         else:
             entries.append(_file(Member(where, partial(read_plain, source, where))))
     return entries
 
 
-def _few(files: Iterator[Member]) -> list[Member]:
+def _few(files: Callable[[], Iterator[Member]]) -> list[Member]:
     """The files of one student, with those in zips that can be read.
 
     Raises:
         TooManyError: there are more than that can be.
     """
     found: list[Member] = []
-    for file in files:
+    for file in files():
         found += looked_into(file)
         if len(found) > MOST:
             raise TooManyError(f"it holds more than {MOST} files")
@@ -186,15 +185,18 @@ def _file(member: Member) -> Entry:
     if is_zip(member.name):
         above = (*member.path[:-1], member.name[: -len(".zip")])
         held = partial(unpacked, member)
-        return Entry(member.path, Kind.ZIP, partial(_some, held), lambda: grouped(packed_in(member), above))
+        return Entry(member.path, Kind.ZIP, partial(_some, member, held), lambda: grouped(packed_in(member), above))
     kind = Kind.NOTEBOOK if is_notebook(member.name) else Kind.OTHER
     return Entry(member.path, kind, lambda: [member], list)
 
 
-def _some(held: Callable[[], list[Member]]) -> list[Member]:
+def _some(member: Member, held: Callable[[], list[Member]]) -> list[Member]:
     files = held()
     if not files:
-        raise NotUnderstoodError("is an empty zip")
+        bad = bad_names(member)
+        raise NotUnderstoodError(
+            f"is a zip whose names lead nowhere in it, such as {bad[0][:60]!r}" if bad else "is an empty zip"
+        )
     return files
 
 
@@ -219,7 +221,12 @@ def grouped(files: Sequence[Member], above: tuple[str, ...], empty: Sequence[tup
         else:
             single.append(member)
     entries = [
-        Entry((*above, name), Kind.FOLDER, partial(_few, iter(held)), partial(grouped, held, (*above, name), empty))
+        Entry(
+            (*above, name),
+            Kind.FOLDER,
+            partial(_few, partial(iter, held)),
+            partial(grouped, held, (*above, name), empty),
+        )
         for name, held in folders.items()
     ]
     entries = [*entries, *map(_file, single)]

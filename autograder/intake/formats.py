@@ -10,7 +10,7 @@ from __future__ import annotations
 import contextlib
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import yaml
 
@@ -18,7 +18,7 @@ from autograder.intake.asked import FormatName
 from autograder.intake.choosing import is_of_lab
 from autograder.intake.claims import Claim, Recognised
 from autograder.intake.entries import Entry, Kind, NotUnderstoodError
-from autograder.intake.members import Member, is_hidden, is_notebook
+from autograder.intake.members import is_hidden, is_notebook
 from autograder.intake.roster import FILE_NAME as ROSTER
 from autograder.submission.timestamp import moment
 
@@ -76,8 +76,9 @@ def canvas(entries: Sequence[Entry], lab: str) -> Recognised:
     for entry, match in _forms(entries, _CANVAS):
         owner = {"canvas": match["name"], "canvas_id": match["user"]}
         called = match["file"] or entry.name
-        turn = (int(match["number"] or 0), called == f"{lab}.ipynb", entry.name)
-        found.claims.append(Claim(entry, owner, called, turn=turn, late=bool(match["late"])))
+        number = int(match["number"] or 0)
+        turn = (number, called == f"{lab}.ipynb", entry.name)
+        found.claims.append(Claim(entry, owner, called, number=number, turn=turn, late=bool(match["late"])))
     return found
 
 
@@ -110,7 +111,7 @@ def blackboard(entries: Sequence[Entry], lab: str) -> Recognised:
         when = f"{'-'.join(numbers[:3])} {':'.join(numbers[3:])}"
         called = match["file"] or ""
         turn = (called == f"{lab}.ipynb", entry.name)
-        found.claims.append(Claim(entry, {"id": user}, called, (match["when"],), turn, when))
+        found.claims.append(Claim(entry, {"id": user}, called, (match["when"],), turn=turn, handed_in=when))
     return found
 
 
@@ -142,7 +143,7 @@ def gradescope(entries: Sequence[Entry], lab: str) -> Recognised:
             found.strange.append(f"{entry.name} is of nobody in {_METADATA}.")
             found.aside.append(entry)
         attempt = (when, int(match["number"]))
-        found.claims += [Claim(entry, owner, "", attempt, (), moment(when.encode()) or "") for owner in owners]
+        found.claims += [Claim(entry, owner, "", attempt, handed_in=moment(when.encode()) or "") for owner in owners]
     return found if len(found.aside) > 1 or found.claims else Recognised()
 
 
@@ -179,6 +180,15 @@ def classroom(entries: Sequence[Entry], lab: str) -> Recognised:
     return found
 
 
+def repositories(entries: Sequence[Entry], lab: str) -> Recognised:
+    """GitHub Classroom, if somebody says so: also a single repository, whose whole name is the student's then."""
+    found = classroom(entries, lab)
+    single = [entry for entry in entries if entry.kind in (Kind.FOLDER, Kind.ZIP) and _has_labs(entry, lab)]
+    if not found.claims and len(single) == 1:
+        found.claims.append(Claim(single[0], {"github": single[0].stem, "repository": single[0].stem}))
+    return found
+
+
 def _has_labs(entry: Entry, lab: str) -> bool:
     """Whether it is laid out as the repository that students get."""
     with contextlib.suppress(NotUnderstoodError):
@@ -192,7 +202,7 @@ def exchange(entries: Sequence[Entry], lab: str) -> Recognised:
     found = Recognised()
     for entry, match in _forms([entry for entry in entries if entry.kind is Kind.FOLDER], _INBOUND):
         if match["lab"] == lab:
-            found.claims.append(Claim(entry, {"id": match["student"]}, "", (match["when"],), (), match["when"]))
+            found.claims.append(Claim(entry, {"id": match["student"]}, "", (match["when"],), handed_in=match["when"]))
         else:
             found.aside.append(entry)
     return found if found.claims else Recognised()
@@ -204,22 +214,35 @@ def submitted(entries: Sequence[Entry], lab: str) -> Recognised:
     folder = next((entry for entry in entries if entry.kind is Kind.FOLDER and entry.name == "submitted"), None)
     if folder is None:
         return found
-    for entry in folder.inside:
-        inside = {path[0] for member in _files(entry) if len(path := entry.below(member)) > 1}
-        if entry.kind is Kind.FOLDER and lab in inside:
+    found = by_lab(folder.inside, lab)
+    if not any(claim.only for claim in found.claims):
+        return Recognised()
+    found.aside += [folder, *(entry for entry in entries if entry.name in _OF_NBGRADER and entry is not folder)]
+    return found
+
+
+def by_lab(entries: Sequence[Entry], lab: str) -> Recognised:
+    """Return whose folders there are with one for the lab in them, as nbgrader's `submitted` and the kit's own have it.
+
+    Whatever else lies there is read as in a class without a platform, but for folders with work for other labs only.
+    """
+    found = Recognised()
+    others = []
+    for entry in entries:
+        paths = None
+        if entry.kind is Kind.FOLDER:
+            with contextlib.suppress(NotUnderstoodError):  # which is said when it is looked into
+                paths = [entry.below(member) for member in entry.files]
+        if paths is not None and any(path[0] == lab and len(path) > 1 for path in paths):
             found.claims.append(Claim(entry, {"id": entry.name}, only=lab))
-        elif entry.kind in (Kind.FOLDER, Kind.LINK):
+        elif paths is not None and all(len(path) > 1 for path in paths):
             found.aside.append(entry)
-    if found.claims:
-        found.aside += [folder, *(entry for entry in entries if entry.name in _OF_NBGRADER and entry is not folder)]
-    return found if found.claims else Recognised()
-
-
-def _files(entry: Entry) -> Sequence[Member]:
-    try:
-        return entry.files
-    except NotUnderstoodError:
-        return []
+        else:
+            others.append(entry)
+    added = plain(others, lab)
+    found.claims += [replace(claim, by_hand=True) for claim in added.claims]
+    found.strange += added.strange
+    return found
 
 
 def plain(entries: Sequence[Entry], lab: str) -> Recognised:
@@ -273,3 +296,5 @@ PLATFORMS: Mapping[str, Format] = {
     )
 }
 """Those that give names of their own."""
+CLASSROOM = replace(PLATFORMS["classroom"], read=repositories)
+"""The same, where somebody has named it."""

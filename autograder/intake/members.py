@@ -155,6 +155,13 @@ def unpacked(zipped: Member) -> list[Member]:
     return _held(zipped, zipped, _ZIPS)
 
 
+def bad_names(zipped: Member) -> list[str]:
+    """Return the names in a zip that lead nowhere in it; raises as `unpacked`."""
+    bad: list[str] = []
+    list(in_zip(_opened(zipped), bad))
+    return bad
+
+
 def packed_in(zipped: Member) -> list[Member]:
     """Return the files of a zip, among which other zips are files; raises as `unpacked`."""
     above = (*zipped.path[:-1], zipped.name[: -len(".zip")])

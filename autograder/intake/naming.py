@@ -31,19 +31,21 @@ class Student:
 
 
 def named(claims: Sequence[Claim], roster: Roster | None, before: Mapping[tuple[str, str], str]) -> list[Student]:
-    """Return the students of a class, each owner by one name; two owners may have come to the same name.
+    """Return the students of a class, each owner by one name; several may have come to the same name.
 
-    Who was taken in before keeps their name, whoever hands in besides.
+    Who was taken in before keeps their name, whoever hands in besides. Where nothing says which of two entries of one
+    owner is the later one, each counts as a student of that name.
 
     Args:
         claims: whose each entry is.
         roster: of the course, if it has one.
         before: what the persons of the platforms were called before.
     """
-    by_owner: dict[tuple[tuple[str, str], ...], list[Claim]] = {}
+    by_owner: dict[tuple[object, ...], list[Claim]] = {}
     for claim in claims:
-        by_owner.setdefault(tuple(sorted(claim.owner.items())), []).append(claim)
-    owners = [dict(owner) for owner in by_owner]
+        in_turn = claim.attempt or claim.turn
+        by_owner.setdefault((*sorted(claim.owner.items()), None if in_turn else id(claim)), []).append(claim)
+    owners = [group[0].owner for group in by_owner.values()]
     names = _by_roster(owners, roster) if roster is not None else _by_platform(owners, before)
     return [
         Student(name or given_name(owner), group, listed=roster is None or bool(name))

@@ -12,9 +12,7 @@ from autograder.intake.naming import Student, file_name
 from autograder.intake.reading import Reading
 from autograder.intake.record import Taken, person
 from autograder.intake.roster import Roster
-
-NAMED = 5
-"""Of more names than this only their number is said."""
+from autograder.intake.words import count, some
 
 
 @dataclass(frozen=True)
@@ -77,9 +75,7 @@ def stop(
     strangers = [repr(student.name[:100]) for student in students if not student.listed]
     objections = {
         Accepted.SMALLER: _missing(source, sorted(lost)),
-        Accepted.ROSTER: f"No student of the roster, or more than one, is {some(strangers, ', ')}."
-        if strangers
-        else "",
+        Accepted.ROSTER: _strangers(strangers),
         Accepted.REPLACED: some(_replaced(students, before), " "),
     }
     open_ones = {kind: sentence for kind, sentence in objections.items() if sentence and kind not in accepted}
@@ -93,6 +89,11 @@ def stop(
         " Nothing was graded.",
         f"Look at the submissions and at who is meant. If this is right, go on with {options}.",
     )
+
+
+def _strangers(names: Sequence[str]) -> str:
+    fits = "fits" if len(names) == 1 else "fit"
+    return f"{some(names, ', ')} {fits} no student of the roster, or several." if names else ""
 
 
 def _missing(source: Path, lost: Sequence[str]) -> str:
@@ -120,14 +121,3 @@ def _replaced(students: Sequence[Student], before: Mapping[str, Taken]) -> list[
         if was is not None and now is not None and was[0] == now[0] and was != now:
             told.append(f"{name[:80]!r} was {was[1][:80]!r} the last time, and is {now[1][:80]!r} now.")
     return told
-
-
-def count(number: int, what: str) -> str:
-    """Return a number of things: `1 file`, `2 files`."""
-    return f"{number} {what}{'s' * (number != 1)}"
-
-
-def some(names: Sequence[str], between: str) -> str:
-    """Return the first of several names or sentences, and how many more there are."""
-    more = f"{between}and {len(names) - NAMED} more" if len(names) > NAMED else ""
-    return between.join(names[:NAMED]) + more

@@ -14,13 +14,13 @@ from autograder.core.errors import KitError
 from autograder.intake.choosing import choose, is_of_lab
 from autograder.intake.claims import Claim, Recognised
 from autograder.intake.entries import Entry, Kind, NotUnderstoodError, listed
-from autograder.intake.formats import PLAIN, PLATFORMS, Format, owner_of
+from autograder.intake.formats import CLASSROOM, PLAIN, PLATFORMS, Format, by_lab, owner_of
 from autograder.intake.members import is_hidden, is_notebook
+from autograder.intake.naming import given_name
+from autograder.intake.words import some
 
 _MOST_AROUND = 3
 """So many folders and zips may lie around a class."""
-_SHOWN = 3
-"""Of more names only these are said."""
 
 
 @dataclass
@@ -37,7 +37,7 @@ class Reading:
     @property
     def owners(self) -> list[str]:
         """What the students are called, each once."""
-        return list(dict.fromkeys(_called(claim) for claim in self.recognised.claims))
+        return list(dict.fromkeys(given_name(claim.owner) for claim in self.recognised.claims))
 
 
 @dataclass(frozen=True)
@@ -48,6 +48,8 @@ class Known:
     """Whether the roster has a student of that name, or one was taken in before."""
     roster: bool = False
     """There is a roster, so that whoever is not in it is no student."""
+    own: bool = False
+    """The source is the course's own folder of what was taken in, which holds the work for every lab."""
     around: Collection[str] | None = None
     """The folders and zips that lay around the class when it was taken in before; None: it was not."""
 
@@ -73,8 +75,10 @@ def read_class(source: Path, lab: str, format_name: str = "", known: Known | Non
     Raises:
         KitError: the source is no class, or can be read in two ways.
     """
-    named = {**PLATFORMS, PLAIN.name: PLAIN}.get(format_name)
+    named = {**PLATFORMS, PLAIN.name: PLAIN, CLASSROOM.name: CLASSROOM}.get(format_name)
     found = listed(source, lab)
+    if known is not None and known.own:
+        return Reading(PLAIN, by_lab(found.entries, lab))
     reading = _read(found.entries, (), _Asked(source, lab, named, known or Known()))
     reading.recognised.strange += found.bad_names()
     return reading
@@ -142,7 +146,7 @@ def _of_platform(entries: Sequence[Entry], around: tuple[str, ...], asked: _Aske
 
 def _two_ways(asked: _Asked, titles: Sequence[str], others: Sequence[str]) -> KitError:
     ways = " or ".join(f"as what {title} gives out" for title in titles)
-    names = f" {_few([repr(name[:80]) for name in others])} {_have(others)} no such name." if others else ""
+    names = f" {some([repr(name[:80]) for name in others], ', ')} {_have(others)} no such name." if others else ""
     plain = "" if len(titles) > 1 else ", or as a class whose folders and files have the students' names"
     return KitError(
         f"{asked.source} can be read {ways}{plain}.{names} Nothing was graded.",
@@ -158,11 +162,6 @@ def _have(names: Sequence[str]) -> str:
     return "has" if len(names) == 1 else "have"
 
 
-def _few(names: Sequence[str]) -> str:
-    more = f" and {len(names) - _SHOWN} more" if len(names) > _SHOWN else ""
-    return ", ".join(names[:_SHOWN]) + more
-
-
 def _inside(only: Entry, around: tuple[str, ...], asked: _Asked) -> Reading | None:
     """The class in the one folder or zip that lies in the source; None if that is a student's.
 
@@ -174,6 +173,10 @@ def _inside(only: Entry, around: tuple[str, ...], asked: _Asked) -> Reading | No
         return None
     if any(is_notebook(entry.name) and entry.stem.casefold() == asked.lab.casefold() for entry in only.inside):
         return None  # whatever else is in it
+    if asked.format is PLAIN:  # the innermost names, then, that can be students'
+        work = _work(only.inside)
+        alone = not work or (len(work) == 1 and work[0].kind is Kind.NOTEBOOK)
+        return None if alone or _is_packed(work, asked.lab) else _read(only.inside, (*around, only.name), asked)
     inner = _read(only.inside, (*around, only.name), asked)
     if inner.format.around.fullmatch(only.stem) or inner.format is asked.format is not PLAIN:
         return inner
@@ -188,16 +191,13 @@ def _inside(only: Entry, around: tuple[str, ...], asked: _Asked) -> Reading | No
     before = asked.known.around
     if is_class and not _is_students(only, asked.lab) and (before is None or "/".join(inner.around) in before):
         return inner
-    if asked.format is PLAIN:
-        return None
-    place = asked.source.joinpath(*around, only.name)
-    packed = asked.source.is_file() or any(name.lower().endswith(".zip") for name in around)
-    how = "unpack it, and" if packed else f"name {place}, or"
+    names = some([repr(name[:80]) for name in owners], ", ")
+    are = "is a student" if len(owners) == 1 else "are students"
     raise KitError(
-        f"{asked.source} holds only {only.name[:80]!r}. That may be one student's work, or a class of {len(owners)}:"
-        f" {_few([repr(name[:80]) for name in owners])}. Nothing was graded.",
-        f"If it is the class, {how} name the folder that holds the students' work. If it is a student's, put it beside"
-        " the others', or add --format plain.",
+        f"{asked.source} holds only {only.name[:80]!r}. That may be the work of a student of this name, or a class of"
+        f" {len(owners)}: {names}. Nothing was graded.",
+        f"If {names} {are}, add --format {inner.format.name}. If {student[:80]!r} is a student, put the name into"
+        " roster.csv, or put the work beside that of others.",
     )
 
 
@@ -214,9 +214,15 @@ def _may_be_class(inner: Reading, inside: Sequence[Entry], lab: str) -> bool:
     work = _work(inside)
     if any(is_notebook(entry.name) and is_of_lab(entry.name, lab) for entry in work):
         return False
-    if any(entry.name in (lab, "labs") for entry in work):  # as students get it; but somebody may be called so
-        return any(_holds_notebook(entry) for entry in work if entry.name not in (lab, "labs"))
-    return bool(inner.recognised.claims)
+    return bool(inner.recognised.claims) and not _is_packed(work, lab)
+
+
+def _is_packed(work: Sequence[Entry], lab: str) -> bool:
+    """Whether it is laid out as students get it: the labs alone, or their whole kit; but somebody may be called so."""
+    names = {entry.name for entry in work}
+    own = {lab, "labs", *(("kit", "lectures") if {"labs", "kit"} <= names else ())}
+    others = [entry for entry in work if entry.name not in own]
+    return bool(names & {lab, "labs"}) and not any(_holds_notebook(entry) for entry in others)
 
 
 def _is_class(inner: Reading, inside: Sequence[Entry], lab: str) -> bool:
@@ -242,8 +248,3 @@ def _holds_lab(entry: Entry, lab: str) -> bool:
         )
     except NotUnderstoodError:
         return False
-
-
-def _called(claim: Claim) -> str:
-    owner = claim.owner
-    return next((owner[kind] for kind in ("id", "github", "name", "canvas", "email") if owner.get(kind)), "")

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
 
+from autograder.core.errors import KitError
 from autograder.core.files import write_beside
 from autograder.course.paths import CoursePaths
 
@@ -40,11 +41,23 @@ _CLASS = TypeAdapter(dict[str, Taken])
 
 
 def read_class(root: Path, lab: str) -> dict[str, Taken]:
-    """Return what is known of a lab's submissions, by student; empty if nothing was taken in yet."""
+    """Return what is known of a lab's submissions, by student; empty if nothing was taken in yet.
+
+    Raises:
+        KitError: it cannot be understood, so that nobody could say who is missing.
+    """
+    path = CoursePaths(root).taken(lab)
     try:
-        return _CLASS.validate_json(CoursePaths(root).taken(lab).read_bytes())
-    except (OSError, ValidationError):
+        return _CLASS.validate_json(path.read_bytes())
+    except FileNotFoundError:
         return {}
+    except (OSError, ValidationError) as error:
+        why = error.strerror if isinstance(error, OSError) else "it is not as this version of the kit writes it"
+        raise KitError(
+            f"{path}, which says who was in the class the last time, cannot be read: {why}.",
+            "Put an earlier copy in its place. If you have none, move it away: the next run then cannot say who is"
+            " missing or was replaced.",
+        ) from error
 
 
 def left_class(root: Path, lab: str) -> set[str]:

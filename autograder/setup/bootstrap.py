@@ -21,6 +21,7 @@ from autograder.setup.jupyter import lead_jupyter
 from autograder.setup.labs import put_labs
 from autograder.setup.packages import fill, install_wheel, say
 from autograder.setup.places import DEV_LOCK, MARKER, PYTHON, ROOT, STUDENT_LOCK, VENV, WHEEL
+from autograder.setup.python import lead_python
 from autograder.setup.refusals import SetUpError, refuse_closed_folder, refuse_foreign_ros, refuse_other_machines
 
 
@@ -39,6 +40,7 @@ def make_ready(dev: bool, wanted: str) -> None:
     locks = [STUDENT_LOCK, DEV_LOCK] if dev or DEV_LOCK in known else [STUDENT_LOCK]
     sources = locks + [WHEEL] if WHEEL else locks  # noqa: RUF005  Python 3.6 is to understand it
     if all(known.get(source) == digest(source) for source in sources):
+        lead_python()
         write_commands()
         lead_jupyter()
         return
@@ -70,16 +72,18 @@ def main() -> int:
     parser.add_argument("--dev", action="store_true", help="with what tests and lectures need")
     parser.add_argument("--python", default="", help="the Python to build on, instead of the first good one on PATH")
     options = parser.parse_args()
+    failed = ".venv could not be made"
     try:
         # Two commands in two terminals must not make one environment at once. The checkout itself is the lock.
         fcntl.flock(os.open(str(ROOT), os.O_RDONLY), fcntl.LOCK_EX)
         make_ready(options.dev, options.python)
         if WHEEL:
+            failed = ".venv is ready, but the labs could not be put into %s" % (ROOT / "labs")
             put_labs()
     except SetUpError as error:
         say("\n%s\n\nWhat to do: %s" % (error.what, error.do))
     except OSError as error:
-        say("\n.venv could not be made: %s\n\nWhat to do: see that the folder is yours and the disk has room." % error)
+        say("\n%s: %s\n\nWhat to do: see that the folder is yours and the disk has room." % (failed, error))
     except KeyboardInterrupt:
         say("\nInterrupted. The next run starts over.")
     else:

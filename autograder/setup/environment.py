@@ -7,17 +7,14 @@ import hashlib
 import json
 import os
 import shutil
-from pathlib import Path
 from typing import Any, Dict, List, Tuple
 
 from autograder.setup.commands import write_commands
 from autograder.setup.interpreter import Interpreter, output_of
 from autograder.setup.jupyter import lead_jupyter
-from autograder.setup.places import MARKER, PYTHON, ROOT, VENV, WHEEL
+from autograder.setup.places import MARKER, PYTHON, ROOT, VENV
+from autograder.setup.python import lead_python
 from autograder.setup.refusals import SetUpError, refuse_full_disk, tail
-
-_WITHOUT_GRAMMAR = "import sys; sys.modules.setdefault('rfc3987_syntax', None)"
-"""Jupyter's programs load jsonschema, which would build a grammar for one format of strings, unused here: a second."""
 
 
 def digest(lock: str) -> str:
@@ -53,15 +50,14 @@ def create(base: Interpreter) -> "List[str]":
 
 
 def finish(locks: "List[str]", version: "Tuple[int, ...]") -> None:
-    """Make the kit importable from the checkout, if there is one, then write the marker as the very last act.
+    """Lead the environment's programs to the kit, then write the marker as the very last act.
 
     Raises SetUpError if the new Python does not run.
     """
-    status, text = output_of(str(PYTHON), "-I", "-c", "import sysconfig; print(sysconfig.get_path('purelib'))")
+    status, text = output_of(str(PYTHON), "-I", "-c", "")
     if status:
         raise SetUpError("The new Python does not run:\n%s" % tail(text), "rm -rf .venv, then try again.")
-    lines = [_WITHOUT_GRAMMAR] if WHEEL else [str(ROOT), _WITHOUT_GRAMMAR]
-    Path(text.strip(), "autograder.pth").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    lead_python()
     write_commands()
     lead_jupyter()
     write_marker(locks, version)

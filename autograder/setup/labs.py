@@ -4,6 +4,7 @@
 
 import contextlib
 import filecmp
+import os
 import shutil
 
 from autograder.setup.places import KIT_FOLDER, ROOT
@@ -12,20 +13,27 @@ from autograder.setup.places import KIT_FOLDER, ROOT
 def put_labs() -> None:
     """Put each lab that is not there yet where the student works. A lab that is there is the student's, and stays.
 
+    Only `README.md`, the page that lists the labs, is the kit's, and is put in place of an earlier one. Another process
+    may do the same meanwhile.
+
     Raises OSError if files cannot be written.
     """
     handed_out, labs = ROOT / KIT_FOLDER / "labs", ROOT / "labs"
     labs.mkdir(exist_ok=True)
     for given in sorted(handed_out.iterdir()):
-        mine, beside = labs / given.name, labs / (".%s.new" % given.name)
-        # Of a lab the first one counts; the page that lists them is the kit's.
+        mine, beside = labs / given.name, labs / (".%s.%d.new" % (given.name, os.getpid()))
         if mine.exists() and (given.is_dir() or filecmp.cmp(str(given), str(mine), shallow=False)):
             continue
-        shutil.rmtree(str(beside), ignore_errors=True)
-        with contextlib.suppress(FileNotFoundError):
-            beside.unlink()
-        if given.is_dir():
-            shutil.copytree(str(given), str(beside))
-        else:
-            shutil.copy(str(given), str(beside))
-        beside.replace(mine)
+        try:
+            if given.is_dir():
+                shutil.copytree(str(given), str(beside))
+            else:
+                shutil.copy(str(given), str(beside))
+            beside.replace(mine)
+        except OSError:
+            if not (given.is_dir() and mine.exists()):  # of a lab the first one counts
+                raise
+        finally:
+            shutil.rmtree(str(beside), ignore_errors=True)
+            with contextlib.suppress(OSError):
+                beside.unlink()

@@ -15,7 +15,7 @@ from autograder.course.lab import Lab, lab_names, load_lab
 from autograder.course.markers import MARK
 from autograder.course.paths import CoursePaths
 from autograder.course.settings import SETTINGS_FILE, read_settings
-from autograder.grading.known_answers import wrong_answers
+from autograder.grading.known_answers import known_answers, wrong_answers
 
 
 def course_findings(root: Path) -> list[Finding]:
@@ -53,6 +53,7 @@ def _canary_findings(root: Path, lab: Lab) -> Iterator[Finding]:
     path = CoursePaths(root).canaries(lab.name)
     try:
         named = {name for one in wrong_answers(root, lab) for name in one.points}
+        known_answers(root, lab)
     except KitError as error:
         yield Finding("", error.what)
         return
