@@ -20,6 +20,10 @@ CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", 
 # Fast DDS reads its profile once in a process, for the first participant: that is the kit's in every process of tests.
 os.environ.update(profile_environment())
 
+# What this run was asked for, as in `make test ARGS=-v`, is nothing that the commands under test are asked for.
+for name in ("ARGS", "LAB", "NB", "MAKEFLAGS", "MFLAGS", "MAKEOVERRIDES"):
+    os.environ.pop(name, None)
+
 # Courses of tests are nobody's, and stand in nobody's list.
 os.environ["XDG_CONFIG_HOME"] = NOBODYS = tempfile.mkdtemp(prefix="autograder-tests-")
 
