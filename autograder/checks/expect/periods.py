@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from autograder import diagnosis
 from autograder.checks.expect.concurrency import ConcurrencyExpectations, refuse_names
 from autograder.checks.expect.expectations import WITHIN
+from autograder.checks.misuse import Misuse
 from autograder.diagnosis import Diagnosis
 
 
@@ -32,7 +33,8 @@ class PeriodExpectations(ConcurrencyExpectations):
             names: the callbacks.
             period: seconds.
             tolerance: allowed deviation, as a share.
-            runs: gaps between two begins of each; three times as many decide against it.
+            runs: gaps between two begins of each, at least 3, so that one late begin decides nothing; three times as
+                many decide against it.
             within: seconds until these must have come.
             hint: a pointer for the student.
 
@@ -43,6 +45,8 @@ class PeriodExpectations(ConcurrencyExpectations):
             `period`, and those of `expect_runs`.
         """
         refuse_names(names)
+        if runs < 3:
+            raise Misuse(f"runs={runs}: one callback that begins late would decide about the median of so few gaps.")
         title = f"{', '.join(names)} run{'s' if len(names) == 1 else ', each'} every {period:g} s"
 
         def wrong(least: int) -> dict[str, list[float]]:
