@@ -49,6 +49,9 @@ class StableNotebook(NbGraderPreprocessor):  # type: ignore[misc]
                 cell.metadata.pop(key, None)
             if cell.cell_type == "code":
                 cell.outputs, cell.execution_count = [], None
+                if utils.is_grade(cell) and not utils.is_solution(cell):
+                    # A check is there to be run; whoever wants to read it opens the cell.
+                    cell.metadata["jupyter"] = {"source_hidden": True}
                 if utils.is_solution(cell):
                     cell.metadata["autograder"] = blank_mark(cell.source)
                     file = named_file(cell)
