@@ -33,8 +33,7 @@ class PeriodExpectations(ConcurrencyExpectations):
             names: the callbacks.
             period: seconds.
             tolerance: allowed deviation, as a share.
-            runs: gaps between two begins of each, at least 3, so that one late begin decides nothing; three times as
-                many decide against it.
+            runs: gaps between two begins of each, 3 at least; three times as many decide against it.
             within: seconds until these must have come.
             hint: a pointer for the student.
 
@@ -59,8 +58,7 @@ class PeriodExpectations(ConcurrencyExpectations):
 
         def decided() -> bool:
             off = wrong(runs)
-            long_off = any(len(gaps) >= 3 * runs for gaps in off.values())
-            return not off or long_off or self._starves(topic, names, runs)
+            return not off or max(map(len, off.values())) >= 3 * runs or self._starves(topic, names, runs)
 
         self.wait(decided, within)
         late = wrong(runs)
