@@ -49,23 +49,24 @@ class PeriodExpectations(ConcurrencyExpectations):
         title = f"{', '.join(names)} run{'s' if len(names) == 1 else ', each'} every {period:g} s"
 
         def wrong(least: int) -> dict[str, list[float]]:
-            gaps = {name: self.concurrency(topic).gaps(name) for name in names}
             return {
                 name: found
-                for name, found in gaps.items()
-                if len(found) < least or abs(statistics.median(found) - period) > tolerance * period
+                for name in names
+                if len(found := self.concurrency(topic).gaps(name)) < least
+                or abs(statistics.median(found) - period) > tolerance * period
             }
 
         def decided() -> bool:
-            off = wrong(runs)
-            return not off or max(map(len, off.values())) >= 3 * runs or self._starves(topic, names, runs)
+            return (
+                not (off := wrong(runs)) or max(map(len, off.values())) >= 3 * runs or self._starves(topic, names, runs)
+            )
 
         self.wait(decided, within)
         late = wrong(runs)
-        if late and all(len(found) < runs for found in late.values()):
+        if late and all(len(gaps) < runs for gaps in late.values()):
             self._wait_for_runs(topic, names, runs + 1, title, 0.0, hint)  # so many gaps lie between one run more
-        told = ", ".join(f"{name} every {statistics.median(found):.2f} s" for name, found in late.items() if found)
-        self._sure_if(all(found and statistics.median(found) < period for found in late.values()))
+        told = ", ".join(f"{name} every {statistics.median(gaps):.2f} s" for name, gaps in late.items() if gaps)
+        self._sure_if(all(gaps and statistics.median(gaps) < period for gaps in late.values()))
         self._expect_that(
             not late,
             title,
