@@ -48,21 +48,13 @@ class PeriodExpectations(ConcurrencyExpectations):
             raise Misuse(f"runs={runs}: one callback that begins late would decide about the median of so few gaps.")
         title = f"{', '.join(names)} run{'s' if len(names) == 1 else ', each'} every {period:g} s"
 
-        def wrong(least: int) -> dict[str, list[float]]:
-            return {
-                name: found
-                for name in names
-                if len(found := self.concurrency(topic).gaps(name)) < least
-                or abs(statistics.median(found) - period) > tolerance * period
-            }
-
         def decided() -> bool:
-            return (
-                not (off := wrong(runs)) or max(map(len, off.values())) >= 3 * runs or self._starves(topic, names, runs)
-            )
+            off = self._off_period(topic, names, period, tolerance, runs)
+            long_off = any(len(gaps) >= 3 * runs for gaps in off.values())
+            return not off or long_off or self._starves(topic, names, runs)
 
         self.wait(decided, within)
-        late = wrong(runs)
+        late = self._off_period(topic, names, period, tolerance, runs)
         if late and all(len(gaps) < runs for gaps in late.values()):
             self._wait_for_runs(topic, names, runs + 1, title, 0.0, hint)  # so many gaps lie between one run more
         told = ", ".join(f"{name} every {statistics.median(gaps):.2f} s" for name, gaps in late.items() if gaps)
@@ -77,3 +69,14 @@ class PeriodExpectations(ConcurrencyExpectations):
             observed=told,
             hint=hint,
         )
+
+    def _off_period(
+        self, topic: str, names: Sequence[str], period: float, tolerance: float, least: int
+    ) -> dict[str, list[float]]:
+        """The gaps between the begins of each callback that has fewer than `least`, or another median."""
+        gaps = {name: self.concurrency(topic).gaps(name) for name in names}
+        return {
+            name: found
+            for name, found in gaps.items()
+            if len(found) < least or abs(statistics.median(found) - period) > tolerance * period
+        }
