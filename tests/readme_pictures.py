@@ -1,4 +1,7 @@
-"""Makes the pictures of README.md anew, each from a real run: `python tests/readme_pictures.py` (about two minutes)."""
+"""Makes the pictures of README.md and of the book's pages about labs and grading again, each from a real run.
+
+`python tests/readme_pictures.py` takes about two minutes.
+"""
 
 from __future__ import annotations
 

@@ -107,7 +107,7 @@ def test_what_lies_around_a_notebook_is_never_the_course(root: Path, tmp_path: P
         status, _, err = run(folder, "check", str(evil / "toy.ipynb"))
         assert status == 2 and "no notebook of a lab of this course" in err and f"Labs in {KIT}: lab" in err
     status, _, err = run(evil, "grade", "toy", ".")
-    assert status == 2 and "lies in the submissions" in err
+    assert status == 2 and "is inside the submissions" in err
 
 
 def test_check_follows_no_link_out_of_a_submission(root: Path, tmp_path: Path) -> None:

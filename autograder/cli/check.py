@@ -30,27 +30,27 @@ _LOOK = 0.3
 @app.command()
 def check(
     notebook: Annotated[Path, typer.Argument(help="The notebook to check.")],
-    lab: Annotated[str | None, typer.Option(help="The lab it answers, where its name does not say.")] = None,
+    lab: Annotated[str | None, typer.Option(help="The lab it answers, if its name does not say so.")] = None,
     as_json: JsonOption = False,
     junit: Annotated[Path | None, typer.Option(help="Also write JUnit XML to this file.")] = None,
     gradescope: Annotated[Path | None, typer.Option(help="Also write Gradescope's results.json to this file.")] = None,
     instructor: Annotated[bool, typer.Option("--instructor", help="Show what the hidden checks look at.")] = False,
     isolation: Annotated[
         Isolation | None,
-        typer.Option(help="How programs are kept apart; default: full, in a student's kit the most there is."),
+        typer.Option(help="How programs are isolated; default: full, in a student's kit the best that there is."),
     ] = None,
     seed: SeedOption = None,
     github: Annotated[
-        bool, typer.Option("--github", help="Write annotations, and a summary, for GitHub Actions.")
+        bool, typer.Option("--github", help="Write annotations and a summary for GitHub Actions.")
     ] = False,
     watch: Annotated[bool, typer.Option("--watch", help="Check again whenever the notebook is saved.")] = False,
     course: Annotated[
         Path | None, typer.Option(help="The folder of the course whose checks are run; default: the kit's own.")
     ] = None,
 ) -> None:
-    """Check one notebook as grading would, and report what is wrong and why.
+    """Check one notebook in the same way as grading does, and report what is wrong and why.
 
-    Exit status: 0 all checks passed, 1 some failed, 2 usage or set-up, 3 none failed and of some nobody could find out.
+    Exit status: 0 all checks passed; 1 some failed; 2 wrong usage or set-up; 3 none failed, but some are undecided.
     """
     if not notebook.is_file():
         raise KitError(f"There is no notebook {notebook}.", "Name an .ipynb file.")
@@ -60,7 +60,7 @@ def check(
 
     found = lab_of(notebook, lab, trusted_course(course))
     if found.notebook.resolve() == notebook.resolve():
-        note = "This notebook is the course's own copy of the lab: its checks are run as they stand in it."
+        note = "This notebook is the course's own copy of the lab, so the checks in this notebook are run."
         print(f"note: {note}", file=sys.stderr)
     settings = Settings(isolation=isolation_for(isolation), seed=seed)
     audience: Audience = "instructor" if instructor else "student"
@@ -102,7 +102,7 @@ def isolation_for(wanted: Isolation | None) -> Isolation:
         return choose(wanted or Isolation.FULL)
     found, why = most()
     if why:
-        print(f"note: programs run with isolation `{found.value}`, since {why}.", file=sys.stderr)
+        print(f"note: programs run with isolation `{found.value}` because {why}.", file=sys.stderr)
     return found
 
 
