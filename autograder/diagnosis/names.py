@@ -6,13 +6,13 @@ from collections.abc import Sequence
 
 from autograder.arguments import remap_rules
 from autograder.diagnosis.chain import inside_reason, reason_inside
-from autograder.diagnosis.events import Thing
 from autograder.diagnosis.inside import Inside
 from autograder.diagnosis.programs import program_trouble
 from autograder.diagnosis.reason import Diagnosis
 from autograder.diagnosis.scene import Scene
 from autograder.diagnosis.unmade import not_made_yet
 from autograder.graph.names import nearest, node_of, type_name
+from autograder.sandbox.inside.probe.events import Thing
 
 _LETTER_BY_LETTER = "Compare the two names letter by letter, namespace included."
 _EVERY_NODES = ("/rosout", "/parameter_events")
