@@ -1295,3 +1295,31 @@ def test_a_parameter_reaches_the_program_as_what_it_is(grade: Grade) -> None:
         holder__py=HOLDER,
     )
     assert result.points == 2.0, result.outcomes
+
+
+CAMERA = """
+import rclpy
+from rclpy.lifecycle import LifecycleNode
+
+rclpy.init()
+rclpy.spin(LifecycleNode("camera"))
+"""
+
+
+def test_a_node_that_goes_on_after_the_expected_transitions_fails(grade: Grade) -> None:
+    result = grade(
+        """\
+        up = [("unconfigured", "configuring"), ("configuring", "inactive")]
+        on = [("inactive", "activating"), ("activating", "active")]
+        with launch("camera", lifecycle=["/camera"]) as ros:
+            ros.transition("/camera", "configure")
+            ros.transition("/camera", "activate")
+            ros.expect_transitions("/camera", up + on)
+            ros.expect_transitions("/camera", up)
+        ros.score(2)
+        """,
+        camera__py=CAMERA,
+    )
+    failed = failure(result)
+    assert (failed.code, failed.expected) == ("transitions", "unconfigured to configuring, configuring to inactive")
+    assert failed.observed.endswith("configuring to inactive, inactive to activating, activating to active")
