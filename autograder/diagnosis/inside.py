@@ -9,7 +9,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TypeVar
 
-from autograder.arguments.remap_rules import full_name
+from autograder.arguments.rule_effect import full_name
 from autograder.diagnosis import sources
 from autograder.diagnosis.events import read
 from autograder.diagnosis.reason import DiagnosedProgram
