@@ -1328,3 +1328,31 @@ def test_a_first_call_that_is_late_makes_no_other_period_right(grade: Grade) -> 
         worker__py=LATE_FIRST,
     )
     assert (result.points, failure(result).code) == (0, "period")
+
+
+CAMERA = """
+import rclpy
+from rclpy.lifecycle import LifecycleNode
+
+rclpy.init()
+rclpy.spin(LifecycleNode("camera"))
+"""
+
+
+def test_a_node_that_goes_on_after_the_expected_transitions_fails(grade: Grade) -> None:
+    result = grade(
+        """\
+        up = [("unconfigured", "configuring"), ("configuring", "inactive")]
+        on = [("inactive", "activating"), ("activating", "active")]
+        with launch("camera", lifecycle=["/camera"]) as ros:
+            ros.transition("/camera", "configure")
+            ros.transition("/camera", "activate")
+            ros.expect_transitions("/camera", up + on)
+            ros.expect_transitions("/camera", up)
+        ros.score(2)
+        """,
+        camera__py=CAMERA,
+    )
+    failed = failure(result)
+    assert (failed.code, failed.expected) == ("transitions", "unconfigured to configuring, configuring to inactive")
+    assert failed.observed.endswith("configuring to inactive, inactive to activating, activating to active")

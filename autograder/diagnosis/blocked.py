@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from autograder.diagnosis.events import Call, Thing
 from autograder.diagnosis.inside import Inside, called
 from autograder.diagnosis.reason import Diagnosis
 from autograder.diagnosis.sources import Place
 from autograder.graph.names import nearest
+from autograder.sandbox.inside.probe.events import Call, Thing
 
 STUCK_AFTER = 1.5
 """Seconds that a run must have taken to count as one that does not end."""

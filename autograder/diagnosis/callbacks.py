@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import re
 
-from autograder.diagnosis.events import BadMessage, BadReturn, CallbackError, Event, ThreadError, read
+from autograder.diagnosis.events import read
 from autograder.diagnosis.inside import Inside
 from autograder.diagnosis.reason import DiagnosedProgram, Diagnosis
 from autograder.diagnosis.scene import Scene
 from autograder.diagnosis.traces import KNOWN_ERRORS, quoted
+from autograder.sandbox.inside.probe.events import BadMessage, BadReturn, CallbackError, Event, ThreadError
 
 _AFTER = {
     "service": "The client gets no answer and the node no longer spins.",

@@ -9,12 +9,12 @@ from collections.abc import Iterator
 
 from autograder.diagnosis.callbacks import of_event
 from autograder.diagnosis.chain import inside_reason
-from autograder.diagnosis.events import BadMessage, BadReturn, CallbackError, Event, GoalLeft, Thing
 from autograder.diagnosis.inside import Inside, called
 from autograder.diagnosis.programs import program_trouble
 from autograder.diagnosis.reason import Diagnosis
 from autograder.diagnosis.scene import Scene
 from autograder.graph.names import nearest, type_name
+from autograder.sandbox.inside.probe.events import BadMessage, BadReturn, CallbackError, Event, GoalLeft, Thing
 
 SEND_GOAL = "/_action/send_goal"
 """How the name of the service ends that takes an action's goals."""

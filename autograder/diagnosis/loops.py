@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from autograder.diagnosis.events import Thing
 from autograder.diagnosis.inside import Inside
 from autograder.diagnosis.reason import Diagnosis
 from autograder.diagnosis.scene import Scene, first
+from autograder.sandbox.inside.probe.events import Thing
 
 
 def why_all_alike(scene: Scene) -> Diagnosis | None:

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from autograder.arguments import remap_rules
+from autograder.arguments import remap_rules, rule_effect
 from autograder.diagnosis.chain import inside_reason, reason_inside
-from autograder.diagnosis.events import Thing
 from autograder.diagnosis.inside import Inside
 from autograder.diagnosis.programs import program_trouble
 from autograder.diagnosis.reason import Diagnosis
 from autograder.diagnosis.scene import Scene
 from autograder.diagnosis.unmade import not_made_yet
 from autograder.graph.names import nearest, node_of, type_name
+from autograder.sandbox.inside.probe.events import Thing
 
 _LETTER_BY_LETTER = "Compare the two names letter by letter, namespace included."
 _EVERY_NODES = ("/rosout", "/parameter_events")
@@ -60,7 +60,7 @@ def _given_as_a_parameter(scene: Scene, insides: Sequence[Inside], wanted: str) 
     """Why a name given with `-p` to one of these programs is not there."""
     pairs = zip(scene.insides, scene.parameter_rules, strict=False)
     return next(
-        (why for it, given in pairs if it in insides and (why := remap_rules.renames_nothing(given, wanted))), None
+        (why for it, given in pairs if it in insides and (why := rule_effect.renames_nothing(given, wanted))), None
     )
 
 
@@ -96,7 +96,7 @@ def why_no_node(scene: Scene, wanted: str) -> Diagnosis:
     if silent or not own:
         return _nothing_of(silent or around)
     for inside, rules in zip(scene.insides, scene.rules, strict=False):
-        idle = remap_rules.node_without_effect(rules, wanted, own) if inside in around else None
+        idle = rule_effect.node_without_effect(rules, wanted, own) if inside in around else None
         if idle:
             return Diagnosis(*idle)
     idle = _given_as_a_parameter(scene, around, wanted)
@@ -244,7 +244,7 @@ def _idle_rule(scene: Scene, topic: str, node: str) -> Diagnosis | None:
     for inside, rules in zip(scene.insides, scene.rules, strict=False):
         own = [name for name in observer.nodes() if name in inside.nodes] or observer.nodes()
         nodes = [name for name in own if name == node] if node else own
-        found = remap_rules.without_effect(rules, topic, nodes, users, inside.names_in_code)
+        found = rule_effect.without_effect(rules, topic, nodes, users, inside.names_in_code)
         named = [name for name in users if found and name in found[0]]
         absolute = any(absolute_name(scene, kind, name) for name in named for kind in ("publisher", "subscription"))
         if found and (found[1] != "absolute-name" or absolute):

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from autograder.diagnosis.events import ExecutorSeen, Thing
 from autograder.diagnosis.inside import Inside, called, listed
 from autograder.diagnosis.reason import Diagnosis
 from autograder.diagnosis.scene import Scene
 from autograder.diagnosis.turns import one_lock
+from autograder.sandbox.inside.probe.events import ExecutorSeen, Thing
 
 MOST_OF_THE_TIME = 0.6
 """Share of the time that others must have taken for a callback to count as kept waiting by them."""

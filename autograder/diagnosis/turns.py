@@ -5,10 +5,10 @@ from __future__ import annotations
 import itertools
 
 from autograder.diagnosis.blocked import ONE_LOCK
-from autograder.diagnosis.events import Thing
 from autograder.diagnosis.inside import Inside, called
 from autograder.diagnosis.reason import Diagnosis
 from autograder.diagnosis.scene import Scene
+from autograder.sandbox.inside.probe.events import Thing
 
 
 def why_kept_waiting(scene: Scene, service: str) -> Diagnosis | None:

@@ -19,7 +19,7 @@ _POSITIONS = {
     "undecided": (1, 3, 4),
 }  # fmt: skip
 """Where the sentence, the code and the hint stand in calls that give them by position."""
-_RULES = ("rule_effect.py", "rule_grammar.py", "traces.py")
+_RULES = ("rule_effect.py", "remap_rules.py", "traces.py")
 """Modules that give a reason as a tuple of three."""
 
 
