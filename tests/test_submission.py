@@ -348,6 +348,16 @@ def test_a_link_or_a_fifo_is_not_read(lab: Lab, tmp_path: Path) -> None:
         assert codes(read_submission(path, lab)) == ["no-notebook"]
 
 
+@pytest.mark.parametrize("level", ["student", "lab"])
+def test_a_link_in_place_of_a_folder_of_a_submission_is_not_followed(lab: Lab, tmp_path: Path, level: str) -> None:
+    other = toy.hand_in(tmp_path / "submitted" / "ann", toy.LAB, solved(lab))
+    links = {"student": tmp_path / "submitted" / "eve", "lab": tmp_path / "submitted" / "eve" / toy.LAB}
+    links[level].parent.mkdir(exist_ok=True)
+    links[level].symlink_to({"student": other.parent.parent, "lab": other.parent}[level])
+    assert codes(read_submission(tmp_path / "submitted" / "eve" / toy.LAB / other.name, lab)) == ["no-notebook"]
+    assert codes(read_submission(other, lab)) == []
+
+
 def test_half_characters_are_replaced(lab: Lab, tmp_path: Path) -> None:
     text = json.dumps(toy.notebook(solved(lab, talker="%%node talker\nprint('X')"))).replace("'X'", "'\\ud800'")
     submission = read(lab, tmp_path, text)
