@@ -25,7 +25,8 @@ from autograder.checks.command_line import CommandLineError, command_line
 from autograder.checks.forms import NAME_OR_NONE
 from autograder.core.errors import KitError
 from autograder.core.results import Isolation, Status
-from autograder.course.lab import grade_id_of, load_lab
+from autograder.course.cells import grade_id_of
+from autograder.course.lab import load_lab
 from autograder.grading.job import Cell, Job
 from autograder.grading.worker import run_job
 from autograder.intake.asked import Accepted

@@ -20,7 +20,8 @@ import toy
 
 from autograder.authoring.release import release
 from autograder.core.results import Isolation
-from autograder.course.lab import Lab, grade_id_of, load_lab
+from autograder.course.cells import grade_id_of
+from autograder.course.lab import Lab, load_lab
 from autograder.gradebook.class_run import grade_class
 from autograder.gradebook.grades import write_grades
 from autograder.gradebook.own_courses import TEMPLATE, trust

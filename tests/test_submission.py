@@ -19,9 +19,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from autograder.core.errors import KitError
-from autograder.course.cell_file import BadNameError, parse
-from autograder.course.lab import Lab, grade_id_of, load_lab
-from autograder.course.markers import hidden_lines, without_hidden_tests
+from autograder.course.cells import BadNameError, grade_id_of, hidden_lines, parse, without_hidden_tests
+from autograder.course.lab import Lab, load_lab
 from autograder.intake.collect import collect
 from autograder.submission.cell_files import OWN_FILES
 from autograder.submission.copies import told_of_copies

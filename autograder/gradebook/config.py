@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from autograder.course.lab import CODE_STUB, TEXT_STUB
+from autograder.course.cells import CODE_STUB, TEXT_STUB
 from autograder.course.paths import CoursePaths
 from autograder.gradebook.autograde import AUTOGRADE, SANITIZE, SubmissionExporter
 from autograder.gradebook.exchange_files import CollectNotebooks

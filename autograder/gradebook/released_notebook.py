@@ -17,8 +17,7 @@ from nbgrader.preprocessors import (
     NbGraderPreprocessor,
 )
 
-from autograder.course.lab import blank_mark
-from autograder.course.markers import without_hidden_tests
+from autograder.course.cells import blank_mark, without_hidden_tests
 from autograder.gradebook.migration import FitCells
 from autograder.submission.copies import named_file
 

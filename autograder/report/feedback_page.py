@@ -12,7 +12,7 @@ from markupsafe import Markup
 from autograder.core.grades import CellGrade, Grade
 from autograder.core.results import CheckResult, SubmissionResult
 from autograder.core.version import VERSION
-from autograder.course.lab import TEXT_STUB
+from autograder.course.cells import TEXT_STUB
 from autograder.report import words
 from autograder.report.audience import reason, result_for
 from autograder.report.html import check_html, render
