@@ -30,7 +30,7 @@ from rich.table import Table
 from autograder.core.results import Isolation, SubmissionResult
 from autograder.course.cells import grade_id_of
 from autograder.course.lab import lab_names, load_lab
-from autograder.gradebook.preparation import prepare_nbgrader
+from autograder.gradebook.own_courses import prepare_nbgrader
 from autograder.grading.store import ResultStore
 from autograder.sandbox.outer import run_in_sandbox
 

@@ -207,9 +207,9 @@ def test_markdown(case: dict[str, Any]) -> None:
     from bs4 import BeautifulSoup
     from nbconvert.filters import markdown2html
 
-    from autograder.gradebook.inert import inert
+    from autograder.gradebook.autograde import harmless
 
-    page = BeautifulSoup(markdown2html(inert(written_out(case["text"]))), "html.parser")
+    page = BeautifulSoup(markdown2html(harmless(written_out(case["text"]))), "html.parser")
     plain = {"p", "a", "code", "pre", "br", "em", "strong", "blockquote", "ol", "li"}
     assert {tag.name for tag in page.find_all()} <= plain
     for link in page.find_all("a"):

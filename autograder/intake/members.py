@@ -101,7 +101,7 @@ def in_zip(archive: zipfile.ZipFile, bad: list[str], above: tuple[str, ...] = ()
 def empty_folders(archive: zipfile.ZipFile) -> Iterator[tuple[str, ...]]:
     """Give the paths of the folders that a zip names as such."""
     for info in archive.infolist():
-        if info.is_dir() and (path := _path(info)):
+        if (path := _path(info)) and info.is_dir():  # Python cannot say it of a name without characters
             yield path
 
 
