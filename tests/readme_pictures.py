@@ -24,7 +24,8 @@ from rich.terminal_theme import DEFAULT_TERMINAL_THEME
 from rich.text import Text
 from test_browser import jupyter_lab, run_all
 
-from autograder.course.lab import Lab, grade_id_of, load_lab
+from autograder.course.cells import grade_id_of
+from autograder.course.lab import Lab, load_lab
 
 ROOT = Path(__file__).resolve().parent.parent
 PICTURES = ROOT / "lectures" / "_static"

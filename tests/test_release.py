@@ -9,7 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from autograder.course.lab import CODE_STUB, load_lab
+from autograder.course.cells import CODE_STUB
+from autograder.course.lab import load_lab
 from autograder.gradebook import release
 
 ROOT = Path(__file__).resolve().parent.parent

@@ -6,7 +6,8 @@ import json
 import re
 from pathlib import Path
 
-from autograder.course.lab import lab_names, source_of
+from autograder.course.cells import source_of
+from autograder.course.lab import lab_names
 from autograder.course.settings import read_settings
 
 START_PAGE = "README.md"

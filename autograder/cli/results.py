@@ -26,7 +26,7 @@ def report(course: CourseOption = None) -> None:
 
     from autograder.course.folder import course_root
     from autograder.course.paths import CoursePaths
-    from autograder.gradebook.class_entries import class_entries
+    from autograder.gradebook.grades import class_entries
     from autograder.report.class_page import write_class_page
 
     root = course_root(course)
@@ -54,7 +54,7 @@ def export(
     """
     from autograder.core.files import write_beside
     from autograder.course.folder import course_root
-    from autograder.gradebook.class_entries import class_entries
+    from autograder.gradebook.grades import class_entries
 
     if form not in FORMATS:
         raise KitError(f"There is no format `{form}`.", f"Name one of: {', '.join(FORMATS)}.")

@@ -10,7 +10,7 @@ import re
 from typing import TYPE_CHECKING, Any
 
 from autograder.core import front_end
-from autograder.course.cell_file import CELL_BYTES, BadNameError, CellFile, check_free, check_name, parse
+from autograder.course.cells import CELL_BYTES, BadNameError, CellFile, check_free, check_name, parse
 from autograder.course.folder import book_of_kit
 from autograder.notebook import completion, lab_magic, ros2_magic
 from autograder.notebook.kernel import Kernel, now

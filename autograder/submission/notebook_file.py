@@ -8,7 +8,7 @@ from typing import Any
 
 from autograder.core.files import read_plain
 from autograder.core.results import Outcome, Status
-from autograder.course.lab import grade_id_of
+from autograder.course.cells import grade_id_of
 
 NOTEBOOK_BYTES = 8 * 1024 * 1024
 """The largest notebook that is read, in bytes."""
