@@ -6,11 +6,11 @@ import itertools
 from collections.abc import Sequence
 
 from autograder.arguments.rule_effect import full_name, without_effect
-from autograder.arguments.rule_grammar import Reason, Rule, parse, why_parameter_refused, why_remap_refused
+from autograder.arguments.rule_grammar import Rule, parse, why_parameter_refused, why_remap_refused
 from autograder.arguments.rule_kind import node_without_effect, renames_nothing
+from autograder.reasons import Reason
 
 __all__ = [
-    "Reason",
     "Rule",
     "full_name",
     "node_without_effect",

@@ -8,7 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from autograder.arguments.rule_grammar import Reason, parse
+from autograder.arguments.rule_effect import RULE_PREFIX, RULE_TAKES_NAME
+from autograder.arguments.rule_grammar import RULE_KIND, parse
+from autograder.reasons import Reason
 
 
 def node_without_effect(rules: Sequence[str], wanted: str, nodes: Sequence[str]) -> Reason | None:
@@ -22,9 +24,8 @@ def node_without_effect(rules: Sequence[str], wanted: str, nodes: Sequence[str])
     space, _, base = wanted.rpartition("/")
     for rule in map(parse, rules):
         if rule and rule.renames_topics and rule.right == base:
-            return (
+            return RULE_KIND(
                 f"The rule `{rule.text}` renames topics and services, and no node.",
-                "rule-kind",
                 f"A node's name is given with `__node`: `-r __node:={base}`.",
             )
     names, spaces = {node.rpartition("/")[2] for node in nodes}, {node.rpartition("/")[0] for node in nodes}
@@ -33,24 +34,21 @@ def node_without_effect(rules: Sequence[str], wanted: str, nodes: Sequence[str])
             continue
         said = f"The rule `{rule.text}` changed nothing:"
         if rule.left in ("__node", "__name") and rule.prefix == base and rule.right in names:
-            return (
+            return RULE_TAKES_NAME(
                 f"The rule `{rule.text}` gives the node `{base}` the name `{rule.right}`: `{rule.right}` is there, and "
                 f"`{base}` is not.",
-                "rule-takes-name",
                 f"If the code calls the node `{base}`, leave the rule out. If it calls it `{rule.right}`, old and new "
                 f"are swapped: `{rule.right}:__node:={base}`.",
             )
         if rule.left in ("__node", "__name") and rule.right == base and base not in names:
-            return (
+            return RULE_PREFIX(
                 f"{said} no node is called `{rule.prefix}` in its code (the nodes are {', '.join(nodes)}).",
-                "rule-prefix",
                 "The prefix of a `__node` rule is the name that the code gives to the node's constructor.",
             )
         if rule.left == "__ns" and rule.right.rstrip("/") == space and space not in spaces:
-            return (
+            return RULE_PREFIX(
                 f"{said} it is for a node named `{rule.prefix}`, and no node on the graph has that name (the nodes are "
                 f"{', '.join(nodes)}).",
-                "rule-prefix",
                 "The prefix of a `__ns` rule is the name that the node has now, after `__node`.",
             )
     return None
@@ -66,9 +64,8 @@ def renames_nothing(parameter_rules: Sequence[str], wanted: str) -> Reason | Non
     for text in parameter_rules:
         value = text.partition(":=")[2].strip("'\"")
         if value and value in (wanted, wanted.removeprefix("/"), wanted.rpartition("/")[2]):
-            return (
+            return RULE_KIND(
                 f"`-p {text}` gives a parameter its first value; it renames nothing.",
-                "rule-kind",
                 "Names are changed with `-r`: `__node:=NEW` for a node, `__ns:=/NEW` for a namespace, `OLD:=NEW` for a "
                 "topic or service.",
             )

@@ -11,8 +11,8 @@ from typing import TypeVar
 
 from autograder.arguments.remap_rules import full_name
 from autograder.diagnosis import events, sources
+from autograder.diagnosis.diagnosed import DiagnosedProgram
 from autograder.diagnosis.events import Call, Event, ExecutorSeen, NodeSeen, ParameterSeen, Thing
-from autograder.diagnosis.reason import DiagnosedProgram
 from autograder.graph.observer import Observer
 
 _T = TypeVar("_T")

@@ -5,8 +5,12 @@ from __future__ import annotations
 import ast
 
 from autograder.diagnosis.inside import Inside
-from autograder.diagnosis.reason import Diagnosis
 from autograder.diagnosis.scene import Scene
+from autograder.reasons import Group, Kind, Reason
+
+NOT_MADE_YET = Kind(
+    "not-made-yet", "a method of the source makes the end in a line where the probe has seen none made", Group.NAMES
+)
 
 _MAKERS = {
     "publisher": ("create_publisher", "create_lifecycle_publisher"),
@@ -14,15 +18,14 @@ _MAKERS = {
 }
 
 
-def not_made_yet(scene: Scene, topic: str, kind: str, node: str) -> Diagnosis | None:
+def not_made_yet(scene: Scene, topic: str, kind: str, node: str) -> Reason | None:
     """Must have seen: a line in a method of the source that makes such an end, and no end made there."""
     for inside in scene.inside_of(node) if node else scene.insides:
         for method, call in _makers(inside, topic, kind) if inside.alive else []:
             code = inside.source.line(call.lineno)
-            return Diagnosis(
+            return NOT_MADE_YET(
                 f"The code makes the {kind} on `{topic}` in `{method}`, line {call.lineno} (`{code}`), and the program "
                 "has not come to that line.",
-                "not-made-yet",
                 "Make it in the callback after which it is to be there.",
             )
     return None
