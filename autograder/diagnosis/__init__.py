@@ -39,9 +39,14 @@ from autograder.diagnosis.silence import (
     why_silent,
 )
 from autograder.diagnosis.spinning import thread_left
-from autograder.diagnosis.together import layout, waits_for_its_group, why_not_together, why_starved
+from autograder.diagnosis.together import (
+    layout,
+    waits_for_its_group,
+    why_kept_waiting,
+    why_not_together,
+    why_starved,
+)
 from autograder.diagnosis.traces import last_traceback
-from autograder.diagnosis.turns import why_kept_waiting
 
 __all__ = [
     "SILENT",

@@ -165,9 +165,7 @@ class Doing:
             try:
                 student_yaml.load(done, f"`{path.name}` with its substitutions done")
             except Refused as error:
-                if (
-                    error.reason.kind is student_yaml.NOT_YAML
-                ):  # `launch` looks; what it lets pass is the program's to read
+                if error.reason.kind is student_yaml.NOT_YAML:  # what `launch` lets pass is the program's to read
                     raise refused(error.reason.because, "A value that holds a colon stands in quotes.") from None
             return ParamsText(text=done)
 

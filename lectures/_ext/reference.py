@@ -27,7 +27,7 @@ def layers() -> str:
     """The folders and modules of the package from the top down, as import-linter holds them, each with its purpose."""
     settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
     contract = next(one for one in settings["tool"]["importlinter"]["contracts"] if one["type"] == "layers")
-    lines = ["| folder | what it is for |", "|---|---|"]
+    lines = ["| folder or module | what it is for |", "|---|---|"]
     for layer in contract["layers"]:
         for name in re.findall(r"\w+", layer):  # `one | other` stand beside each other and do not use each other
             about = (inspect.getdoc(importlib.import_module(f"autograder.{name}")) or "").split("\n\n")[0]
