@@ -13,9 +13,10 @@ from std_srvs.srv import Trigger
 from test_msgs.action import Fibonacci, NestedMessage
 
 from autograder import diagnosis
-from autograder.diagnosis import Diagnosis, Scene
+from autograder.diagnosis import Scene
 from autograder.diagnosis.inside import Inside
 from autograder.graph.recording import quiet_profile
+from autograder.reasons import Reason
 
 PRELUDE = """
 import threading, time
@@ -32,22 +33,22 @@ from std_srvs.srv import Trigger
 from test_msgs.action import Fibonacci, NestedMessage
 """
 
-Ask = Callable[[Scene, str], Diagnosis | None]
+Ask = Callable[[Scene, str], Reason | None]
 
 
-def silent(scene: Scene, name: str) -> Diagnosis | None:
+def silent(scene: Scene, name: str) -> Reason | None:
     return diagnosis.why_silent(scene, f"/{name}/out", String, quiet_profile())
 
 
-def silent_late(scene: Scene, name: str) -> Diagnosis | None:
+def silent_late(scene: Scene, name: str) -> Reason | None:
     return diagnosis.why_silent(scene, f"/{name}/map", String, LATCHED)
 
 
-def unlogged(scene: Scene, name: str) -> Diagnosis | None:
+def unlogged(scene: Scene, name: str) -> Reason | None:
     return diagnosis.nothing_due(scene, f"/{name}")
 
 
-def inside(scene: Scene, name: str) -> Diagnosis | None:
+def inside(scene: Scene, name: str) -> Reason | None:
     return diagnosis.inside_reason(scene, f"/{name}")
 
 
@@ -55,19 +56,19 @@ def together(at_once: int = 2, itself: bool = False) -> Ask:
     return lambda scene, name: diagnosis.why_not_together(scene, "", at_once, itself)
 
 
-def alike(scene: Scene, name: str) -> Diagnosis | None:
+def alike(scene: Scene, name: str) -> Reason | None:
     return diagnosis.why_all_alike(scene)
 
 
-def starved(scene: Scene, name: str) -> Diagnosis | None:
+def starved(scene: Scene, name: str) -> Reason | None:
     return diagnosis.why_starved(scene)
 
 
-def kept_waiting(scene: Scene, name: str) -> Diagnosis | None:
+def kept_waiting(scene: Scene, name: str) -> Reason | None:
     return diagnosis.why_kept_waiting(scene, f"/{name}/gate")
 
 
-def trouble(scene: Scene, name: str) -> Diagnosis | None:
+def trouble(scene: Scene, name: str) -> Reason | None:
     return diagnosis.program_trouble(scene)
 
 
@@ -176,7 +177,7 @@ def gate(self, request, response):
 """
 
 
-def no_end(scene: Scene, name: str) -> Diagnosis | None:
+def no_end(scene: Scene, name: str) -> Reason | None:
     return diagnosis.why_no_endpoint(scene, f"/{name}/more", String, "publisher", f"/{name}")
 
 

@@ -21,7 +21,7 @@ from autograder.course.lab import Cell
 from autograder.grading.builds import with_interfaces
 from autograder.grading.job import Job
 from autograder.grading.supervisor import run_in_workers
-from autograder.packages.explain import CODES
+from autograder.reasons import Group, all_kinds
 from autograder.sandbox import build as sandbox_build
 from autograder.sandbox.build import BuildRun
 from autograder.sandbox.isolation import preflight
@@ -525,7 +525,8 @@ def test_without_a_compiler_nothing_is_decided_and_the_reason_is_told(
 
 def test_every_code_of_a_build_has_a_case() -> None:
     seen = {code for _, _, code, _ in CASES.values()}
-    assert CODES.keys() - seen <= {"build-failed", "build-time", "build-limit"}
+    codes = {kind.code for kind in all_kinds().values() if kind.group is Group.BUILDING}
+    assert codes - seen <= {"build-failed", "build-time", "build-limit"}
 
 
 @pytest.mark.skipif(not preflight().full, reason="without full isolation a build is a plain process")

@@ -21,7 +21,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from autograder.checks import findings, runtime
-from autograder.checks.command_line import CommandLineError, command_line
+from autograder.checks.command_line import command_line
 from autograder.checks.forms import NAME_OR_NONE
 from autograder.core.errors import KitError
 from autograder.core.results import Isolation, Status
@@ -31,7 +31,8 @@ from autograder.grading.job import Cell, Job
 from autograder.grading.worker import run_job
 from autograder.intake.asked import Accepted
 from autograder.intake.collect import collect
-from autograder.launch_files import LaunchFileError, read_launch_file
+from autograder.launch_files import read_launch_file
+from autograder.reasons import Refused
 from autograder.report.terminal import plain
 from autograder.submission.reader import read_submission
 
@@ -194,7 +195,7 @@ def test_tables_of_answers(tmp_path: Path) -> None:
 def test_a_launch_file(case: dict[str, Any], tmp_path: Path) -> None:
     path = tmp_path / "attack.launch.yaml"
     path.write_text(written_out(case["text"]), encoding="utf-8")
-    with pytest.raises(LaunchFileError) as refused:
+    with pytest.raises(Refused) as refused:
         read_launch_file(path, {})
     told = str(refused.value)
     assert len(told) < 600 and "root:" not in told
@@ -256,7 +257,7 @@ def test_no_table_leaves_a_check_undecided(text: str, tmp_path: Path) -> None:
         exec(CHECK, globals() | {"scores": (scores := [])})
         result = scores[0].result
         assert result.status in (Status.FAILED, Status.PASSED), result.outcomes
-        with contextlib.suppress(CommandLineError):
+        with contextlib.suppress(Refused):
             command_line("table.yaml", "word").words()
     finally:
         runtime.current.configure(before, Isolation.NONE, seed=1)

@@ -25,7 +25,8 @@ from rclpy.logging import LoggingSeverity, set_logger_level
 from rclpy.node import Node
 from rclpy.utilities import remove_ros_args
 
-from autograder.launch_files import LaunchedNode, LaunchFileError, read_launch_file
+from autograder.launch_files import LaunchedNode, read_launch_file
+from autograder.reasons import Refused
 
 CASES = Path(__file__).parent / "launch_cases"
 NAMES = ("camera/image_color", "a", "b", "foo", "baz", "~/status", "/emergency_stop")
@@ -102,11 +103,11 @@ def test_a_launch_file_does_what_ros2_launch_does_with_it(
     text = full(case["file"] if "file" in case else "launch:\n" + case["launch"])
     monkeypatch.chdir(tmp_path)
     if isinstance(case["result"], str):
-        with pytest.raises(LaunchFileError) as caught:
+        with pytest.raises(Refused) as caught:
             read(tmp_path, text, case.get("given"))
-        assert caught.value.because
+        assert caught.value.reason.because
         if case["result"] == "not covered":
-            assert NOT_COVERED.search(caught.value.because), caught.value.because
+            assert NOT_COVERED.search(caught.value.reason.because), caught.value.reason.because
         return
     assert in_order([run(node) for node in read(tmp_path, text, case.get("given"))]) == in_order(case["result"])
 
@@ -128,7 +129,7 @@ def test_a_value_gets_the_type_that_ros2_launch_gives_it(
         try:
             [launched] = read(tmp_path, "launch:\n" + lists[table])
             found = [run(launched)["parameters"]["p"]]
-        except LaunchFileError:
+        except Refused:
             found = []
         if repr(found) != repr(expected):  # the types count, and nan is not equal to itself
             wrong.append((written, expected, found))
@@ -155,7 +156,7 @@ def test_a_value_gets_the_type_that_ros2_launch_gives_it(
 )
 def test_what_grows_without_bound_is_refused(tmp_path: Path, text: str, told: str) -> None:
     (tmp_path / "many.launch.yaml").write_text("launch:\n" + "- log: {message: x}\n" * 200)
-    with pytest.raises(LaunchFileError) as caught:
+    with pytest.raises(Refused) as caught:
         read(tmp_path, f"launch:\n{text}")
     assert told in str(caught.value)
 
@@ -168,7 +169,7 @@ def test_without_the_file_of_from_a_node_starts_and_a_warning_says_so(tmp_path: 
 
 
 def test_a_program_that_the_package_does_not_have_is_refused_with_those_it_has(tmp_path: Path) -> None:
-    with pytest.raises(LaunchFileError, match="It has `cam`, `camera_demo`"):
+    with pytest.raises(Refused, match="It has `cam`, `camera_demo`"):
         read(tmp_path, "launch:\n- node: {pkg: lab, exec: nope}\n")
 
 

@@ -16,12 +16,12 @@ from autograder.course.cells import parse
 from autograder.course.lab import load_lab
 from autograder.launch_files import (
     LaunchedNode,
-    LaunchFileError,
     ParamsFile,
     declared_arguments,
     read_launch_file,
     remove_written,
 )
+from autograder.reasons import Refused
 
 CAMERA = '- node: {pkg: "camera_lab", exec: "camera_demo"'
 
@@ -35,7 +35,7 @@ def read(folder: Path, text: str, **arguments: str) -> list[LaunchedNode]:
 
 
 def refusal(folder: Path, text: str, **arguments: str) -> str:
-    with pytest.raises(LaunchFileError) as caught:
+    with pytest.raises(Refused) as caught:
         read(folder, text, **arguments)
     return str(caught.value)
 
@@ -43,10 +43,10 @@ def refusal(folder: Path, text: str, **arguments: str) -> str:
 @pytest.mark.parametrize("written", ["010", "0x10", "12:30", "on", "1_000", "Yes", "+5", "true", "1.50"])
 @pytest.mark.parametrize("text", ["- arg:\n    name: rate\n    default: {}\n", "- let: {{name: rate, value: {}}}\n"])
 def test_the_hint_to_put_a_value_in_quotes_keeps_what_was_written(tmp_path: Path, text: str, written: str) -> None:
-    with pytest.raises(LaunchFileError) as caught:
+    with pytest.raises(Refused) as caught:
         read(tmp_path, "launch:\n" + text.format(written))
-    assert f'"{written}"`' in caught.value.hint and f"`{written}` is a" in caught.value.because
-    quoted = caught.value.hint.partition("`")[2].partition("`")[0].partition(": ")[2]
+    assert f'"{written}"`' in caught.value.reason.hint and f"`{written}` is a" in caught.value.reason.because
+    quoted = caught.value.reason.hint.partition("`")[2].partition("`")[0].partition(": ")[2]
     read(tmp_path, "launch:\n" + text.format(quoted))
 
 
@@ -71,14 +71,14 @@ def generate_launch_description():
      "import launch_ros.actions as a\nfrom launch import LaunchDescription as D\n", "x: 1\nLaunchDescription([])\n"],
 )  # fmt: skip
 def test_a_launch_file_in_python_is_called_so_and_its_words_are_translated(tmp_path: Path, text: str) -> None:
-    with pytest.raises(LaunchFileError) as caught:
+    with pytest.raises(Refused) as caught:
         read(tmp_path, text)
-    assert "a launch file in Python" in caught.value.because and "YAML" in caught.value.because
-    assert "`launch:`" in caught.value.hint and "`- node:`" in caught.value.hint
+    assert "a launch file in Python" in caught.value.reason.because and "YAML" in caught.value.reason.because
+    assert "`launch:`" in caught.value.reason.hint and "`- node:`" in caught.value.reason.hint
     if "remappings" in text:
         for words in ("`$(var NAME)`", "`remap:`", "`- arg:`"):
-            assert words in caught.value.hint
-    assert "indentation" not in str(caught.value) + caught.value.hint
+            assert words in caught.value.reason.hint
+    assert "indentation" not in str(caught.value) + caught.value.reason.hint
 
 
 @pytest.mark.parametrize("text", [
@@ -221,9 +221,9 @@ def test_the_courses_file_can_stand_in_for_an_included_one_and_names_its_own_pro
         return [(node.program, node.arguments) for node in found]
 
     assert started(include) == [("course", ["left"])]
-    with pytest.raises(LaunchFileError, match=r"`inner\.launch\.yaml` has no default for it"):
+    with pytest.raises(Refused, match=r"`inner\.launch\.yaml` has no default for it"):
         started(include.replace("side, value", "other, value"))
-    with pytest.raises(LaunchFileError, match=r"has no program `course`\. It has `camera_demo`"):
+    with pytest.raises(Refused, match=r"has no program `course`\. It has `camera_demo`"):
         started("launch:\n- node: {pkg: camera_lab, exec: course}\n")
 
 
@@ -288,9 +288,9 @@ def test_what_cannot_be_read_is_said_with_its_place(tmp_path: Path, text: str, t
 )
 def test_what_is_often_meant_is_in_the_hint(tmp_path: Path, text: str, hint: str) -> None:
     (tmp_path / "a.launch.yaml").write_text(text)
-    with pytest.raises(LaunchFileError) as caught:
+    with pytest.raises(Refused) as caught:
         read_launch_file(tmp_path / "a.launch.yaml", {})
-    assert hint in caught.value.hint
+    assert hint in caught.value.reason.hint
 
 
 @pytest.mark.parametrize(("content", "told"), [(b"a: \xe4", "text in UTF-8"), (b"#" * (FILE_BYTES + 1), "larger than")])
@@ -315,7 +315,7 @@ def test_the_arguments_that_a_file_declares_are_known(tmp_path: Path) -> None:
 
 
 def test_a_file_that_is_missing(tmp_path: Path) -> None:
-    with pytest.raises(LaunchFileError, match="there is no such file"):
+    with pytest.raises(Refused, match="there is no such file"):
         read_launch_file(tmp_path / "a.launch.yaml", {})
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import sys
+from collections import Counter
 from pathlib import Path
 
 import pytest
@@ -14,30 +15,53 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.append(str(ROOT / "lectures" / "_ext"))
 
 import check_api  # noqa: E402  (these make pages of the book)
-import kit_source  # noqa: E402
 import reason_codes  # noqa: E402
 import reference  # noqa: E402
 
-from autograder.checks.codes import GROUPS  # noqa: E402
 from autograder.checks.launch import Launch  # noqa: E402
-from autograder.diagnosis.codes import CODES  # noqa: E402
-from autograder.report.reading import LECTURES, SECTIONS  # noqa: E402
+from autograder.course.book import read_book  # noqa: E402
+from autograder.reasons import KINDS, Group, Kind, all_kinds, kind_of_lab  # noqa: E402
 
-LISTED = [*CODES, *(code for group in GROUPS.values() for code in group)]
+BOOK = read_book(ROOT)
 PAGES = sorted((ROOT / "lectures" / "instructors").glob("*.md"))
 
 
-def test_every_code_that_the_kit_gives_is_listed() -> None:
-    used = kit_source.codes_used()
-    assert len(used) > 100
-    assert sorted(code for code in used if not any(kit_source.fits(one, code) for one in LISTED)) == []
+def test_a_new_reason_is_declared_in_one_place() -> None:
+    try:
+        kind = Kind("too-green", "the light was too green", Group.ENDS, "timeline")
+        reason = kind("It is green.", "Paint it.")
+        assert (reason.code, reason.because, reason.hint, reason.kind.picture) == (
+            "too-green", "It is green.", "Paint it.", "timeline",
+        )  # fmt: skip
+        page = reason_codes.reason_codes()
+        assert "**`too-green`**\n: The light was too green.\n\n  - A picture shows" in page
+        with pytest.raises(ValueError, match="two kinds of reasons with the code 'too-green'"):
+            Kind("too-green", "it was greener", Group.ENDS)
+    finally:
+        KINDS.pop("too-green", None)
 
 
-def test_no_code_is_listed_twice_or_without_use() -> None:
-    assert len(LISTED) == len(set(LISTED))
-    filled_in = {code for code in LISTED if code.endswith(("-limit", "-exception"))}  # named by what happened
-    used = kit_source.codes_used()
-    assert [code for code in LISTED if code not in filled_in and not any(kit_source.fits(code, u) for u in used)] == []
+def test_a_code_of_a_lab_is_of_the_kits_kind_where_there_is_one_and_else_of_its_own() -> None:
+    assert kind_of_lab("topic-name") is KINDS["topic-name"]
+    assert kind_of_lab("lost-update").group is None and "lost-update" not in KINDS
+
+
+def test_every_kind_has_a_form_of_its_code_and_says_what_was_seen() -> None:
+    kinds = all_kinds()
+    assert len(kinds) > 200
+    assert [code for code in kinds if not re.fullmatch(r"[a-z]+(-[a-z]+)*", code)] == []
+    assert [kind.code for kind in kinds.values() if not kind.seen or kind.seen.endswith(".")] == []
+
+
+def test_every_kind_is_given_somewhere() -> None:
+    sources = "".join(path.read_text(encoding="utf-8") for path in (ROOT / "autograder").rglob("*.py"))
+    uses = Counter(re.findall(r"\b[A-Z][A-Z_]+\b", sources))
+    assert [code for code in all_kinds() if uses[code.upper().replace("-", "_")] < 2] == []
+
+
+def test_no_text_of_the_kit_names_a_lecture() -> None:
+    texts = {path: path.read_bytes() for path in (ROOT / "autograder").rglob("*") if path.suffix not in (".pyc", "")}
+    assert [path for path, text in texts.items() if re.search(rb"[Ll]ecture \d", text)] == []
 
 
 def test_every_code_that_grading_gave_stands_on_the_page_or_in_a_lab() -> None:
@@ -54,12 +78,8 @@ def test_every_code_that_grading_gave_stands_on_the_page_or_in_a_lab() -> None:
 
 def test_every_folder_of_the_package_stands_among_the_layers() -> None:
     folders = {path.parent.name for path in (ROOT / "autograder").glob("*/__init__.py")}
-    assert folders == set(re.findall(r"^\| `(\w+)` \| \S", reference.layers(), re.MULTILINE))
-
-
-def test_groups_of_codes_point_to_lectures_that_are_there() -> None:
-    assert reason_codes.READ_ON.keys() <= {*re.findall(r"^## (.*)$", reason_codes.reason_codes(), re.MULTILINE)}
-    assert all((ROOT / "lectures" / f"{name}.md").is_file() for name in reason_codes.LECTURES.values())
+    modules = {path.stem for path in (ROOT / "autograder").glob("*.py")} - {"__init__"}
+    assert folders | modules == set(re.findall(r"^\| `(\w+)` \| \S", reference.layers(), re.MULTILINE))
 
 
 def test_everything_that_ros_offers_is_documented() -> None:
@@ -86,21 +106,21 @@ def test_an_example_is_taken_from_what_students_may_see() -> None:
         assert example.splitlines()[0].removesuffix(":") in released
 
 
-def test_hints_lead_to_sections_that_the_lectures_have() -> None:
-    sources = [*(ROOT / "autograder").rglob("*.py"), *(ROOT / "solutions").glob("*/*.ipynb")]
-    texts = [path.read_text(encoding="utf-8") for path in sources]
-    named = {found for text in texts for found in re.findall(r"Lecture (\d), section '([^']+)'", text)}
+def sections_of(lecture: str) -> list[str]:
+    text = (ROOT / "lectures" / f"{BOOK.pages[lecture]}.md").read_text(encoding="utf-8")
+    return re.findall(r"^##+ (.*)$", text, re.MULTILINE)
+
+
+def test_hints_of_the_labs_lead_to_sections_that_the_lectures_have() -> None:
+    texts = [path.read_text(encoding="utf-8") for path in (ROOT / "solutions").glob("*/*.ipynb")]
+    named = {found for text in texts for found in re.findall(r"(Lecture \d), section '([^']+)'", text)}
     assert len(named) > 3
-    for number, section in named:
-        lecture = next((ROOT / "lectures").glob(f"0{number}_*.md")).read_text(encoding="utf-8")
-        assert re.search(rf"^##+ {re.escape(section)}$", lecture, re.MULTILINE), (number, section)
+    assert [(lecture, title) for lecture, title in sorted(named) if title not in sections_of(lecture)] == []
 
 
-@pytest.mark.parametrize("where", SECTIONS, ids=lambda where: f"{where[0]}-{where[1]}")
-def test_a_reason_leads_to_a_section_that_its_lecture_has(where: tuple[int, str]) -> None:
-    number, section = where
-    lecture = (ROOT / "lectures" / f"{LECTURES[number]}.md").read_text(encoding="utf-8")
-    assert re.search(rf"^##+ {re.escape(section)}$", lecture, re.MULTILINE)
-    known = {code for group in GROUPS.values() for code in group} | CODES.keys()
-    known |= set(re.findall(r'code=\\?"([a-z-]+)', "".join(p.read_text() for p in ROOT.glob("solutions/*/*.ipynb"))))
-    assert set(SECTIONS[where].split()) <= known
+@pytest.mark.parametrize("code", BOOK.sections)
+def test_a_reason_leads_to_a_section_that_its_lecture_has(code: str) -> None:
+    section = BOOK.sections[code]
+    assert section.title in sections_of(section.lecture)
+    labs = "".join(path.read_text(encoding="utf-8") for path in ROOT.glob("solutions/*/*.ipynb"))
+    assert code in all_kinds() or code in re.findall(r'code=\\?"([a-z-]+)', labs)

@@ -13,9 +13,10 @@ from rclpy.node import Node
 from std_msgs.msg import String
 
 from autograder.arguments import params_file, remap_rules, rule_effect
+from autograder.arguments.rule_effect import RULE_WITHOUT_MATCH
 from autograder.checks import command_line, runtime
-from autograder.checks.command_line import CommandLineError
 from autograder.core.results import Isolation
+from autograder.reasons import Refused
 
 
 @contextmanager
@@ -66,7 +67,7 @@ def test_a_rule_that_rcl_refuses_is_explained(rule: str, code: str) -> None:
         names([rule])
     reason = remap_rules.refused(["a:=b", rule])
     assert reason is not None
-    assert reason[1] == code
+    assert reason.code == code
 
 
 @pytest.mark.parametrize(
@@ -101,7 +102,7 @@ def test_a_rule_without_effect_is_explained(rules: list[str], wanted: str, code:
     assert wanted not in topics
     reason = rule_effect.without_effect(rules, wanted, [node], topics)
     assert reason is not None
-    assert reason[1] == code
+    assert reason.code == code
 
 
 def test_a_swapped_rule_is_told_from_one_that_is_misspelt() -> None:
@@ -109,7 +110,7 @@ def test_a_swapped_rule_is_told_from_one_that_is_misspelt() -> None:
     in_code = {f"/{name}": [node] for name in ("camera/image_color", "camera_demo/status")}
     for rule, said in (("front/image:=camera/image_color", True), ("camera/image_colour:=front/image", False)):
         reason = rule_effect.without_effect([rule], "/front/image", [node], topics, in_code)
-        assert reason is not None and ("swapped" in reason[0]) == said
+        assert reason is not None and ("swapped" in reason.because) == said
 
 
 @pytest.mark.parametrize(("space", "wanted"), [("", "/camera/image_color"), ("/car", "/car/camera/image_color")])
@@ -120,25 +121,25 @@ def test_a_rule_that_worked_is_not_said_to_have_changed_nothing(space: str, want
     assert "/front/image" in topics and wanted not in topics
     in_code = {wanted: [node], f"{node}/status": [node]} if known else None
     reason = rule_effect.without_effect(rules, wanted, [node], topics, in_code)
-    assert reason is not None and reason[1] == "rule-takes-name" and "leave the rule out" in reason[2].lower()
-    assert "changed nothing" not in reason[0] and "swapped" not in reason[0]
-    assert ("swapped" in reason[2]) != known
+    assert reason is not None and reason.code == "rule-takes-name" and "leave the rule out" in reason.hint.lower()
+    assert "changed nothing" not in reason.because and "swapped" not in reason.because
+    assert ("swapped" in reason.hint) != known
 
 
 def test_what_renames_no_node_is_told() -> None:
     assert names(["camera_demo:=front"])[0] == "/camera_demo"
     found = rule_effect.node_without_effect(["camera_demo:=front"], "/front", ["/camera_demo"])
-    assert found is not None and found[1] == "rule-kind" and "-r __node:=front" in found[2]
+    assert found is not None and found.code == "rule-kind" and "-r __node:=front" in found.hint
     assert rule_effect.node_without_effect(["camera_demo:=rear"], "/front", ["/camera_demo"]) is None
     given = rule_effect.renames_nothing(["a:=1", "camera_name:=front"], "/front")
-    assert given is not None and given[0].startswith("`-p camera_name:=front` gives a parameter")
+    assert given is not None and given.because.startswith("`-p camera_name:=front` gives a parameter")
     assert rule_effect.renames_nothing(["a:=1", "camera_name:=rear"], "/front") is None
 
 
 def test_a_value_given_with_the_option_for_rules_leads_to_the_one_for_parameters() -> None:
     found, other = remap_rules.refused(["camera_rate:=40"]), remap_rules.refused(["camera:=2nd"])
-    assert found is not None and "-p camera_rate:=40" in found[2]
-    assert other is not None and "-p" not in other[2]
+    assert found is not None and "-p camera_rate:=40" in found.hint
+    assert other is not None and "-p" not in other.hint
 
 
 @pytest.mark.parametrize(
@@ -157,8 +158,8 @@ def test_a_parameter_file_that_rcl_refuses_is_explained(tmp_path: Path, text: st
     with contextlib.chdir(tmp_path), pytest.raises(Exception, match="params file") as caught:
         rclpy.init(context=rclpy.Context(), args=["x", "--ros-args", "--params-file", "car.yaml"])
     found = params_file.why_refused(f"Traceback\nRCLError: {caught.value}", tmp_path)
-    assert found is not None and words in found[0]
-    assert not line or f"line {line} of the cell" in found[0]
+    assert found is not None and words in found.because
+    assert not line or f"line {line} of the cell" in found.because
 
 
 def test_the_names_in_a_parameter_file_are_known_by_node() -> None:
@@ -169,14 +170,14 @@ def test_the_names_in_a_parameter_file_are_known_by_node() -> None:
 def test_an_absolute_name_in_the_code_is_told_from_a_wrong_rule() -> None:
     reason = rule_effect.without_effect(["camera:=image"], "/x/image", ["/x/demo"], ["/camera"])
     assert reason is not None
-    assert reason[1] == "absolute-name"
+    assert reason.code == "absolute-name"
 
 
 def test_a_rule_of_another_node_is_not_blamed_for_the_order() -> None:
     rules = ["front:camera:=a", "rear:camera:=image"]
-    assert rule_effect.without_effect(rules, "/image", ["/rear"], {"/a": ["/front"], "/stop": ["/rear"]}) == (
+    found = rule_effect.without_effect(rules, "/image", ["/rear"], {"/a": ["/front"], "/stop": ["/rear"]})
+    assert found == RULE_WITHOUT_MATCH(
         "The rule `rear:camera:=image` changed nothing: nothing is called `/camera`, the name on its left side.",
-        "rule-without-match",
         "Compare the left side with the name in the code, letter by letter. ROS 2 does not warn about such a rule.",
     )
 
@@ -194,7 +195,7 @@ def test_a_private_name_or_an_idle_namespace_is_not_called_absolute(
 ) -> None:
     wanted = "/x/image" if nodes == ["/x/demo"] else "/image"
     reason = rule_effect.without_effect(rules, wanted, nodes, used)
-    assert reason is None or reason[1] == "rule-without-match"
+    assert reason is None or reason.code == "rule-without-match"
 
 
 def test_rules_that_have_nothing_to_do_with_the_wanted_name_are_not_blamed() -> None:
@@ -312,29 +313,29 @@ def test_only_a_parameter_file_that_rcl_does_not_read_either_is_called_unreadabl
 )
 def test_words_that_are_no_ros_arguments_are_refused_with_a_reason(table: Path, text: str, code: str) -> None:
     table.write_text(text)
-    with pytest.raises(CommandLineError) as caught:
+    with pytest.raises(Refused) as caught:
         command_line("rules.yaml", "front").words()
-    assert caught.value.code == code
+    assert caught.value.reason.code == code
 
 
 @pytest.mark.parametrize("words", ["-r a := b", "-r a:= b", "-r a :=b"])
 def test_a_space_beside_the_sign_of_a_rule_is_named(table: Path, words: str) -> None:
     table.write_text(f"front: {words}\n")
-    with pytest.raises(CommandLineError) as caught:
+    with pytest.raises(Refused) as caught:
         command_line("rules.yaml", "front").words()
-    assert "no space" in caught.value.hint
+    assert "no space" in caught.value.reason.hint
 
 
 @pytest.mark.parametrize("name", ["__node", "__name", "__ns"])
 def test_a_name_that_is_given_as_a_parameter_is_sent_to_the_right_option(name: str) -> None:
     reason = remap_rules.refused_parameter(["--ros-args", "-p", f"{name}:=front"])
     assert reason is not None
-    assert reason[1] == "rule-kind"
-    assert f"-r {name}:=" in reason[2]
+    assert reason.code == "rule-kind"
+    assert f"-r {name}:=" in reason.hint
 
 
 def test_a_missing_table_is_told(table: Path) -> None:
-    with pytest.raises(CommandLineError, match=r"%%file rules\.yaml"):
+    with pytest.raises(Refused, match=r"%%file rules\.yaml"):
         command_line("rules.yaml", "front").words()
 
 
@@ -400,4 +401,4 @@ def test_a_parameter_file_that_rcl_reads_is_read_as_rcl_reads_it(tmp_path: Path,
 def test_a_rule_for_one_node_that_matched_nothing_is_named(rule: str, wanted: str, nodes: list[str], says: str) -> None:
     reason = rule_effect.node_without_effect([rule], wanted, nodes)
     assert bool(reason) == bool(says)
-    assert reason is None or says in reason[0]
+    assert reason is None or says in reason.because

@@ -6,7 +6,9 @@ import datetime
 import io
 import json
 import re
+from dataclasses import replace
 from html.parser import HTMLParser
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -15,6 +17,7 @@ from rich.console import Console
 
 from autograder.core.grades import CellGrade, Grade
 from autograder.core.results import CheckResult, Isolation, NodeLog, Outcome, Part, Status, SubmissionResult
+from autograder.course.book import NO_BOOK, read_book
 from autograder.report.audience import Audience, result_for
 from autograder.report.export.csv_table import to_csv
 from autograder.report.export.entry import Entry
@@ -25,6 +28,8 @@ from autograder.report.html import check_html
 from autograder.report.reading import hints
 from autograder.report.terminal import check_text, check_view, class_view, submission_view, undecided_view
 
+ROOT = Path(__file__).resolve().parent.parent
+BOOK = read_book(ROOT)
 NASTY = "<img src=x onerror=alert(1)>\x1b[31m\x00 `code` & [link](javascript:alert(2))"
 
 
@@ -283,17 +288,20 @@ def test_in_a_notebook_hints_open_one_after_the_other_and_lead_to_the_book() -> 
         status=Status.FAILED, title="beats", because="The timer waits.", code="one-group",
         hint="Give them two groups; lecture 2, section 'How many threads?'. Then count threads.",
     )  # fmt: skip
-    said = [hint.text for hint in hints(failed)]
+    said = [hint.text for hint in hints(failed, BOOK)]
     assert said == ["Lecture 2, section 'How many threads?'.", "Give them two groups.", "Then count threads."]
     check = CheckResult(grade_id="c", title="c", max_points=1, points=0, outcomes=[failed])
-    html = check_html(check, on_demand=True, book="../../lectures")
+    html = check_html(check, on_demand=True, book=replace(BOOK, address="../../lectures"))
     assert 'href="../../lectures/02_executors.html#how-many-threads"' in html
     inside = html[html.index("Hint (1 of 3)") :]
     assert inside.index("Another hint (2 of 3)") < inside.index("Give them") < inside.index("Another hint (3 of 3)")
     assert inside.index("Another hint (3 of 3)") < inside.index("</details>")  # in each other: no later one is in sight
-    assert "<a" not in check_html(check, on_demand=True)
+    assert "<a" not in check_html(check, on_demand=True, book=BOOK)
     assert "<details" not in check_html(check) and "→ Give them" in Page(check_html(check)).text
     # A reason without a pointer of its own has the section that explains it.
     bare = failed.model_copy(update={"hint": ""})
-    assert [hint.text for hint in hints(bare)] == ["Lecture 2, section 'Second repair: a callback group'."]
-    assert "Second repair" in check_text(check.model_copy(update={"outcomes": [bare]}), [], "")
+    assert [hint.text for hint in hints(bare, BOOK)] == ["Lecture 2, section 'Second repair: a callback group'."]
+    assert "Second repair" in check_text(check.model_copy(update={"outcomes": [bare]}), [], "", BOOK)
+    # Of a course that says nothing of its lectures, nobody is sent to any.
+    assert hints(bare, NO_BOOK) == []
+    assert "Second repair" not in check_text(check.model_copy(update={"outcomes": [bare]}), [], "")

@@ -9,8 +9,9 @@ from hypothesis import HealthCheck, assume, example, given, settings
 from hypothesis import strategies as st
 from rclpy.node import Node
 
-from autograder.arguments.remap_rules import Reason, parse, refused, refused_parameter
+from autograder.arguments.remap_rules import parse, refused, refused_parameter
 from autograder.arguments.rule_effect import full_name, without_effect
+from autograder.reasons import Reason
 
 QUICK = settings(max_examples=100, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.filter_too_much])
 PIECES = (
@@ -62,7 +63,7 @@ def started(name: str, context: rclpy.Context) -> Node:
 def test_a_remap_rule_is_explained_if_and_only_if_rcl_refuses_it(rule: str) -> None:
     reason = refused([rule])
     assert (reason is not None) == rcl_refuses("-r", rule)
-    assert reason is None or all(reason)
+    assert reason is None or (reason.because and reason.hint)
 
 
 @QUICK
@@ -75,7 +76,7 @@ def test_a_parameter_rule_is_explained_if_and_only_if_rcl_refuses_it(name: str, 
     rule = f"{name}:={value}"
     reason = refused_parameter(["--ros-args", "-p", rule])
     assert (reason is not None) == rcl_refuses("-p", rule)
-    assert reason is None or all(reason)
+    assert reason is None or (reason.because and reason.hint)
 
 
 IN_CODE = ("camera/image_color", "camera", "status", "~/status", "/stop", "~/state/raw", "image")
@@ -114,7 +115,7 @@ def resolved(rules: Sequence[str], code: Sequence[str]) -> tuple[str, dict[str, 
 
 def followed(reason: Reason, rules: list[str], code: list[str], node: str) -> tuple[list[str], list[str]]:
     """The rules and the names in the code after what the reason advises."""
-    blamed = next(rule for rule in rules if f"The rule `{rule}` " in reason[0])
+    blamed = next(rule for rule in rules if f"The rule `{rule}` " in reason.because)
     rule, number = parse(blamed), rules.index(blamed)
     assert rule is not None
     scheme = {"topic": "rostopic://", "service": "rosservice://", "": ""}[rule.kind]
@@ -123,7 +124,7 @@ def followed(reason: Reason, rules: list[str], code: list[str], node: str) -> tu
     def instead(new: str) -> list[str]:
         return [*rules[:number], new, *rules[number + 1 :]]
 
-    match reason[1]:
+    match reason.code:
         case "rule-takes-name":
             left = full_name(rule.left, node)  # where several match the name, each is named in its turn
             again = [one.text for one in filter(None, map(parse, rules)) if full_name(one.left, node) == left]
@@ -133,15 +134,16 @@ def followed(reason: Reason, rules: list[str], code: list[str], node: str) -> tu
             matching = [other.text for other in same if full_name(other.left, node) == full_name(rule.left, node)]
             return [other for other in rules if other not in matching or other == blamed], code
         case "rules-do-not-chain":
-            maker = next(other for other in map(parse, rules) if other and f"`{other.text}` made it" in reason[0])
+            said = reason.because
+            maker = next(other for other in map(parse, rules) if other and f"`{other.text}` made it" in said)
             return [f"{maker.left}:={rule.right}", *rules], code
         case "rule-prefix":
             return instead(f"{own}:{scheme}{rule.left}:={rule.right}"), code
         case "rule-kind":
             return instead(f"{rule.left}:={rule.right}"), code
-        case "absolute-rule" if "its right side" in reason[0]:
+        case "absolute-rule" if "its right side" in reason.because:
             return instead(blamed.replace(":=/", ":=")), code
-        case "private-rule" if "its right side" in reason[0]:
+        case "private-rule" if "its right side" in reason.because:
             return instead(blamed.replace(":=~/", ":=")), code
         case "topic-name":
             return instead(blamed.replace(":=", ":=/")), code
@@ -173,13 +175,14 @@ def test_following_a_reasons_advice_makes_the_name_that_was_wanted(
             continue
         topics = {name: [node] for name in names.values()}
         reason = without_effect(given_rules, wanted, [node], topics, in_code if known else None)
-        if reason is None or (not known and reason[1] == "rule-takes-name"):  # which leaves two cases open
+        if reason is None or (not known and reason.code == "rule-takes-name"):  # which leaves two cases open
             continue
-        if reason[1] == "rule-without-match" and "swapped" in reason[0]:
+        if reason.code == "rule-without-match" and "swapped" in reason.because:
             assert known and wanted not in in_code
             continue
-        if reason[1] == "rule-without-match":
-            blamed = next(one for one in map(parse, rules) if one and f"The rule `{one.text}` changed" in reason[0])
+        if reason.code == "rule-without-match":
+            said = reason.because
+            blamed = next(one for one in map(parse, rules) if one and f"The rule `{one.text}` changed" in said)
             assert blamed.prefix in ("", node.rsplit("/", 1)[-1])
             assert all(full_name(name, node) != full_name(blamed.left, node) for name in code)
             continue

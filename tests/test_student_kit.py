@@ -12,6 +12,7 @@ import shutil
 import subprocess
 import sys
 import time
+import tomllib
 import urllib.error
 import urllib.request
 import zipfile
@@ -49,6 +50,12 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     with zipfile.ZipFile(io.BytesIO(found.pop(wheel))) as archive:
         found |= {f"{wheel}/{name}": archive.read(name) for name in archive.namelist()}
     return {name: content.decode("utf-8") for name, content in found.items()}
+
+
+def test_the_kit_says_which_section_of_the_lectures_explains_which_reason(files: dict[str, str]) -> None:
+    given = tomllib.loads(files[f"{NAME}/kit/course.toml"])
+    own = tomllib.loads((ROOT / "course.toml").read_text(encoding="utf-8"))
+    assert given["sections"] and given == own
 
 
 def cells(notebook: Path) -> list[str]:

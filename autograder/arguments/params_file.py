@@ -10,7 +10,10 @@ from pathlib import Path
 import yaml
 
 from autograder.arguments.remap_rules import LIBYAML
-from autograder.core.student_yaml import DEPTH, FILE_BYTES, StudentFileError, read
+from autograder.core.student_yaml import DEPTH, FILE_BYTES, NOT_YAML, RefusedHere, read
+from autograder.reasons import Group, Kind, Reason, Refused
+
+PARAMS_FILE = Kind("params-file", "the parameter file cannot be read as one", Group.FILES)
 
 _REFUSED = re.compile(
     r"parse params file: '--params-file (?P<file>[^']{1,300})'\. Error: (?P<what>.{0,400}?)"
@@ -35,7 +38,7 @@ _IN_WORDS = {
 """By rcl's words: what is wrong, and what to do."""
 
 
-def unreadable(words: Sequence[str], folder: Path) -> StudentFileError | None:
+def unreadable(words: Sequence[str], folder: Path) -> Refused | None:
     """Why a program cannot start with these words: the first of its parameter files that is no YAML at all.
 
     The program itself would only end with the parser's own words. What it might read after all is not decided here.
@@ -44,8 +47,8 @@ def unreadable(words: Sequence[str], folder: Path) -> StudentFileError | None:
         if option == "--params-file" and (folder / file).is_file():
             try:
                 read(folder / file)
-            except StudentFileError as error:
-                if error.code == "not-yaml" and not error.elsewhere:
+            except Refused as error:
+                if error.reason.kind is NOT_YAML and not isinstance(error, RefusedHere):
                     return error
     return None
 
@@ -116,8 +119,8 @@ def _sections(text: str) -> list[tuple[str, list[str]]]:
     return found
 
 
-def why_refused(error: str, folder: Path) -> tuple[str, str, str] | None:
-    """Why rcl could not read a parameter file, by what a program printed: a sentence, a short word, what to do."""
+def why_refused(error: str, folder: Path) -> Reason | None:
+    """Why rcl could not read a parameter file, by what a program printed."""
     match = _REFUSED.search(error)
     if match is None or not (folder / match["file"]).is_file():
         return None
@@ -126,7 +129,7 @@ def why_refused(error: str, folder: Path) -> tuple[str, str, str] | None:
         ((ours, what_to_do) for theirs, (ours, what_to_do) in _IN_WORDS.items() if theirs in match["what"]),
         (f"is refused by ROS 2: {match['what']}", "Look at the keys and the indentation there."),
     )
-    return f"`{match['file']}`{at} {words.format(what=match['what'].split(' ')[0])}.", "params-file", hint
+    return PARAMS_FILE(f"`{match['file']}`{at} {words.format(what=match['what'].split(' ')[0])}.", hint)
 
 
 def is_for(key: str, node: str) -> bool:

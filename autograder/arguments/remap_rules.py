@@ -17,9 +17,35 @@ from __future__ import annotations
 import itertools
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import yaml
+
+from autograder.reasons import Group, Kind, Reason
+
+RULE_FORM = Kind("rule-form", "a rule has no `:=`, or two of them", Group.RULES)
+PARAMETER_VALUE = Kind(
+    "parameter-value",
+    "the parameter has another value or type, or a value on the command line cannot be read",
+    Group.STATES,
+)
+NAME_FORM = Kind("name-form", "`~` stands where it means nothing, or the whole is no name", Group.RULES)
+NAMESPACE_WITHOUT_SLASH = Kind("namespace-without-slash", "the new namespace does not begin with a slash", Group.RULES)
+NAMESPACE_END = Kind("namespace-end", "the new namespace ends with a slash", Group.RULES)
+RULE_SPECIAL = Kind(
+    "rule-special", "`__node` or `__ns` is misspelt, or something else stands where these do", Group.RULES
+)
+RULE_SCHEME = Kind("rule-scheme", "`rostopic://` or `rosservice://` stands on the right side", Group.RULES)
+RULE_COLON = Kind("rule-colon", "what stands before a single `:` is no name of a node", Group.RULES)
+BEGINS_WITH_DIGIT = Kind("begins-with-digit", "a part of a name begins with a digit", Group.RULES)
+NAME_EMPTY = Kind("name-empty", "a side of the rule is empty", Group.RULES)
+NAME_SPACE = Kind("name-space", "a name holds a space", Group.RULES)
+WILDCARD = Kind("wildcard", "a rule has a `*`, which ROS 2 does not implement", Group.RULES)
+NAME_SLASH = Kind("name-slash", "a slash or a dot stands where no part of a name follows", Group.RULES)
+NAME_CHARACTERS = Kind("name-characters", "a name holds a character that names do not have", Group.RULES)
+DOUBLE_UNDERSCORE = Kind("double-underscore", "two underscores follow one another in a name", Group.RULES)
+RULE_KIND = Kind("rule-kind", "the rule is for names of another kind, or gives a parameter its value", Group.EFFECT)
+SLASH_IN_NODE_NAME = Kind("slash-in-node-name", "the new name of a node has a slash", Group.RULES)
 
 _BOOLS = {
     word for small in ("y", "yes", "true", "on", "n", "no", "false", "off")
@@ -89,9 +115,6 @@ def _integer(value: str) -> int:
     return int(value, 16 if "x" in value.lower() else 10)
 
 
-Reason = tuple[str, str, str]
-"""Why (a sentence), a short stable word for it, and what to do."""
-
 _LEXEMES = re.compile(
     r"(?P<scheme>rostopic://|rosservice://)|(?P<node>__node|__name)|(?P<ns>__ns)|(?P<private>~/)"
     r"|(?P<token>(?!__)(?=[A-Za-z_])(?:_?[A-Za-z0-9]+)*_?)|(?P<separator>:=)|(?P<colon>:)|(?P<slash>/)|(?P<dot>\.)"
@@ -148,12 +171,12 @@ def why_remap_refused(text: str) -> Reason | None:
     """Why rcl does not take a remap rule: at `rclpy.init`, or for its namespace when the node is made."""
     rule = parse(text)
     if rule is None:
-        return f"`{text}` is not a remap rule: it has no `:=`.", "rule-form", "A rule is `old:=new`."
+        return RULE_FORM(f"`{text}` is not a remap rule: it has no `:=`.", "A rule is `old:=new`.")
     ends_in_slash = rule.left == "__ns" and rule.right.endswith("/") and rule.right != "/"
     if _REMAP.fullmatch(_shape(text)) and not ends_in_slash:
         return None
-    because, code, hint = _of_node(rule) or _of_names(rule) or _of_form(rule)
-    return f"The rule `{text}` is refused, and the program ends at its start: {because}", code, hint
+    found = _of_node(rule) or _of_names(rule) or _of_form(rule)
+    return replace(found, because=f"The rule `{text}` is refused, and the program ends at its start: {found.because}")
 
 
 def _of_node(rule: Rule) -> Reason | None:
@@ -161,22 +184,20 @@ def _of_node(rule: Rule) -> Reason | None:
     right = rule.right
     if rule.left in ("__node", "__name"):
         if "/" in right:
-            return (
+            return SLASH_IN_NODE_NAME(
                 "a node name has no slash.",
-                "slash-in-node-name",
                 "The node's name and its namespace are two things: `__node:=name` and `__ns:=/namespace`.",
             )
         return _of_name(right, "the new name of the node")
     if rule.left != "__ns":
         return None
     if right and not right.startswith("/"):
-        return (
+        return NAMESPACE_WITHOUT_SLASH(
             "a namespace on the command line begins with a slash.",
-            "namespace-without-slash",
             f"Write `__ns:=/{right.lstrip('~/')}`." if right.lstrip("~/") else "Write `__ns:=/name`.",
         )
     if right.endswith("/") and right.strip("/"):
-        return "a namespace does not end with a slash.", "namespace-end", "Leave the last slash out."
+        return NAMESPACE_END("a namespace does not end with a slash.", "Leave the last slash out.")
     return _of_name(right, "the namespace")
 
 
@@ -185,28 +206,24 @@ def _of_names(rule: Rule) -> Reason | None:
     if not rule.renames_topics:
         return None
     if rule.left.lower() in ("__ns", "__node", "__name", "__namespace", "ns", "_ns", "_node") and "__" in rule.left:
-        return (
+        return RULE_SPECIAL(
             f"`{rule.left}` means nothing there: the node's name is given with `__node` and its namespace with `__ns`.",
-            "rule-special",
             "Write these words with two underscores and small letters.",
         )
     if rule.right.startswith(("rostopic://", "rosservice://")):
-        return (
+        return RULE_SCHEME(
             "`rostopic://` and `rosservice://` stand on the left side only.",
-            "rule-scheme",
             "Leave the word out on the right side.",
         )
     if ":" in rule.left:
         before = rule.left.rsplit(":", 1)[0]
-        return (
+        return RULE_COLON(
             f"a single `:` ends the name of the node that the rule is for, and `{before}` is no node's name there.",
-            "rule-colon",
             "Write one name of a node, without slash, then `:`, then the old name: `NODE:old:=new`.",
         )
     if re.fullmatch(r"[+-]?\d[\d.]*", rule.right):
-        return (
+        return BEGINS_WITH_DIGIT(
             "a number is no name, and `-r` gives a new name.",
-            "begins-with-digit",
             f"A parameter gets its value with `-p`: `-p {rule.text}`.",
         )
     return _of_name(rule.left, "the left side", left=True) or _of_name(rule.right, "the right side")
@@ -217,55 +234,49 @@ def _of_name(name: str, what: str, left: bool = False) -> Reason | None:
     bare = name[2:] if name.startswith("~/") else name.removeprefix("/")
     parts = bare.split("/")
     if not name:
-        return f"{what} is empty.", "name-empty", "A rule is `old:=new`, without spaces around `:=`."
+        return NAME_EMPTY(f"{what} is empty.", "A rule is `old:=new`, without spaces around `:=`.")
     if ":=" in name:
-        return (
+        return RULE_FORM(
             f"a second `:=` stands in {what}.",
-            "rule-form",
             "Every rule has its own `-r`: `-r old:=new -r old2:=new2`.",
         )
     if name.strip() != name or any(character.isspace() for character in name):
-        return f"{what} holds a space.", "name-space", "Write the rule as one word, without spaces around `:=`."
+        return NAME_SPACE(f"{what} holds a space.", "Write the rule as one word, without spaces around `:=`.")
     if left and "*" in name:
-        return "`*` is not implemented in remap rules.", "wildcard", "Write one rule for each name."
+        return WILDCARD("`*` is not implemented in remap rules.", "Write one rule for each name.")
     if re.search(r"\\[1-9]", name):
-        return (
+        return WILDCARD(
             "numbers with a backslash, which stand for what a `*` has matched, are not implemented.",
-            "wildcard",
             "Write one rule for each name.",
         )
     if name in ("~", "~/", "/"):
-        return f"{what} is `{name}`, which is no name of its own.", "name-form", "Write a name after it: `~/name`."
+        return NAME_FORM(f"{what} is `{name}`, which is no name of its own.", "Write a name after it: `~/name`.")
     if "~" in bare or (name.startswith("~") and not name.startswith("~/")):
-        return (
+        return NAME_FORM(
             f"in {what}, `~` does not stand at the beginning with a slash behind it.",
-            "name-form",
             "`~/name` is a name below the node's own; elsewhere `~` means nothing.",
         )
     if any(part == "" for part in parts):
         where = "ends with a slash" if name.endswith("/") and "//" not in name else "has two slashes in a row"
-        return f"{what} {where}.", "name-slash", "A slash stands between two parts of a name, and only there."
+        return NAME_SLASH(f"{what} {where}.", "A slash stands between two parts of a name, and only there.")
     return _of_parts(name, parts, what)
 
 
 def _of_parts(name: str, parts: list[str], what: str) -> Reason | None:
     if any(part[0].isdigit() for part in parts):
-        return (
+        return BEGINS_WITH_DIGIT(
             "no part of a name may begin with a digit.",
-            "begins-with-digit",
             "Put a word in front: `camera_2` instead of `2_camera`.",
         )
     strange = re.search(r"[^A-Za-z0-9_/~]", name)
     if strange:
-        return (
+        return NAME_CHARACTERS(
             f"`{name}` is not a name: `{strange[0]}` cannot stand in it.",
-            "name-characters",
             "Names have letters from a to z, digits and underscores, with slashes between their parts.",
         )
     if "__" in name:
-        return (
+        return DOUBLE_UNDERSCORE(
             f"in {what}, `{name}`, two underscores follow one another.",
-            "double-underscore",
             "Use single underscores. Two of them belong to `__node` and `__ns`.",
         )
     return None
@@ -276,7 +287,7 @@ def _of_form(rule: Rule) -> Reason:
         why = f"`{rule.left}` cannot stand before `:={rule.right}`."
     else:
         why = f"`{rule.left}` and `{rule.right}` do not make a rule."
-    return why, "rule-form", "A rule is `old:=new`, or `NODE:old:=new` for one node."
+    return RULE_FORM(why, "A rule is `old:=new`, or `NODE:old:=new` for one node.")
 
 
 def why_parameter_refused(text: str) -> Reason | None:
@@ -284,48 +295,45 @@ def why_parameter_refused(text: str) -> Reason | None:
     name, separator, value = text.partition(":=")
     said = f"The parameter rule `{text}` is refused, and the program ends at its start:"
     if not separator:
-        return f"`{text}` is not a parameter rule: it has no `:=`.", "rule-form", "A parameter rule is `name:=value`."
+        return RULE_FORM(f"`{text}` is not a parameter rule: it has no `:=`.", "A parameter rule is `name:=value`.")
     if not _PARAMETER.fullmatch(_shape(name)):
-        because, code, hint = _of_parameter(name)
-        return f"{said} {because}", code, hint
+        found = _of_parameter(name)
+        return replace(found, because=f"{said} {found.because}")
     wrong = why_value_refused(value)
     if wrong is None:
         return None
-    return (
+    return PARAMETER_VALUE(
         f"{said} {wrong}",
-        "parameter-value",
         "A value is a bool, a number, a text or a list such as `[1, 2]`, written as in YAML.",
     )
 
 
 def _of_parameter(name: str) -> Reason:
     if not name:
-        return "it has no name.", "name-empty", "A parameter rule is `name:=value`."
+        return NAME_EMPTY("it has no name.", "A parameter rule is `name:=value`.")
     if ":" in name and (name.startswith("/") or name.count(":") > 1):
-        return (
+        return RULE_COLON(
             "before the `:` stands the name of a node, without slashes.",
-            "rule-colon",
             "Leave the node out: the value is for every node of the process then. A parameter file can name one node.",
         )
     if "*" in name:
-        return "`*` is not implemented there.", "wildcard", "Write one rule for each parameter."
+        return WILDCARD("`*` is not implemented there.", "Write one rule for each parameter.")
     bare = name.rsplit(":", 1)[-1]
     if any(part == "" for part in bare.split(".")):
-        return "a part of the name is empty.", "name-slash", "A dot stands between two parts of a name."
+        return NAME_SLASH("a part of the name is empty.", "A dot stands between two parts of a name.")
     found = _of_parts(name, [part for part in re.split(r"[./]", bare) if part], "the name")
-    if found and found[1] == "begins-with-digit":
+    if found and found.kind is BEGINS_WITH_DIGIT:
         return found
     strange = re.search(r"[^A-Za-z0-9_./:]", name)
     if strange:
         what = "a space" if strange[0].isspace() else f"`{strange[0]}`"
-        return (
+        return NAME_CHARACTERS(
             f"{what} cannot stand in the name of a parameter on a command line.",
-            "name-characters",
             "Such names have letters from a to z, digits, underscores and dots.",
         )
     if name in ("__node", "__name", "__ns"):
-        return f"`{name}` is no parameter.", "rule-kind", f"Names are changed with `-r`: `-r {name}:=NEW`."
-    return f"`{name}` is not a name.", "name-form", "A parameter rule is `name:=value`."
+        return RULE_KIND(f"`{name}` is no parameter.", f"Names are changed with `-r`: `-r {name}:=NEW`.")
+    return NAME_FORM(f"`{name}` is not a name.", "A parameter rule is `name:=value`.")
 
 
 def rules_in(words: Sequence[str]) -> list[str]:

@@ -16,8 +16,23 @@ import itertools
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 
-from autograder.arguments.remap_rules import Reason, Rule, parse
+from autograder.arguments.remap_rules import RULE_KIND, Rule, parse
 from autograder.graph.names import nearest
+from autograder.reasons import Group, Kind, Reason
+
+RULE_WITHOUT_MATCH = Kind("rule-without-match", "no name in the code is the left side", Group.EFFECT)
+RULE_PREFIX = Kind("rule-prefix", "the rule is for a node whose name no node has", Group.EFFECT)
+RULES_DO_NOT_CHAIN = Kind("rules-do-not-chain", "the left side is a name that another rule made", Group.EFFECT)
+ABSOLUTE_RULE = Kind("absolute-rule", "one side of a rule is absolute, and the name lies in a namespace", Group.EFFECT)
+PRIVATE_RULE = Kind(
+    "private-rule", "one side of a rule is private to the node, and the other name is not", Group.EFFECT
+)
+ABSOLUTE_NAME = Kind("absolute-name", "the code gives a name with a leading slash, and the end is on that", Group.NAMES)
+TOPIC_NAME = Kind("topic-name", "the end is on a topic with a similar name", Group.NAMES)
+RULE_TAKES_NAME = Kind(
+    "rule-takes-name", "a rule renames the topic or node that already has the expected name", Group.EFFECT
+)
+RULE_ORDER = Kind("rule-order", "an earlier rule matches the same name", Group.EFFECT)
 
 
 @dataclass(frozen=True)
@@ -115,21 +130,18 @@ def _beside(case: _Case) -> Reason | None:
         return None
     said = f"The rule `{case.rule.text}` makes `{made}`:"
     if right.startswith("~/") and full_name(right[2:], case.node) == case.wanted:
-        return (
+        return PRIVATE_RULE(
             f"{said} its right side begins with `~`, so it is below the node's own name.",
-            "private-rule",
             "Write the right side (in a launch file, `to`) without `~/`: then it is below the namespace.",
         )
     if space and right.startswith("/") and full_name(right[1:], case.node) == case.wanted:
-        return (
+        return ABSOLUTE_RULE(
             f"{said} its right side begins with a slash, so it does not follow the namespace `{space}`.",
-            "absolute-rule",
             "Write the right side (in a launch file, `to`) without the leading slash: then it follows the namespace.",
         )
     if space and f"/{right}" == case.wanted:
-        return (
+        return TOPIC_NAME(
             f"{said} its right side does not begin with a slash, so it is below the namespace `{space}`.",
-            "topic-name",
             f"Begin it with a slash, `{case.wanted}`, or leave out what the namespace gives already.",
         )
     return None
@@ -143,24 +155,21 @@ def _away(case: _Case) -> Reason | None:
     if any(other is not rule for other in case.makes(right)):
         return None
     if case.given is None:
-        return (
+        return RULE_TAKES_NAME(
             f"The rule `{rule.text}` makes `{right}` of the name `{left}`: `{right}` is there, and `{left}` is not.",
-            "rule-takes-name",
             f"If the code gives the name `{left}`, leave the rule out. If it gives `{right}`, old and new are swapped: "
             f"`{rule.right}:={rule.left}`.",
         )
     if case.in_code(left):
-        return (
+        return RULE_TAKES_NAME(
             f"The rule `{rule.text}` took the name away: the code gives `{left}`, and the rule made `{right}` of it.",
-            "rule-takes-name",
             f"Leave the rule out, or give the right side (in a launch file, `to`) the name that is expected: `{left}`.",
         )
     if not case.in_code(right):
         return None
-    return (
+    return RULE_WITHOUT_MATCH(
         f"{case.said} nothing is called `{left}`, the name on its left side, and `{right}`, the one on its right, "
         "is there: old and new are swapped.",
-        "rule-without-match",
         f"The name in the code stands on the left (in a launch file, in `from`): `{rule.right}:={rule.left}`.",
     )
 
@@ -179,9 +188,8 @@ def _own_nodes(rules: Sequence[str], nodes: Sequence[str]) -> list[str]:
 def _other_kind(case: _Case) -> Reason | None:
     if not case.is_for(case.rule) or case.rule.kind != "service" or not case.in_code(case.left):
         return None
-    return (
+    return RULE_KIND(
         f"{case.said} `rosservice://` makes it a rule for services, and `{case.left}` is a topic.",
-        "rule-kind",
         "Leave `rosservice://` out: then the rule is for topics and services.",
     )
 
@@ -192,10 +200,9 @@ def _prefix(case: _Case) -> Reason | None:
         return None
     if not case.in_code(case.left):
         return None
-    return (
+    return RULE_PREFIX(
         f"{case.said} it is for a node named `{case.rule.prefix}`, and no node on the graph has that name "
         f"(the nodes are {', '.join(case.nodes)}).",
-        "rule-prefix",
         "The prefix of a rule is the name that the node has now, after `__node`, not the one in its code.",
     )
 
@@ -210,9 +217,8 @@ def _order(case: _Case) -> Reason | None:
             matched = case.makes(made) == [earlier] if case.given is None else case.in_code(case.left)
             if made not in case.used or not matched:
                 return None
-            return (
+            return RULE_ORDER(
                 f"{case.said} `{earlier.text}` stands before it and matches the same name, and the first rule wins.",
-                "rule-order",
                 "Only the first rule that matches a name counts.",
             )
     return None
@@ -224,10 +230,9 @@ def _chain(case: _Case) -> Reason | None:
     others = [rule for rule in case.makes(case.left) if rule is not case.rule and rule.kind != "service"]
     if not others or (case.given is not None and case.in_code(case.left)):
         return None
-    return (
+    return RULES_DO_NOT_CHAIN(
         f"{case.said} no entity has the name `{case.left}` in its code; `{others[0].text}` made it. Rules do not "
         "chain: what one rule makes is not looked at by the next.",
-        "rules-do-not-chain",
         "The left side is the name that the code gives. The first rule that matches it wins.",
     )
 
@@ -238,9 +243,8 @@ def _absolute_rule(case: _Case) -> Reason | None:
     here = full_name(case.rule.left.lstrip("/"), case.node)
     if not case.in_code(here):
         return None
-    return (
+    return ABSOLUTE_RULE(
         f"{case.said} its left side is the absolute name `{case.left}`, and the name is `{here}` here.",
-        "absolute-rule",
         "Write the left side without the leading slash: then it follows the namespace.",
     )
 
@@ -250,9 +254,8 @@ def _private_rule(case: _Case) -> Reason | None:
     private = f"{case.node}/{tail}"
     if not _idle(case) or case.rule.left.startswith("~") or not case.in_code(private):
         return None
-    return (
+    return PRIVATE_RULE(
         f"{case.said} `{case.left}` is not the name of the private topic `~/{tail}`; that is `{private}` here.",
-        "private-rule",
         f"Write `~/{tail}` on the left side: it follows the node's name.",
     )
 
@@ -261,9 +264,8 @@ def _absolute_name(case: _Case) -> Reason | None:
     fixed = f"/{case.rule.left}"
     if not _idle(case) or case.rule.left[:1] in ("/", "~") or fixed == case.left or not case.in_code(fixed):
         return None
-    return (
+    return ABSOLUTE_NAME(
         f"{case.said} the name in the code is absolute, `{fixed}`, and the rule looks for `{case.left}`.",
-        "absolute-name",
         "A name with a leading slash is absolute: no namespace reaches it. Write it without the slash.",
     )
 
@@ -272,10 +274,9 @@ def _no_match(case: _Case) -> Reason | None:
     if not _idle(case) or not case.used:
         return None
     close = nearest(case.left, [name for name in case.used if case.in_code(name)])
-    return (
+    return RULE_WITHOUT_MATCH(
         f"{case.said} nothing is called `{case.left}`, the name on its left side"
         + (f"; the nearest name is `{close}`." if close else "."),
-        "rule-without-match",
         "Compare the left side with the name in the code, letter by letter. ROS 2 does not warn about such a rule.",
     )
 
@@ -309,9 +310,8 @@ def node_without_effect(rules: Sequence[str], wanted: str, nodes: Sequence[str])
     space, _, base = wanted.rpartition("/")
     for rule in map(parse, rules):
         if rule and rule.renames_topics and rule.right == base:
-            return (
+            return RULE_KIND(
                 f"The rule `{rule.text}` renames topics and services, and no node.",
-                "rule-kind",
                 f"A node's name is given with `__node`: `-r __node:={base}`.",
             )
     names, spaces = {node.rpartition("/")[2] for node in nodes}, {node.rpartition("/")[0] for node in nodes}
@@ -320,24 +320,21 @@ def node_without_effect(rules: Sequence[str], wanted: str, nodes: Sequence[str])
             continue
         said = f"The rule `{rule.text}` changed nothing:"
         if rule.left in ("__node", "__name") and rule.prefix == base and rule.right in names:
-            return (
+            return RULE_TAKES_NAME(
                 f"The rule `{rule.text}` gives the node `{base}` the name `{rule.right}`: `{rule.right}` is there, and "
                 f"`{base}` is not.",
-                "rule-takes-name",
                 f"If the code calls the node `{base}`, leave the rule out. If it calls it `{rule.right}`, old and new "
                 f"are swapped: `{rule.right}:__node:={base}`.",
             )
         if rule.left in ("__node", "__name") and rule.right == base and base not in names:
-            return (
+            return RULE_PREFIX(
                 f"{said} no node is called `{rule.prefix}` in its code (the nodes are {', '.join(nodes)}).",
-                "rule-prefix",
                 "The prefix of a `__node` rule is the name that the code gives to the node's constructor.",
             )
         if rule.left == "__ns" and rule.right.rstrip("/") == space and space not in spaces:
-            return (
+            return RULE_PREFIX(
                 f"{said} it is for a node named `{rule.prefix}`, and no node on the graph has that name (the nodes are "
                 f"{', '.join(nodes)}).",
-                "rule-prefix",
                 "The prefix of a `__ns` rule is the name that the node has now, after `__node`.",
             )
     return None
@@ -353,9 +350,8 @@ def renames_nothing(parameter_rules: Sequence[str], wanted: str) -> Reason | Non
     for text in parameter_rules:
         value = text.partition(":=")[2].strip("'\"")
         if value and value in (wanted, wanted.removeprefix("/"), wanted.rpartition("/")[2]):
-            return (
+            return RULE_KIND(
                 f"`-p {text}` gives a parameter its first value; it renames nothing.",
-                "rule-kind",
                 "Names are changed with `-r`: `__node:=NEW` for a node, `__ns:=/NEW` for a namespace, `OLD:=NEW` for a "
                 "topic or service.",
             )

@@ -8,6 +8,7 @@ searched for both before it is given out.
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import shutil
@@ -15,13 +16,14 @@ import subprocess
 import sys
 import tempfile
 import zipfile
+from collections.abc import Sequence
 from pathlib import Path
 
 from autograder.authoring.secrets import leaks, secrets_of
 from autograder.core.errors import KitError
 from autograder.course.lab import lab_names
 from autograder.course.paths import CoursePaths
-from autograder.course.settings import SETTINGS_FILE, read_settings
+from autograder.course.settings import SETTINGS_FILE, CourseSettings, read_settings
 from autograder.setup.places import KIT_FOLDER, ROOT, STUDENT_LOCK
 
 NAME = "ros2-labs"
@@ -80,13 +82,12 @@ def write_kit(root: Path, book: Path | None, into: Path) -> Path:
         shutil.copytree(book, folder / "lectures", ignore=_NOT_OURS)
         for page in (folder / "lectures").glob("*.html"):
             page.write_text(_SLIDES.sub("", page.read_text(encoding="utf-8")), encoding="utf-8")
-    title = read_settings(root).title
-    listed = ", ".join(f'"{name}"' for name in names)
-    quoted = title.replace("\\", "\\\\").replace('"', '\\"')
-    (folder / KIT_FOLDER / SETTINGS_FILE).write_text(f'title = "{quoted}"\nlabs = [{listed}]\n', encoding="utf-8")
+    settings = read_settings(root)
+    (folder / KIT_FOLDER / SETTINGS_FILE).write_text(_settings_file(settings, names), encoding="utf-8")
     shutil.copy(lock, folder)
     wheel = build_wheel(folder / KIT_FOLDER)
-    values = {"WHEEL": wheel.name, "TITLE": title, "FIRST": names[0], "NAME": NAME, "BOOK": _BOOK_ROW if book else ""}
+    values = {"WHEEL": wheel.name, "TITLE": settings.title, "FIRST": names[0], "NAME": NAME}
+    values["BOOK"] = _BOOK_ROW if book else ""
     for template, where in _PLACES.items():
         text = (_TEMPLATES / template).read_text(encoding="utf-8")
         for word, value in values.items():
@@ -98,6 +99,21 @@ def write_kit(root: Path, book: Path | None, into: Path) -> Path:
         shutil.rmtree(folder)
         raise KitError("Students would get what they may not:\n  " + "\n  ".join(found[:10]), "Nothing was written.")
     return _zipped(folder)
+
+
+def _settings_file(settings: CourseSettings, names: Sequence[str]) -> str:
+    """What students get of `course.toml`: the title, these labs, and where the lectures explain what."""
+    lines = [f"title = {_toml(settings.title)}", f"labs = {_toml(list(names))}", "", "[lectures]"]
+    lines += [f"{_toml(name)} = {_toml(page)}" for name, page in settings.lectures.items()]
+    for lecture, titles in settings.sections.items():
+        lines += ["", f"[sections.{_toml(lecture)}]"]
+        lines += [f"{_toml(title)} = {_toml(codes)}" for title, codes in titles.items()]
+    return "\n".join(lines) + "\n"
+
+
+def _toml(value: str | list[str]) -> str:
+    """A text, or a list of texts, as TOML has them: as JSON has them."""
+    return json.dumps(value, ensure_ascii=False)
 
 
 def build_wheel(into: Path) -> Path:

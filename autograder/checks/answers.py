@@ -6,16 +6,23 @@ Each question is a part of its own: a wrong line costs that line's share of the 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 from autograder.checks import findings, outcomes, runtime
+from autograder.checks.command_line import UNANSWERED
 from autograder.checks.forms import NAME_OR_NONE, allowed, begins_with_slash, is_seal, misses, one_of, same, seal
 from autograder.checks.misuse import Misuse
 from autograder.checks.parts import part
 from autograder.checks.scoring import Score, score
 from autograder.core import student_yaml
 from autograder.core.results import Status
+from autograder.core.student_yaml import FILE_MISSING, NOT_YAML, YAML_REFUSED
 from autograder.graph.names import nearest
+from autograder.reasons import Group, Kind, Refused
+
+ANSWER_FORM = Kind("answer-form", "the answer is none of the allowed ones", Group.FILES)
+WRONG_ANSWER = Kind("wrong-answer", "the answer is of the right form, and is not what happens", Group.FILES)
 
 _LINES = "Write one line for each question: `question: answer`, with a space after the colon."
 
@@ -54,14 +61,13 @@ class Answers:
         here = runtime.current.front_end
         if here is not None and not here.has(self.file):
             because, hint = here.why_missing("file", self.file)
-            outcomes.failed(title, because=because, hint=hint, code="file-missing")
+            outcomes.failed(title, FILE_MISSING(because, hint))
         try:
             table = student_yaml.read(runtime.current.use(self.file), table=True)
-        except student_yaml.StudentFileError as error:
-            hint = error.hint or _LINES
-            outcomes.failed(title, because=error.because, hint=hint, code=error.code)
+        except Refused as error:
+            outcomes.failed(title, replace(error.reason, hint=error.reason.hint or _LINES))
         if not isinstance(table, dict) or not table:
-            outcomes.failed(title, because=_no_table(table), hint=_LINES, code="not-yaml")
+            outcomes.failed(title, NOT_YAML(_no_table(table), _LINES))
         self._table = {str(key).strip(): value for key, value in table.items()}
 
     def expect_filled(self, questions: Mapping[str, Sequence[Any]] | Sequence[str]) -> None:
@@ -85,14 +91,14 @@ class Answers:
         answer = self._table.get(question)
         form = self._forms.get(question, ())
         if isinstance(answer, student_yaml.Twice):
-            outcomes.failed(title, because=f"`{question}` {answer}.", code="yaml-refused")
+            outcomes.failed(title, YAML_REFUSED(f"`{question}` {answer}."))
         if answer is None or answer == "?":
             expected = one_of(form) if form else ""
             because = self._below(question) or f"`{question}` has no answer yet." + self._misspelt(question)
-            outcomes.failed(title, expected=expected, because=because, code="unanswered")
+            outcomes.failed(title, UNANSWERED(because), expected=expected)
         if form and not allowed(answer, form):
             because = f"`{question}` is `{_spelt(answer)}`{misses(answer, form)}."
-            outcomes.failed(title, expected=one_of(form), observed=_spelt(answer), because=because, code="answer-form")
+            outcomes.failed(title, ANSWER_FORM(because), expected=one_of(form), observed=_spelt(answer))
         return answer
 
     def _below(self, question: str) -> str:
@@ -144,13 +150,14 @@ class Answers:
             return
         if self._forms.get(question) is NAME_OR_NONE and not begins_with_slash(answer) and not same(answer, "none"):
             because = f"`{_spelt(answer)}` is neither a full name, which begins with `/`, nor `none`."
-            outcomes.failed(title, observed=_spelt(answer), because=because, code="answer-form")
+            outcomes.failed(title, ANSWER_FORM(because), observed=_spelt(answer))
         outcomes.failed(
             title,
+            WRONG_ANSWER(
+                f"`{_spelt(answer)}` is not what happens.",
+                hint or "Run the experiment again and look at what it prints.",
+            ),
             observed=_spelt(answer),
-            because=f"`{_spelt(answer)}` is not what happens.",
-            hint=hint or "Run the experiment again and look at what it prints.",
-            code="wrong-answer",
         )
 
     def score(self, points: float) -> Score:

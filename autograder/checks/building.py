@@ -5,19 +5,25 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager
+from dataclasses import replace
 from typing import NoReturn
 
 from autograder.checks import findings, outcomes, runtime
 from autograder.checks.parts import part
 from autograder.checks.scoring import Score, score
-from autograder.diagnosis import Diagnosis
 from autograder.graph.names import nearest
 from autograder.packages.built import Built
 from autograder.packages.executables import why_no_executable, why_other_target
-from autograder.packages.explain import needed_packages, not_described, why_not_built
+from autograder.packages.explain import PACKAGE_XML, needed_packages, not_described, why_not_built
 from autograder.packages.imports import imported_interfaces
 from autograder.packages.interfaces import InterfaceError, interface_parts
 from autograder.packages.workspace import missing_tools
+from autograder.reasons import Group, Kind, Reason
+
+PACKAGE_DEPEND = Kind("package-depend", "package.xml does not name a package that the programs need", Group.BUILT)
+NO_INTERFACE = Kind("no-interface", "the build installs no interface of this name", Group.BUILT)
+NOT_INSTALLED = Kind("not-installed", "the build installs no file at this place", Group.BUILT)
+INTERFACE_FIELDS = Kind("interface-fields", "the interface has other fields or types than asked for", Group.BUILT)
 
 _RECORDS = re.compile(r"(egg-info|dist-info|__pycache__|/colcon-core/|/hook/)|(^|/)package\.(d?sv|sh|ps1|bash|zsh)$")
 """Files that colcon, setuptools and Python write for themselves."""
@@ -165,10 +171,10 @@ class Package:
                 same = [other for other in sorted(built.files) if other.rsplit("/", 1)[-1] == path.rsplit("/", 1)[-1]]
                 because = f"The build installs no `{path}`."
                 because += f" A file of that name lies at `{same[0]}`." if same else ""
-                self._fail(title, Diagnosis(because, "not-installed"), hint)
+                self._fail(title, NOT_INSTALLED(because), hint)
             if _by_colcon_alone(path, built.log):
                 because = f"setup.py does not install `{path}`. colcon still does it in its place, and warns in its log"
-                self._fail(title, Diagnosis(f"{because} that it will not do so for long.", "not-installed"), hint)
+                self._fail(title, NOT_INSTALLED(f"{because} that it will not do so for long."), hint)
             outcomes.passed(title)
 
     def expect_interface(self, name: str, *parts: Mapping[str, str], hint: str = "") -> None:
@@ -194,17 +200,17 @@ class Package:
             has = [path for path in has if re.fullmatch(r"(msg/\w+\.msg|srv/\w+\.srv|action/\w+\.action)", path)]
             because = f"The package installs no interface `{name}`; it has: {', '.join(has) or 'none'}."
             near = "rosidl_generate_interfaces in CMakeLists.txt has to name each file."
-            self._fail(title, Diagnosis(because, "no-interface", near), hint)
+            self._fail(title, NO_INTERFACE(because, near), hint)
         try:
             found = interface_parts(self.name, name, installed)
         except InterfaceError as error:
-            self._fail(title, Diagnosis(str(error), "interface-fields"), hint)
+            self._fail(title, INTERFACE_FIELDS(str(error)), hint)
         for place, (wanted, have) in enumerate(zip(parts, found, strict=False)):
             wrong = _difference(wanted, have)
             if wrong:
                 names = {2: ("request", "response"), 3: ("goal", "result", "feedback")}.get(len(parts), ("",))
                 where = f"Its {names[place]}" if names[place] else f"`{name}`"
-                self._fail(title, Diagnosis(f"{where} {wrong}", "interface-fields"), hint)
+                self._fail(title, INTERFACE_FIELDS(f"{where} {wrong}"), hint)
         outcomes.passed(title)
 
     def _build(self) -> Built:
@@ -222,34 +228,34 @@ class Package:
                 return built
         self._fail(title, reason, hint)
 
-    def _fail(self, title: str, reason: Diagnosis, hint: str) -> NoReturn:
-        outcomes.failed(title, because=reason.because, hint=hint or reason.hint, code=reason.code)
+    def _fail(self, title: str, reason: Reason, hint: str) -> NoReturn:
+        outcomes.failed(title, replace(reason, hint=hint or reason.hint))
 
 
-def _not_named(package: str, when: str, named: Sequence[str], tag: str) -> Diagnosis:
+def _not_named(package: str, when: str, named: Sequence[str], tag: str) -> Reason:
     """A package that package.xml lacks: when it is needed, what is named for that, and the tag that names it."""
     because = f"package.xml does not name `{package}` as needed {when} For that it names: "
     because += f"{', '.join(f'`{one}`' for one in named) or 'none'}."
-    return Diagnosis(because, "package-depend", f"It needs `<{tag}>{package}</{tag}>`.")
+    return PACKAGE_DEPEND(because, f"It needs `<{tag}>{package}</{tag}>`.")
 
 
-def missing_package(name: str) -> Diagnosis | None:
+def missing_package(name: str) -> Reason | None:
     """Why a package cannot be built at all; None if it can be tried."""
     if runtime.current.workspace.source(name).is_dir():
         return None
     first = f"%%file src/{name}/package.xml"
     because = f"There is no package `{name}`: no cell that begins with `{first}` or the like has been run."
-    return Diagnosis(because, "package-xml", "Run the cells of the package first.")
+    return PACKAGE_XML(because, "Run the cells of the package first.")
 
 
-def why_no_package(name: str) -> Diagnosis | None:
+def why_no_package(name: str) -> Reason | None:
     """Build a package; None if that went well, or why not."""
     runtime.current.use_package(name)
     space = runtime.current.workspace
     return missing_package(name) or why_not_built(space.build(name), space.source(name))
 
 
-def why_not_found(package: str, name: str) -> Diagnosis | None:
+def why_not_found(package: str, name: str) -> Reason | None:
     """Why a package that is built has no executable of a name; None if it has."""
     return why_no_executable(runtime.current.workspace.build(package), name)
 

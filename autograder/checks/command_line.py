@@ -5,11 +5,16 @@ from __future__ import annotations
 import itertools
 import shlex
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from autograder.checks import runtime
 from autograder.core import student_yaml
+from autograder.core.student_yaml import YAML_REFUSED
 from autograder.graph.names import nearest
+from autograder.reasons import Group, Kind, Refused
+
+UNANSWERED = Kind("unanswered", "the line is missing, empty or still `?`", Group.FILES)
+COMMAND_LINE = Kind("command-line", "the words are no list of ROS arguments", Group.FILES)
 
 _WITH_A_WORD = {
     "-r", "--remap", "-p", "--param", "--params-file", "-e", "--enclave",
@@ -17,15 +22,6 @@ _WITH_A_WORD = {
 }  # fmt: skip
 _ALONE = {f"--{how}-{which}-logs" for how in ("enable", "disable") for which in ("rosout", "stdout", "external-lib")}
 _LONGEST = 2000
-
-
-class CommandLineError(Exception):
-    """The words cannot be used; `because`, a short `code` and a `hint` for the student."""
-
-    def __init__(self, because: str, code: str, hint: str = "") -> None:
-        """Keep the parts."""
-        super().__init__(because)
-        self.because, self.code, self.hint = because, code, hint
 
 
 @dataclass(frozen=True)
@@ -43,32 +39,34 @@ class CommandLine:
         """The words after `--ros-args`.
 
         Raises:
-            CommandLineError: there is no such entry, or it holds something else than ROS arguments.
+            Refused: there is no such entry, or it holds something else than ROS arguments.
         """
         text = self._text()
         example = f"`{self.entry}: -r camera:=front_camera`"
         try:
             given = shlex.split(text)
         except ValueError as error:
-            raise CommandLineError(f"`{self.entry}` in `{self.file}`: {error}.", "command-line") from None
+            raise Refused(COMMAND_LINE(f"`{self.entry}` in `{self.file}`: {error}.")) from None
         words = _ros_arguments(given)
         if not words:
-            raise CommandLineError(f"`{self.entry}` in `{self.file}` has no words.", "unanswered", f"Write {example}.")
+            raise Refused(UNANSWERED(f"`{self.entry}` in `{self.file}` has no words.", f"Write {example}."))
         option = ""  # the one that the next word belongs to
         for before, word in itertools.pairwise(["", *words]):
             if (word in _WITH_A_WORD or word in _ALONE) == bool(option):
-                raise CommandLineError(
-                    f"`{self.entry}` in `{self.file}` is not a list of ROS arguments: `{word}` is not expected there.",
-                    "command-line",
-                    "There is no space beside `:=`."
-                    if before.endswith(":=") or word.startswith(":=")
-                    else "Leave out `ros2 run` and all that stands before the words after `--ros-args`."
-                    if "ros2" in given or "--ros-args" in given
-                    else f"Every rule has its own `-r`, every parameter its own `-p`: {example}.",
+                raise Refused(
+                    COMMAND_LINE(
+                        f"`{self.entry}` in `{self.file}` is not a list of ROS arguments: `{word}` is not expected"
+                        " there.",
+                        "There is no space beside `:=`."
+                        if before.endswith(":=") or word.startswith(":=")
+                        else "Leave out `ros2 run` and all that stands before the words after `--ros-args`."
+                        if "ros2" in given or "--ros-args" in given
+                        else f"Every rule has its own `-r`, every parameter its own `-p`: {example}.",
+                    )
                 )
             option = "" if option or word in _ALONE else word
         if option:
-            raise CommandLineError(f"`{self.entry}` in `{self.file}` ends with `{words[-1]}`.", "command-line")
+            raise Refused(COMMAND_LINE(f"`{self.entry}` in `{self.file}` ends with `{words[-1]}`."))
         return [*self._kept(words), *self.then]
 
     def _kept(self, words: list[str]) -> list[str]:
@@ -80,23 +78,25 @@ class CommandLine:
     def _text(self) -> str:
         try:
             table = student_yaml.read(runtime.current.use(self.file), table=True)
-        except student_yaml.StudentFileError as error:
-            raise CommandLineError(error.because, error.code, error.hint or "Write `entry: words`.") from None
+        except Refused as error:
+            raise Refused(replace(error.reason, hint=error.reason.hint or "Write `entry: words`.")) from None
         text = table.get(self.entry) if isinstance(table, dict) else None
         if text is None or text == "?":
             near = nearest(self.entry, map(str, table)) if isinstance(table, dict) and text is None else None
-            raise CommandLineError(
-                f"`{self.entry}` in `{self.file}` has no answer yet."
-                + (f" `{near[:60]}` is there; did you mean `{self.entry}`?" if near else ""),
-                "unanswered",
+            raise Refused(
+                UNANSWERED(
+                    f"`{self.entry}` in `{self.file}` has no answer yet."
+                    + (f" `{near[:60]}` is there; did you mean `{self.entry}`?" if near else ""),
+                )
             )
         if isinstance(text, student_yaml.Twice):
-            raise CommandLineError(f"`{self.entry}` in `{self.file}` {text}.", "yaml-refused")
+            raise Refused(YAML_REFUSED(f"`{self.entry}` in `{self.file}` {text}."))
         if not isinstance(text, str) or len(text) > _LONGEST:
-            raise CommandLineError(
-                f"`{self.entry}` in `{self.file}` is not a command line.",
-                "command-line",
-                "Write the words in one line, as you would type them, without brackets and commas.",
+            raise Refused(
+                COMMAND_LINE(
+                    f"`{self.entry}` in `{self.file}` is not a command line.",
+                    "Write the words in one line, as you would type them, without brackets and commas.",
+                )
             )
         return text
 

@@ -34,11 +34,11 @@ from autograder.checks.try_out import Log, log_of, try_out
 from autograder.checks.waiting import NotLaunchedError, watched
 from autograder.core.front_end import Watcher
 from autograder.core.processes import no_threads
-from autograder.diagnosis import Diagnosis
 from autograder.graph.domains import claim_domain
 from autograder.graph.observer import ForgedGraph, Observer
-from autograder.launch_files import LaunchFileError, remove_written
+from autograder.launch_files import remove_written
 from autograder.packages.workspace import INSTALLED
+from autograder.reasons import Reason, Refused
 from autograder.sandbox.environment import profile_environment, remove_logs
 from autograder.sandbox.group import ProgramGroup
 
@@ -132,8 +132,8 @@ class Launch(
             try:
                 self._running.described = self._file.nodes()
                 self._running.unused_arguments = self._file.unused
-            except LaunchFileError as error:  # which every expectation then tells
-                self._running.trouble.append(Diagnosis(str(error), "launch-file", error.hint))
+            except Refused as error:  # which every expectation then tells
+                self._running.trouble.append(error.reason)
         for launched in self._running.described:
             self._start(launched)
 
@@ -185,7 +185,7 @@ class Launch(
             self._miss(launched.program)
             return
         words = words_of(launched)
-        if isinstance(words, Diagnosis):
+        if isinstance(words, Reason):
             self._running.trouble.append(words)
             return
         environment = {"ROS_DOMAIN_ID": str(self._observer.domain_id), **launched.environment, **profile_environment()}

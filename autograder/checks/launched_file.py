@@ -35,7 +35,7 @@ class LaunchedFile:
         """What the file starts.
 
         Raises:
-            LaunchFileError: it cannot be read.
+            Refused: it cannot be read.
         """
         built, home = self._built(), runtime.current.folder.resolve()
         folder = self._folder()

@@ -19,9 +19,23 @@ from autograder.core.picture import Picture
 from autograder.core.results import Outcome, Status
 from autograder.course.cells import MORE_AT_GRADING, hidden_lines
 from autograder.graph.observer import ForgedGraph
+from autograder.reasons import Group, Kind, Reason
+
+FAILED = Kind("failed", "an expectation does not hold; nothing more is known", Group.OUTPUT)
+GRADER = Kind("grader", "the check itself broke; no points are taken, and an instructor decides", Group.GRADER)
+FORGED_GRAPH = Kind(
+    "forged-graph",
+    "what is on the ROS graph cannot be read, which no program made with rclpy brings about",
+    Group.GRADER,
+)
+UNUSABLE_DATA = Kind(
+    "unusable-data",
+    "the check broke, and the programs had sent what no check can use: a NaN, a stamp below 0 s,"
+    " or an extremely long text or list",
+    Group.OUTPUT,
+)
 
 _PACKAGE = str(Path(__file__).resolve().parent.parent)
-
 
 _NOT_CELLS = (_PACKAGE, sys.prefix, sys.base_prefix, "<frozen", "<string>")
 """How the names of files begin that are the kit's, an installed package's, the standard library's or generated."""
@@ -60,7 +74,7 @@ def ends_block(error: BaseException | None, ran: bool = False) -> bool:
         return True
     if isinstance(error, ForgedGraph):
         with contextlib.suppress(LaunchEnded):
-            failed_as_a_whole("The ROS graph can be read", because=_FORGED, code="forged-graph")
+            failed_as_a_whole("The ROS graph can be read", FORGED_GRAPH(_FORGED))
         return True
     if isinstance(error, KitError):  # such as a machine without a compiler
         if ran or runtime.current.block is not None:  # what the student wrote may have brought it about
@@ -69,7 +83,7 @@ def ends_block(error: BaseException | None, ran: bool = False) -> bool:
         return True
     if because := unusable.reason(error):
         _flag(error)
-        _record(_failure(_USABLE, because=because, code="unusable-data"))
+        _record(_failure(_USABLE, UNUSABLE_DATA(because)))
         _void_parts()
         return True
     if runtime.current.front_end is not None or not isinstance(error, Exception):
@@ -85,7 +99,7 @@ def ends_part(error: Exception) -> bool:
     because = unusable.reason(error)
     if because:
         _flag(error)
-        _record(_failure(_USABLE, because=because, code="unusable-data"))
+        _record(_failure(_USABLE, UNUSABLE_DATA(because)))
     return bool(because)
 
 
@@ -128,12 +142,10 @@ def _cut(text: str) -> str:
 
 def failed(
     title: str,
+    reason: Reason,
     *,
     expected: str = "",
     observed: str = "",
-    because: str = "",
-    hint: str = "",
-    code: str = "",
     picture: Picture | None = None,
 ) -> NoReturn:
     """Record that an expectation does not hold, and end the block: the part, or the whole launch outside of any.
@@ -141,7 +153,7 @@ def failed(
     Raises:
         CheckEnded: always.
     """
-    _record(_failure(title, expected, observed, because, hint, code).model_copy(update={"picture": picture}))
+    _record(_failure(title, reason, expected, observed).model_copy(update={"picture": picture}))
     _rest_not_checked()
     if findings.current.part:
         raise CheckEnded(title)
@@ -157,12 +169,10 @@ def _void_parts(standing: Collection[str] = ()) -> None:
 
 def failed_as_a_whole(
     title: str,
+    reason: Reason,
     *,
     expected: str = "",
     observed: str = "",
-    because: str = "",
-    hint: str = "",
-    code: str = "",
     standing: Collection[str] = (),
 ) -> NoReturn:
     """As `failed`, in place of all that the launch has found out but for the parts in `standing`: the rest is void.
@@ -175,16 +185,14 @@ def failed_as_a_whole(
     found = current.outcomes[current.block_began :]
     current.outcomes[current.block_began :] = [outcome for outcome in found if outcome.part in standing]
     current.part = ""
-    _record(_failure(title, expected, observed, because, hint, code))
+    _record(_failure(title, reason, expected, observed))
     _rest_not_checked(whole=True, standing=standing)
     _void_parts(standing)
     raise LaunchEnded(title)
 
 
-def _failure(
-    title: str, expected: str = "", observed: str = "", because: str = "", hint: str = "", code: str = ""
-) -> Outcome:
-    return worded(Status.FAILED, title, expected, observed, because, hint, code=code or "failed")
+def _failure(title: str, reason: Reason, expected: str = "", observed: str = "") -> Outcome:
+    return worded(Status.FAILED, title, expected, observed, reason.because, reason.hint, reason.kind.code)
 
 
 def unknown(title: str, because: str) -> None:
@@ -194,7 +202,7 @@ def unknown(title: str, because: str) -> None:
     """
     frame = _check_frame()
     hidden = frame is not None and bool(hidden_lines(_lines(frame)))
-    _record(worded(Status.UNKNOWN, code="grader", hidden=hidden, title=title, because=because))
+    _record(worded(Status.UNKNOWN, code=GRADER.code, hidden=hidden, title=title, because=because))
 
 
 def _record(outcome: Outcome) -> None:

@@ -9,8 +9,9 @@ from autograder.checks import runtime
 from autograder.checks.program import Program
 from autograder.checks.settling import Settling
 from autograder.core.results import NodeLog
-from autograder.diagnosis import Diagnosis, Scene
+from autograder.diagnosis import Scene
 from autograder.graph.observer import Observer
+from autograder.reasons import Reason
 from autograder.sandbox.running_program import RunningProgram
 
 SETTLE = 2.0
@@ -36,7 +37,7 @@ class Running:
         """What has been started."""
         self.missing: list[str] = []
         """Programs that no cell has written."""
-        self.trouble: list[Diagnosis] = []
+        self.trouble: list[Reason] = []
         """Why a program, or the whole launch file, could not be started."""
         self.unused_arguments: Callable[[], list[str]] = list
         """Tells the arguments of the launch that its launch file does not have."""

@@ -1,4 +1,4 @@
-"""What a launch shows of itself, as the pictures want it, and which picture explains which reason."""
+"""What a launch shows of itself, as the pictures want it, and the picture that explains a reason."""
 
 from __future__ import annotations
 
@@ -13,23 +13,12 @@ from autograder.graph.names import node_of
 from autograder.graph.observer import Observer
 from autograder.graph.qos import describe, mismatch_between
 from autograder.pictures import Endpoint, Picture, Run, Runs, Traffic
+from autograder.reasons import Reason
 from autograder.sandbox.inside.probe.events import Ran, Thing
 
 _OF_EVERY_NODE = ("/rosout", "/parameter_events")
 _MOST = 60
 """Nodes, and ends of topics, of one picture."""
-
-BY_TIMELINE = frozenset(
-    {
-        *("single-threaded-executor", "few-threads", "machine-threads"),
-        *("no-callback-groups", "one-group", "exclusive-group", "timer-same-group"),
-        "group-limit",
-        *("starved", "paused", "overlap", "no-overlap", "period", "too-few-runs"),
-    }
-)
-"""Codes of reasons that a timeline shows."""
-BY_QOS = frozenset({"qos-reliability", "qos-durability", "qos-deadline", "qos-liveliness", "qos-lease"})
-"""Codes of reasons that a table of pairs shows."""
 
 
 @dataclass(frozen=True)
@@ -139,21 +128,21 @@ def traffic(insides: Sequence[Inside], topic: str) -> list[Traffic]:
     return rows["publisher"] + rows["subscription"]
 
 
-def explaining(code: str, text: str, observer: Observer, insides: Sequence[Inside]) -> Picture | None:
+def explaining(reason: Reason, title: str, observer: Observer, insides: Sequence[Inside]) -> Picture | None:
     """The picture that shows why an expectation failed; None where none does.
 
     Args:
-        code: of the reason.
-        text: the expectation and the reason in words; a topic's name in it is the one that is meant.
+        reason: why; a topic's name in it is the one that is meant.
+        title: the expectation in words, which may name the topic as well.
         observer: of the launch.
         insides: of its programs.
     """
-    if code in BY_TIMELINE:
+    if reason.kind.picture == "timeline":
         found = runs(insides)
         return pictures.timeline(found) if found else None
-    if code in BY_QOS:
+    if reason.kind.picture == "qos":
         on_graph = graph(observer).endpoints
-        for name in re.findall(r"`(/[^`\s]*)`", text):
+        for name in re.findall(r"`(/[^`\s]*)`", f"{title} {reason.because}"):
             ends = [end for end in on_graph if end.topic == name]
             pairs = [(one, other) for one in ends if one.publishes for other in ends if not other.publishes]
             if any(mismatch(*pair) for pair in pairs):  # the other end may be the check's own, which is not shown

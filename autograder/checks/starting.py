@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from autograder.arguments import params_file, remap_rules
+from autograder.arguments.params_file import PARAMS_FILE
 from autograder.checks import runtime
-from autograder.checks.command_line import CommandLineError
 from autograder.checks.program import Program
 from autograder.checks.waiting import NotLaunchedError
-from autograder.diagnosis import Diagnosis
+from autograder.diagnosis.programs import PROGRAM_MISSING
 from autograder.packages.workspace import INSTALLED
+from autograder.reasons import Reason, Refused
 
 
 def file_of(node: Program) -> str:
@@ -20,32 +21,32 @@ def file_of(node: Program) -> str:
     return f"{node.program}.py"
 
 
-def words_of(node: Program) -> list[str] | Diagnosis:
+def words_of(node: Program) -> list[str] | Reason:
     """The words that a program is started with, or why it would not start with them."""
     try:
         words = node.arguments()
-    except CommandLineError as error:
-        return Diagnosis(error.because, error.code, error.hint)
+    except Refused as error:
+        return error.reason
     return refused_words(words) or words
 
 
-def refused_words(words: Sequence[str]) -> Diagnosis | None:
+def refused_words(words: Sequence[str]) -> Reason | None:
     """Why a program would not start with these words; None if it would."""
     refused = remap_rules.refused_parameter(words)
     if refused:
-        return Diagnosis(*refused)
+        return refused
     unreadable = params_file.unreadable(words, runtime.current.folder)
     if unreadable is not None:
         hint = "Look at the indentation there, and at brackets and quotation marks."
-        return Diagnosis(unreadable.because, "params-file", hint)
+        return PARAMS_FILE(unreadable.reason.because, hint)
     return None
 
 
-def why_missing(program: str) -> Diagnosis:
+def why_missing(program: str) -> Reason:
     """Why no cell has written a program."""
     here = runtime.current.front_end
     because, hint = here.why_missing("node", program) if here is not None else (f"There is no `{program}`.", "")
-    return Diagnosis(because, "program-missing", hint)
+    return PROGRAM_MISSING(because, hint)
 
 
 def refuse_to_start(programs: Sequence[Program]) -> None:
@@ -58,5 +59,5 @@ def refuse_to_start(programs: Sequence[Program]) -> None:
         if not node.package and not runtime.current.has(file_of(node)):
             raise NotLaunchedError(why_missing(node.program))
         words = words_of(node)
-        if isinstance(words, Diagnosis):
+        if isinstance(words, Reason):
             raise NotLaunchedError(words)

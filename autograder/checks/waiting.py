@@ -6,7 +6,7 @@ import functools
 from typing import Any
 
 from autograder.checks.misuse import refuse_times
-from autograder.diagnosis import Diagnosis
+from autograder.reasons import Reason
 
 _WAITS_FOR = {
     "expect_node": "the node `{}`",
@@ -56,7 +56,7 @@ _WAITS_FOR = {
 class NotLaunchedError(Exception):
     """What a cell launches is not there, or cannot be used. In a notebook it reads as a sentence."""
 
-    def __init__(self, reason: Diagnosis) -> None:
+    def __init__(self, reason: Reason) -> None:
         """Keep what to say."""
         super().__init__(f"{reason.because} {reason.hint}")
 

@@ -17,6 +17,7 @@ from autograder.core.results import Isolation  # its values stand in the command
 
 if TYPE_CHECKING:
     from autograder.core.results import SubmissionResult
+    from autograder.course.book import Book
     from autograder.course.lab import Lab
     from autograder.grading.runner import Settings
     from autograder.report.audience import Audience
@@ -54,11 +55,13 @@ def check(
     """
     if not notebook.is_file():
         raise KitError(f"There is no notebook {notebook}.", "Name an .ipynb file.")
+    from autograder.course.book import read_book
     from autograder.course.folder import trusted_course
     from autograder.grading.runner import Settings
     from autograder.submission.reader import lab_of
 
-    found = lab_of(notebook, lab, trusted_course(course))
+    root = trusted_course(course)
+    found, book = lab_of(notebook, lab, root), read_book(root)
     if found.notebook.resolve() == notebook.resolve():
         note = "This notebook is the course's own copy of the lab, so the checks in this notebook are run."
         print(f"note: {note}", file=sys.stderr)
@@ -66,7 +69,7 @@ def check(
     audience: Audience = "instructor" if instructor else "student"
     while True:
         saved = signature(notebook)
-        result = checked(notebook, found, settings, None if as_json else audience)
+        result = checked(notebook, found, settings, book, None if as_json else audience)
         if junit is not None:
             from autograder.core.files import write_beside
             from autograder.report.export.junit import junit_xml
@@ -106,20 +109,23 @@ def isolation_for(wanted: Isolation | None) -> Isolation:
     return found
 
 
-def checked(notebook: Path, lab: Lab, settings: Settings, audience: Audience | None = None) -> SubmissionResult:
+def checked(
+    notebook: Path, lab: Lab, settings: Settings, book: Book, audience: Audience | None = None
+) -> SubmissionResult:
     """Run the checks on a notebook, and say meanwhile on a terminal what is waited for.
 
     Args:
         notebook: to check.
         lab: that it answers.
         settings: how to run it.
+        book: the course's lectures, to which the report points.
         audience: for whom the report is printed, each verdict as soon as it is there; None prints none.
     """
     from autograder.grading.runner import WORKERS_FOR_ONE, run_submission
     from autograder.report.growing import GrowingReport
 
     student = notebook.parent.resolve().name
-    with GrowingReport([check.grade_id for check in lab.checks], audience) as report:
+    with GrowingReport([check.grade_id for check in lab.checks], audience, book) as report:
         result = run_submission(notebook, student, lab, settings, workers=WORKERS_FOR_ONE, follower=report)
         report.finish(result)
     return result

@@ -26,23 +26,24 @@ def explain(
 
     To get the messages, the check is run once more, with the same values.
     """
+    from autograder.course.book import read_book
     from autograder.course.folder import course_root
     from autograder.course.paths import CoursePaths
     from autograder.report.terminal import console, evidence_view, submission_view
 
     root = course_root(course)
-    result = _result(root, student, lab)
+    result, book = _result(root, student, lab), read_book(root)
     folder = CoursePaths(root).explained / result.lab / student
     screen = console()
     if not check:
-        screen.print(submission_view(result, "instructor"))
+        screen.print(submission_view(result, "instructor", book))
         for path in _pictures(result.checks, folder):
             print(path)
         screen.print("To see all evidence and messages of a check, name the check, such as: ", end="")
         screen.print(f"autograder explain {student} 1 --lab {result.lab}", markup=False)
         return
     chosen = _chosen(result, check)
-    screen.print(evidence_view(chosen))
+    screen.print(evidence_view(chosen, book))
     for path in _pictures([chosen], folder):
         print(path)
     _messages(root, result, chosen, folder / _name(chosen))

@@ -77,14 +77,16 @@ def submit(
 def _checks(packed: Path, lab: str, isolation: Isolation | None, course: Path | None, gap: bool) -> str:
     """Run the visible checks on what is handed in, show a line for each, and return the points in words."""
     from autograder.cli.check import checked, isolation_for
+    from autograder.course.book import read_book
     from autograder.course.folder import trusted_course
     from autograder.course.lab import load_lab
     from autograder.grading.runner import Settings
     from autograder.report.terminal import console, summary_view
     from autograder.report.words import total
 
-    found = load_lab(trusted_course(course), lab)
-    result = checked(packed, found, Settings(isolation=isolation_for(isolation)))
+    root = trusted_course(course)
+    found = load_lab(root, lab)
+    result = checked(packed, found, Settings(isolation=isolation_for(isolation)), read_book(root))
     if gap:
         console().print()
     console().print(summary_view(result))

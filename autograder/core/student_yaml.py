@@ -2,8 +2,8 @@
 
 What it accepts is what `yaml.safe_load` makes of plain YAML. Every tag beyond the plain types, and everything too large
 or too deep is refused, where what an alias stands for counts as if it were written out; and whatever is wrong with a
-text becomes one `StudentFileError`, a sentence with the line as the notebook shows it. In a table of answers a line
-that stands twice is no reason to refuse the others.
+text becomes one `Refused`, whose sentence and place name the line as the notebook shows it. In a table of answers a
+line that stands twice is no reason to refuse the others.
 """
 
 from __future__ import annotations
@@ -14,6 +14,19 @@ from pathlib import Path
 from typing import Any
 
 import yaml
+
+from autograder.reasons import Group, Kind, Refused
+
+NOT_YAML = Kind(
+    "not-yaml", "the file is not YAML, or is a list or one text where lines `name: value` belong", Group.FILES
+)
+YAML_REFUSED = Kind(
+    "yaml-refused",
+    "the YAML uses an anchor, a tag, a repeated key, or too many or too deeply nested values",
+    Group.FILES,
+)
+FILE_MISSING = Kind("file-missing", "no cell has written this file", Group.FILES)
+FILE_TOO_LARGE = Kind("file-too-large", "the file is larger than an answer cell may be", Group.FILES)
 
 FILE_BYTES = 64 * 1024
 """The largest file that is read, in bytes of UTF-8: as large as an answer cell may be."""
@@ -55,19 +68,8 @@ _PROBLEMS = {
 }
 
 
-class StudentFileError(Exception):
-    """A student's file cannot be used; the message is a sentence for the student, with the line where it is known."""
-
-    def __init__(
-        self, because: str, code: str = "not-yaml", line: int | None = None, hint: str = "", elsewhere: bool = False
-    ) -> None:
-        """Keep the sentence, a short code, the line as the notebook counts it in the cell, and what to do.
-
-        The codes: `not-yaml`; `yaml-refused`, which is YAML; `file-missing` and `file-too-large`. `elsewhere` is
-        whether another reader may take it for YAML, as the one of ROS 2 takes a tab between words.
-        """
-        super().__init__(because)
-        self.because, self.code, self.line, self.hint, self.elsewhere = because, code, line, hint, elsewhere
+class RefusedHere(Refused):
+    """What PyYAML does not take for YAML, and ROS 2 may, which reads with libyaml: a tab between words, for example."""
 
 
 @dataclass(frozen=True)
@@ -103,10 +105,10 @@ def load(text: str, name: str = "the file", table: bool = False, written: bool =
         written: whether each mapping is a `Written`.
 
     Raises:
-        StudentFileError: it is not YAML, or not plain enough. Nothing else is ever raised.
+        Refused: it is not YAML, or not plain enough. Nothing else is ever raised.
     """
     if len(text) > FILE_BYTES or len(text.encode("utf-8", "replace")) > FILE_BYTES:
-        raise StudentFileError(f"{name} is larger than {FILE_BYTES // 1024} KiB.", "file-too-large")
+        raise Refused(FILE_TOO_LARGE(f"{name} is larger than {FILE_BYTES // 1024} KiB."))
     try:
         loader = _Loader(text, table, written)
         try:
@@ -114,14 +116,15 @@ def load(text: str, name: str = "the file", table: bool = False, written: bool =
         finally:
             loader.dispose()
     except _RefusedError as refused:
-        raise _error(text, name, refused.index, f": {refused}", "yaml-refused") from None
+        raise _error(text, name, refused.index, f": {refused}", YAML_REFUSED) from None
     except yaml.MarkedYAMLError as error:
         problem = error.problem or error.context or ""
         # Of what is never closed, and of a key without its colon, the beginning helps: the end is noticed lines later.
         begun = "end of stream" in problem or "could not find expected ':'" in problem
         mark = (error.context_mark if begun else None) or error.problem_mark or error.context_mark
         wrong = _error(text, name, mark.index if mark else None, f" is not YAML: {_in_plain_words(problem)}")
-        wrong.elsewhere = mark is not None and _taken_elsewhere(text, mark.index, problem)
+        if mark is not None and _taken_elsewhere(text, mark.index, problem):
+            raise RefusedHere(wrong.reason, wrong.place) from None
         raise wrong from None
     except yaml.reader.ReaderError as error:
         raise _error(text, name, error.position, f" is not YAML: {_in_plain_words(error.reason)}") from None
@@ -133,7 +136,7 @@ def read(path: Path, table: bool = False, written: bool = False) -> Any:
     """Read a student's YAML file; for `table` and `written` see `load`.
 
     Raises:
-        StudentFileError: it is missing, is no text, or `load` refuses it.
+        Refused: it is missing, is no text, or `load` refuses it.
     """
     name = f"`{path.name}`"
     try:
@@ -142,18 +145,17 @@ def read(path: Path, table: bool = False, written: bool = False) -> Any:
     except OSError:
         because = f"No cell that begins with `%%file {path.name}` was found."
         hint = "Check the first line of the cell; it must stand there unchanged."
-        raise StudentFileError(because, "file-missing", hint=hint) from None
+        raise Refused(FILE_MISSING(because, hint)) from None
     try:
         text = content.decode("utf-8", "strict" if len(content) <= FILE_BYTES else "replace")
         return load(text, name, table, written)
     except UnicodeDecodeError:
-        raise StudentFileError(f"{name} is not text in UTF-8.") from None
+        raise Refused(NOT_YAML(f"{name} is not text in UTF-8.")) from None
 
 
-def _error(text: str, name: str, index: int | None, what: str, code: str = "not-yaml") -> StudentFileError:
-    line = None if index is None else cell_line(index, text)
-    where = name if line is None else f"{name}, line {line} of the cell"
-    return StudentFileError(f"{where}{what}.", code, line)
+def _error(text: str, name: str, index: int | None, what: str, kind: Kind = NOT_YAML) -> Refused:
+    place = "" if index is None else f"line {cell_line(index, text)} of the cell"
+    return Refused(kind(f"{name}{', ' * bool(place)}{place}{what}."), place)
 
 
 def _taken_elsewhere(text: str, index: int, problem: str) -> bool:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import tomllib
+from collections import Counter
 from pathlib import Path
+from typing import Self
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 
 from autograder.core.errors import KitError
 
@@ -23,6 +25,21 @@ class CourseSettings(BaseModel):
     """The labs in the course's order; those that it leaves out follow by their names."""
     executor: str = "local"
     """Who runs the jobs of a class, `NAME` or `NAME://ADDRESS`, by the names of `autograder.grading.executors`."""
+    lectures: dict[str, str] = {}
+    """The lectures, by the names that hints use for them, such as `Week 2`: the page of each in the book."""
+    sections: dict[str, dict[str, list[str]]] = {}
+    """By a lecture's name and a section's title: the codes of the reasons that this section explains."""
+
+    @model_validator(mode="after")
+    def _each_code_has_one_section(self) -> Self:
+        unknown = [name for name in self.sections if name not in self.lectures]
+        codes = Counter(code for titles in self.sections.values() for found in titles.values() for code in found)
+        twice = [code for code, times in codes.items() if times > 1]
+        if unknown:
+            raise ValueError(f"`sections` names a lecture that `lectures` does not have, {unknown[0]!r}")
+        if twice:
+            raise ValueError(f"`sections` has the code {twice[0]!r} in two sections")
+        return self
 
 
 def read_settings(root: Path) -> CourseSettings:
@@ -44,4 +61,6 @@ def read_settings(root: Path) -> CourseSettings:
         if first["type"] == "extra_forbidden":
             known = ", ".join(CourseSettings.model_fields)
             raise KitError(f"{path} sets `{key}`, which is no setting of a course.", f"Settings: {known}.") from error
+        if not key:  # what the settings say together
+            raise KitError(f"{path}: {first['msg'].removeprefix('Value error, ')}.", "Repair that table.") from error
         raise KitError(f"{path}: `{key}` cannot be {first['input']!r}: {first['msg']}.", "Repair that line.") from error

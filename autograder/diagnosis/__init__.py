@@ -13,6 +13,7 @@ has ended, what was seen before stands where its probe tells that the check's ow
 
 from autograder.diagnosis.callbacks import called_from_outside, failed_in_a_callback
 from autograder.diagnosis.chain import inside_reason, reason_inside
+from autograder.diagnosis.diagnosed import DiagnosedProgram
 from autograder.diagnosis.goals import (
     why_no_action,
     why_no_feedback,
@@ -27,7 +28,6 @@ from autograder.diagnosis.loops import why_all_alike
 from autograder.diagnosis.matching import why_not_matched
 from autograder.diagnosis.names import why_doubled, why_no_endpoint, why_no_node, why_no_service, why_topic_present
 from autograder.diagnosis.programs import program_trouble, shut_down_inside
-from autograder.diagnosis.reason import DiagnosedProgram, Diagnosis
 from autograder.diagnosis.scene import Scene
 from autograder.diagnosis.silence import (
     SILENT,
@@ -39,14 +39,18 @@ from autograder.diagnosis.silence import (
     why_silent,
 )
 from autograder.diagnosis.spinning import thread_left
-from autograder.diagnosis.together import layout, waits_for_its_group, why_not_together, why_starved
+from autograder.diagnosis.together import (
+    layout,
+    waits_for_its_group,
+    why_kept_waiting,
+    why_not_together,
+    why_starved,
+)
 from autograder.diagnosis.traces import last_traceback
-from autograder.diagnosis.turns import why_kept_waiting
 
 __all__ = [
     "SILENT",
     "DiagnosedProgram",
-    "Diagnosis",
     "Scene",
     "account",
     "called_from_outside",

@@ -3,10 +3,50 @@
 from __future__ import annotations
 
 from autograder.diagnosis.inside import Inside, called
-from autograder.diagnosis.reason import Diagnosis
 from autograder.diagnosis.sources import Place
 from autograder.graph.names import nearest
+from autograder.reasons import Group, Kind, Reason
 from autograder.sandbox.inside.probe.events import Call, Thing
+
+WAITS_FOR_SERVICE = Kind(
+    "waits-for-service",
+    "a call, or a request that was sent, waits for a service that is not on the graph",
+    Group.BLOCKED,
+)
+AWAIT_SAME_GROUP = Kind(
+    "await-same-group", "a callback awaits a client's answer; both are in one exclusive group", Group.BLOCKED
+)
+STUCK_CALLBACK = Kind(
+    "stuck-callback", "one run of a callback lasts; its thread is in one line or loop each time", Group.BLOCKED
+)
+CALL_SAME_GROUP = Kind(
+    "call-same-group",
+    "call() in a callback has not come back; client and callback share an exclusive group",
+    Group.BLOCKED,
+)
+CALL_IN_CALLBACK = Kind(
+    "call-in-callback", "call() in a callback has not come back; every thread of the executor is taken", Group.BLOCKED
+)
+NESTED_SPIN = Kind(
+    "nested-spin",
+    "a callback spins, and has not ended since, or its node is in no spinning executor now",
+    Group.BLOCKED,
+)
+RATE_IN_CALLBACK = Kind(
+    "rate-in-callback",
+    "rate.sleep() in a callback has not come back; every thread of the executor is taken",
+    Group.BLOCKED,
+)
+RATE_UNSPUN = Kind("rate-unspun", "rate.sleep() has not come back; no executor spins", Group.BLOCKED)
+BUSY_WAIT = Kind(
+    "busy-wait", "a callback stays in a loop that asks a future; its answer cannot be taken meanwhile", Group.BLOCKED
+)
+WRONG_TYPE = Kind("wrong-type", "the end, or the service that is asked, is there with another type", Group.NAMES)
+WAITS_FOR_LOCK = Kind(
+    "waits-for-lock",
+    "a run of a callback lasts, and its thread is where it takes a lock; or two callbacks take one",
+    Group.BLOCKED,
+)
 
 STUCK_AFTER = 1.5
 """Seconds that a run must have taken to count as one that does not end."""
@@ -25,7 +65,7 @@ def _at(inside: Inside, call: Call) -> str:
     return f"`{inside.name}`, {call.line} (`{call.code}`): "
 
 
-def call_same_group(inside: Inside) -> Diagnosis | None:
+def call_same_group(inside: Inside) -> Reason | None:
     """Must have seen: `call()` in a callback that has not come back, and client and callback in one exclusive group."""
     for call in _blocked(inside, "client.call"):
         client, callback = inside.things.get(call.target), inside.things.get(call.callback)
@@ -33,34 +73,32 @@ def call_same_group(inside: Inside) -> Diagnosis | None:
         if not client or not callback or not client.exclusive or client.group_id != callback.group_id:
             continue
         if executor and executor.size > 1:
-            return Diagnosis(
+            return CALL_SAME_GROUP(
                 f"{_at(inside, call)}`call()` blocks this callback until the answer is taken, but the client is in the "
                 "same mutually exclusive group as the callback: more threads do not help, the answer must wait for the "
                 "callback's end.",
-                "call-same-group",
                 _OWN_GROUP,
             )
     return None
 
 
-def call_in_callback(inside: Inside) -> Diagnosis | None:
+def call_in_callback(inside: Inside) -> Reason | None:
     """Must have seen: `call()` in a callback that has not come back, and every thread of the executor taken."""
     for call in _blocked(inside, "client.call"):
         callback = inside.things.get(call.callback)
         executor = inside.executor_of(callback.node) if callback else None
         if executor and executor.busy >= executor.size:
             threads = "the only thread" if executor.size == 1 else f"the last of {executor.size} threads"
-            return Diagnosis(
+            return CALL_IN_CALLBACK(
                 f"{_at(inside, call)}`call()` blocks inside a callback until the answer comes, but no thread is free "
                 f"to take the answer: this callback holds {threads}, and waits for itself.",
-                "call-in-callback",
                 "Use `call_async` with a done callback. Or keep `call()`, with a MultiThreadedExecutor, and with the "
                 "client in another group than the callback.",
             )
     return None
 
 
-def waits_for_a_service(inside: Inside) -> Diagnosis | None:
+def waits_for_a_service(inside: Inside) -> Reason | None:
     """Must have seen: a call that waits for a service, and no service of that name on the graph."""
     for call in inside.calls:
         client = inside.things.get(call.target)
@@ -74,7 +112,7 @@ def waits_for_a_service(inside: Inside) -> Diagnosis | None:
     return None
 
 
-def asks_nobody(inside: Inside) -> Diagnosis | None:
+def asks_nobody(inside: Inside) -> Reason | None:
     """Must have seen: a request that was not answered, sent a while ago to a service that is not on the graph."""
     for client in inside.things.values():
         waited = client.runs > client.done and inside.now - client.last > STUCK_AFTER
@@ -85,7 +123,7 @@ def asks_nobody(inside: Inside) -> Diagnosis | None:
     return None
 
 
-def asks_another_type(inside: Inside) -> Diagnosis | None:
+def asks_another_type(inside: Inside) -> Reason | None:
     """Must have seen: a request not answered for a while, and the service on the graph with another type only."""
     for client in inside.things.values():
         waited = client.runs > client.done and inside.now - client.last > STUCK_AFTER
@@ -93,23 +131,21 @@ def asks_another_type(inside: Inside) -> Diagnosis | None:
             offered = inside.observer.services().get(client.name, [])
             asked = inside.observer.clients(client.node).get(client.name, [])
             if offered and asked and not set(asked) & set(offered):
-                return Diagnosis(
+                return WRONG_TYPE(
                     f"`{inside.name}` asks `{client.name}` as a {asked[0]}, and the service there is a {offered[0]}: "
                     "its requests do not arrive.",
-                    "wrong-type",
                     "Client and server meet only with one name and one type.",
                 )
     return None
 
 
-def _nobody_offers(client: Thing, services: dict[str, list[str]], said: str, else_do: str = "") -> Diagnosis:
+def _nobody_offers(client: Thing, services: dict[str, list[str]], said: str, else_do: str = "") -> Reason:
     own = ("rcl_interfaces/", "type_description")  # what each node offers by itself
     close = nearest(client.name, [n for n, types in services.items() if not types[0].startswith(own)])
     given = f" (`{client.given}` in the code)" if client.given and client.given != client.name else ""
-    return Diagnosis(
+    return WAITS_FOR_SERVICE(
         f"{said}the service `{client.name}`{given}, and no node offers that"
         + (f"; the nearest name is `{close}`." if close else "."),
-        "waits-for-service",
         "Wait with a time limit, and look at whether a server came."
         if not close
         else "The name in the code begins with a slash, so no namespace reaches it: write it without."
@@ -118,13 +154,12 @@ def _nobody_offers(client: Thing, services: dict[str, list[str]], said: str, els
     )
 
 
-def nested_spin(inside: Inside) -> Diagnosis | None:
+def nested_spin(inside: Inside) -> Reason | None:
     """Must have seen: a callback that spins, and has not ended since, has lost its node to that, or got nothing."""
     for call in inside.calls:
         if call.what == "spin" and call.in_callback and (harm := _harm_of_spinning(inside, call)):
-            return Diagnosis(
+            return NESTED_SPIN(
                 f"{_at(inside, call)}It spins inside a callback: {harm}",
-                "nested-spin",
                 "Never spin inside a callback: use `call_async` and a done callback, or `await`.",
             )
     return None
@@ -150,29 +185,27 @@ def _harm_of_spinning(inside: Inside, call: Call) -> str:
     return ""
 
 
-def rate_in_callback(inside: Inside) -> Diagnosis | None:
+def rate_in_callback(inside: Inside) -> Reason | None:
     """Must have seen: `rate.sleep()` in a callback that has not come back, and every thread of the executor taken."""
     for call in _blocked(inside, "rate.sleep"):
         callback = inside.things.get(call.callback)
         executor = inside.executor_of(callback.node) if callback else None
         if executor and executor.busy >= executor.size:
-            return Diagnosis(
+            return RATE_IN_CALLBACK(
                 f"{_at(inside, call)}`rate.sleep()` inside a callback waits for a timer that only the executor can "
                 "run, and no thread of the executor is free while the callback waits: a deadlock.",
-                "rate-in-callback",
                 "Use a timer for what must happen periodically.",
             )
     return None
 
 
-def rate_unspun(inside: Inside) -> Diagnosis | None:
+def rate_unspun(inside: Inside) -> Reason | None:
     """Must have seen: `rate.sleep()` outside a callback that has not come back, and no executor that spins."""
     for call in inside.calls:
         spun = any(executor.spinning for executor in inside.executors)
         if call.what == "rate.sleep" and not call.in_callback and call.blocks and not spun and not _foreign(inside):
-            return Diagnosis(
+            return RATE_UNSPUN(
                 f"{_at(inside, call)}`rate.sleep()` waits for a timer of the node, and nothing spins the node.",
-                "rate-unspun",
                 "Spin the node in another thread, or better: use a timer and `rclpy.spin`.",
             )
     return None
@@ -182,23 +215,22 @@ def _foreign(inside: Inside) -> bool:
     return any(node.foreign for node in inside.nodes.values())
 
 
-def await_same_group(inside: Inside) -> Diagnosis | None:
+def await_same_group(inside: Inside) -> Reason | None:
     """Must have seen: a callback that awaits a client's answer now, and both in one mutually exclusive group."""
     for thing in inside.things.values():
         client = inside.things.get(thing.awaits.client)
         if not thing.running or not client or not thing.exclusive or client.group_id != thing.group_id:
             continue
         where = thing.awaits
-        return Diagnosis(
+        return AWAIT_SAME_GROUP(
             f"`{inside.name}`, {where.line} (`{where.code}`): the client is in the same mutually exclusive group as "
             "the callback that awaits it. A group is held until its callback ends, so the answer is never taken.",
-            "await-same-group",
             _OWN_GROUP,
         )
     return None
 
 
-def busy_wait(inside: Inside) -> Diagnosis | None:
+def busy_wait(inside: Inside) -> Reason | None:
     """Must have seen: a callback in one loop all the time, whose source asks a future, and an answer not taken."""
     for thing, since, place in _stuck(inside):
         asked = [client for client in inside.things.values() if client.kind == "client" and client.runs > client.done]
@@ -208,37 +240,34 @@ def busy_wait(inside: Inside) -> Diagnosis | None:
         same = asked[0].exclusive and asked[0].group_id == thing.group_id
         if same or (executor and executor.busy >= executor.size):
             why = "its client is in the same exclusive group" if same else "no thread is free to take the answer"
-            return Diagnosis(
+            return BUSY_WAIT(
                 f"`{inside.name}`: a callback waits in {place} for a future, for {since:.1f} s so far. While this "
                 f"callback runs, {why}, so the future is never done.",
-                "busy-wait",
                 "Let the callback end: `future.add_done_callback(...)` goes on when the answer is there, and so does "
                 "`await` with the client in another group.",
             )
     return None
 
 
-def takes_turn(inside: Inside) -> Diagnosis | None:
+def takes_turn(inside: Inside) -> Reason | None:
     """Must have seen: one run of a callback that lasts, and its thread where it takes a lock, each time."""
     for thing, since, _ in _stuck(inside):
         for _, thread in thing.running:
             place = inside.turn(thread)
             if place:
-                return Diagnosis(
+                return WAITS_FOR_LOCK(
                     f"`{inside.name}`: {called(thing)} has waited for its turn for {since:.1f} s, in {place}: somebody "
                     "else has taken what it wants.",
-                    "waits-for-lock",
                     ONE_LOCK,
                 )
     return None
 
 
-def stuck(inside: Inside) -> Diagnosis | None:
+def stuck(inside: Inside) -> Reason | None:
     """Must have seen: one run of a callback that lasts, and its thread in one line or loop of the student's."""
     for thing, since, place in _stuck(inside):
-        return Diagnosis(
+        return STUCK_CALLBACK(
             f"`{inside.name}`: {called(thing)} has been running one callback for {since:.1f} s. It is in {place}.",
-            "stuck-callback",
             "A callback has to return: until then it holds its thread, and its group if that is mutually exclusive.",
         )
     return None

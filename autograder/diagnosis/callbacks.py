@@ -4,19 +4,53 @@ from __future__ import annotations
 
 import re
 
+from autograder.diagnosis.diagnosed import DiagnosedProgram
 from autograder.diagnosis.events import read
 from autograder.diagnosis.inside import Inside
-from autograder.diagnosis.reason import DiagnosedProgram, Diagnosis
 from autograder.diagnosis.scene import Scene
-from autograder.diagnosis.traces import KNOWN_ERRORS, quoted
+from autograder.diagnosis.traces import CRASHED, KNOWN_ERRORS, PARAMETER_NOT_DECLARED, PARAMETER_TYPE, quoted
+from autograder.reasons import Group, Kind, Reason
 from autograder.sandbox.inside.probe.events import BadMessage, BadReturn, CallbackError, Event, ThreadError
+
+NEVER_AWAITED = Kind(
+    "never-awaited", "Python warned of a coroutine that was never awaited, and nothing came", Group.CALLBACKS
+)
+CALLBACK_EXCEPTION = Kind(
+    "callback-exception", "an exception left a timer's or subscription's callback", Group.CALLBACKS
+)
+MESSAGE_FIELD = Kind(
+    "message-field",
+    "a field of a message has a value that is not of its type: it was refused, or what came shows it",
+    Group.CALLBACKS,
+)
+BAD_RETURN = Kind("bad-return", "another callback returned something of the wrong type", Group.CALLBACKS)
+THREAD_EXCEPTION = Kind("thread-exception", "an exception ended a thread of the program's own", Group.CALLBACKS)
+MESSAGE_TYPE = Kind("message-type", "a message was refused, and it is of another class", Group.CALLBACKS)
+SERVICE_NO_RETURN = Kind(
+    "service-no-return", "a service callback returned something else than the response", Group.CALLBACKS
+)
+LIFECYCLE_RETURN = Kind(
+    "lifecycle-return", "a lifecycle callback returned something else than a TransitionCallbackReturn", Group.CALLBACKS
+)
+EXECUTE_RETURN = Kind(
+    "execute-return", "an execute callback returned something else than its action's result", Group.GOALS
+)
+GOAL_RETURN = Kind("goal-return", "a goal callback returned something else than a GoalResponse", Group.GOALS)
+CANCEL_RETURN = Kind("cancel-return", "a cancel callback returned something else than a CancelResponse", Group.GOALS)
+ASYNCIO_IN_CALLBACK = Kind(
+    "asyncio-in-callback", "a callback raised that there is no running event loop", Group.CALLBACKS
+)
+DECLARED_TWICE = Kind("declared-twice", "a callback raised ParameterAlreadyDeclaredException", Group.CALLBACKS)
+SERVICE_EXCEPTION = Kind("service-exception", "an exception left a service callback", Group.CALLBACKS)
+LIFECYCLE_EXCEPTION = Kind("lifecycle-exception", "an exception left a lifecycle callback", Group.CALLBACKS)
+EXECUTE_EXCEPTION = Kind("execute-exception", "an exception left an execute callback", Group.GOALS)
 
 _AFTER = {
     "service": "The client gets no answer and the node no longer spins.",
     "lifecycle": "rclpy swallows it without a log line and treats the transition as ERROR.",
     "execute": "rclpy aborts the goal with an empty result; the node goes on.",
 }
-_CODES = {"service": "service-exception", "lifecycle": "lifecycle-exception", "execute": "execute-exception"}
+_KINDS = {"service": SERVICE_EXCEPTION, "lifecycle": LIFECYCLE_EXCEPTION, "execute": EXECUTE_EXCEPTION}
 
 _GOAL_STATE = re.compile(r"invalid transition from state (\w+) with event (\w+)")
 """What rclpy says where a goal cannot end so, in the state that it is in."""
@@ -24,7 +58,7 @@ _GOAL_STATE = re.compile(r"invalid transition from state (\w+) with event (\w+)"
 _NEVER_AWAITED = re.compile(r"RuntimeWarning: coroutine '([\w.<>]{1,100})' was never awaited")
 
 
-def failed(inside: Inside) -> Diagnosis | None:
+def failed(inside: Inside) -> Reason | None:
     """Must have seen: an exception leave a callback, a return value of the wrong type, or a message refused.
 
     What goes wrong with one goal of an action, and leaves the node as it is, is told by `goals`.
@@ -36,35 +70,32 @@ def failed(inside: Inside) -> Diagnosis | None:
     return None
 
 
-def thread_failed(inside: Inside) -> Diagnosis | None:
+def thread_failed(inside: Inside) -> Reason | None:
     """Must have seen: an exception end a thread of the program's own."""
     for event in inside.all(ThreadError):
         error = f"{event.type}: {event.text}".strip(": ")
         if event.type == "SystemExit":
-            return Diagnosis(
+            return THREAD_EXCEPTION(
                 f"A thread of `{inside.name}` ended by `sys.exit` or SystemExit: that ends the thread in which it is "
                 "raised, and no other.",
-                "thread-exception",
                 "Only in the main thread does it end the program.",
             )
         at = f" in {event.line}{quoted(event.code, error)}" if event.line else ""
-        return Diagnosis(
+        return THREAD_EXCEPTION(
             f"A thread of `{inside.name}` ended with an error{at}: {error}",
-            "thread-exception",
             "What this thread had to do is not done any more; the rest of the program goes on.",
         )
     return None
 
 
-def never_awaited(inside: Inside) -> Diagnosis | None:
+def never_awaited(inside: Inside) -> Reason | None:
     """Must have seen: Python's own warning of a coroutine that was made and never awaited."""
     found = _NEVER_AWAITED.search(inside.program.output())
     if not found:
         return None
-    return Diagnosis(
+    return NEVER_AWAITED(
         f"`{inside.name}`: the coroutine `{found[1]}` was called and never awaited (Python says so in the log), so "
         "nothing in it has run.",
-        "never-awaited",
         "To call an `async def` only makes a coroutine. Await it; to rclpy hand the function itself, for rclpy does "
         "not await what a lambda returns.",
     )
@@ -108,7 +139,7 @@ def _outlived(event: Event) -> bool:
     return isinstance(event, BadReturn) and event.kind in ("goal", "cancel")
 
 
-def of_event(inside: Inside, event: Event) -> Diagnosis | None:
+def of_event(inside: Inside, event: Event) -> Reason | None:
     """What one event says, if it is an error."""
     if isinstance(event, BadMessage):
         return _bad_message(inside.name, event)
@@ -119,84 +150,74 @@ def of_event(inside: Inside, event: Event) -> Diagnosis | None:
     return None
 
 
-def _no_callback(inside: Inside, event: CallbackError) -> Diagnosis | None:
+def _no_callback(inside: Inside, event: CallbackError) -> Reason | None:
     """Must have seen: nothing was called, and a timer or the like that was made without a function."""
     empty = [t for t in inside.things.values() if t.kind == event.kind and t.has_callback and not t.line and t.made]
     if event.line or "'NoneType' object is not callable" not in event.text or not empty:
         return None
     number = int(empty[0].made.rpartition(":")[2] or 0)
-    return Diagnosis(
+    return CALLBACK_EXCEPTION(
         f"`{inside.name}`: the {event.kind} made in line {number} (`{inside.source.line(number)}`) has None for its "
         "callback.",
-        "callback-exception",
         "Hand over the function itself: with brackets it is called at once, and what it returns is handed over.",
     )
 
 
-def _bad_message(program: str, event: BadMessage) -> Diagnosis:
+def _bad_message(program: str, event: BadMessage) -> Reason:
     at = f" in {event.line} (`{event.code}`)" if event.line else ""
     if not event.field:
-        return Diagnosis(
+        return MESSAGE_TYPE(
             f"`{program}` sends the wrong type on `{event.name}`{at}: a {event.kind} there is a {event.expected}, and "
             f"it got {event.value} ({event.given}).",
-            "message-type",
             "The message class must be the one that the publisher, client or service was made with.",
         )
     if event.kind in ("feedback", "result") and event.expected in ("float", "double"):
-        return Diagnosis(
+        return MESSAGE_FIELD(
             f"`{program}` sends a wrong number in its {event.kind} on `{event.name}`{at}: the field `{event.field}` is "
             f"of type {event.expected}, and its value is {event.value} ({event.given}), which rclpy does not convert.",
-            "message-field",
             "Give it a float: `float(...)`, or a number with a point. What is sent of anything else is another number, "
             "without an error.",
         )
-    return Diagnosis(
+    return MESSAGE_FIELD(
         f"`{program}` cannot send its {event.kind} on `{event.name}`{at}: the field `{event.field}` is of type "
         f"{event.expected}, and its value is {event.value} ({event.given}).",
-        "message-field",
         "Python does not notice when the field is set, only when the message is sent: convert the value first.",
     )
 
 
-def _bad_return(program: str, event: BadReturn) -> Diagnosis:
+def _bad_return(program: str, event: BadReturn) -> Reason:
     at = f" ({event.line})" if event.line else ""
     if event.kind == "service":
-        return Diagnosis(
+        return SERVICE_NO_RETURN(
             f"A service callback of `{program}`{at} did not return the response, which ends the node's spinning: the "
             "client never gets an answer.",
-            "service-no-return",
             "Fill `response` and `return response`.",
         )
     if event.kind == "lifecycle":
-        return Diagnosis(
+        return LIFECYCLE_RETURN(
             f"A lifecycle callback of `{program}`{at} did not return a TransitionCallbackReturn: the node stops "
             "answering in the middle of the transition.",
-            "lifecycle-return",
             "Return TransitionCallbackReturn.SUCCESS, FAILURE or ERROR from every path.",
         )
     of_action = f"The {event.kind} callback of `{program}`{at} returned {event.text or 'the wrong type'}:"
     if event.kind == "execute":
-        return Diagnosis(
+        return EXECUTE_RETURN(
             f"{of_action} rclpy cannot send that as a result, the error ends the spinning, and the client never gets "
             "a result.",
-            "execute-return",
             "Every path of an execute callback returns a result of the action, also after `canceled()` and `abort()`.",
         )
     if event.kind == "goal":
-        return Diagnosis(
+        return GOAL_RETURN(
             f"{of_action} rclpy takes whatever is no GoalResponse as a refusal.",
-            "goal-return",
             "Return GoalResponse.ACCEPT or GoalResponse.REJECT from every path.",
         )
     if event.kind == "cancel":
-        return Diagnosis(
+        return CANCEL_RETURN(
             f"{of_action} rclpy takes whatever is no CancelResponse as a refusal.",
-            "cancel-return",
             "Return CancelResponse.ACCEPT, or CancelResponse.REJECT, from every path.",
         )
-    return Diagnosis(
+    return BAD_RETURN(
         f"A {event.kind} callback of `{program}`{at} returned {event.text or 'the wrong type'}.",
-        "bad-return",
         "Every path of the callback must return a value of that type.",
     )
 
@@ -226,27 +247,25 @@ def _of_goal_state(error: str) -> str:
     return "The goal was accepted and is not executed yet: `goal_handle.execute()` has to be called before it can end."
 
 
-def _error(program: str, event: CallbackError) -> Diagnosis:
+def _error(program: str, event: CallbackError) -> Reason:
     error = f"{event.type}: {event.text}".strip(": ")
     at = f" ({event.line})" if event.line else ""
-    kind = "done" if event.kind == "task" else event.kind  # rclpy runs done callbacks as tasks
-    article = "An" if kind[:1] in ("a", "e") else "A"  # of the kinds that there are
-    callback = f"{article} {kind} callback of `{program}`{at}" if kind else f"A callback of `{program}`{at}"
+    name = "done" if event.kind == "task" else event.kind  # rclpy runs done callbacks as tasks
+    article = "An" if name[:1] in ("a", "e") else "A"  # of the names that there are
+    callback = f"{article} {name} callback of `{program}`{at}" if name else f"A callback of `{program}`{at}"
     source = quoted(event.code, error)
     if "no running event loop" in error:
-        return Diagnosis(
+        return ASYNCIO_IN_CALLBACK(
             f"{callback} awaits asyncio{source}, and rclpy does not run an asyncio loop ({error}).",
-            "asyncio-in-callback",
             "Await rclpy futures only (such as the one of `call_async`), or use a timer.",
         )
     if "ParameterAlreadyDeclared" in error:
-        return Diagnosis(
+        return DECLARED_TWICE(
             f"{callback} declares a parameter that is declared already{source}: {error}. A parameter lives as long as "
             "its node.",
-            "declared-twice",
             "Declare parameters in `__init__`, once for all lives of the node.",
         )
-    code = _CODES.get(event.kind, "callback-exception")
+    kind = _KINDS.get(event.kind, CALLBACK_EXCEPTION)
     hint = "The line that raised it, and what was in its variables, is where to begin." if event.line else ""
     if event.kind == "parameter":
         hint = (
@@ -260,10 +279,10 @@ def _error(program: str, event: CallbackError) -> Diagnosis:
         hint = "It could not be called: the function takes another number of arguments than it is given here."
     if event.kind == "task" and not event.line:
         hint = "What `add_done_callback` is given is called with one argument, the future."
-    for exception, word, advice in KNOWN_ERRORS:
-        if exception in error and word.startswith(("parameter", "crashed")):
-            code, hint = code if word == "crashed" else word, advice
+    for exception, known, advice in KNOWN_ERRORS:
+        if exception in error and known in (CRASHED, PARAMETER_NOT_DECLARED, PARAMETER_TYPE):
+            kind, hint = kind if known is CRASHED else known, advice
     after = _AFTER.get(event.kind, "It ended the spinning.")
     if event.kind == "execute" and _ended_already(error):
         after = "The goal keeps the end that it had, with an empty result; the node goes on."
-    return Diagnosis(f"{callback} raised {error}{source}. {after}", code, hint)
+    return kind(f"{callback} raised {error}{source}. {after}", hint)

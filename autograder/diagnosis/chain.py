@@ -11,13 +11,13 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 from autograder.diagnosis import blocked, callbacks, spinning
-from autograder.diagnosis.reason import Diagnosis
 from autograder.diagnosis.scene import Scene, first
+from autograder.reasons import Reason
 
 if TYPE_CHECKING:
     from autograder.diagnosis.inside import Inside
 
-Link = Callable[["Inside"], Diagnosis | None]
+Link = Callable[["Inside"], Reason | None]
 
 SAID: tuple[Link, ...] = (callbacks.failed, callbacks.thread_failed)
 """What a program says by itself; true whatever else the probe could see."""
@@ -45,11 +45,11 @@ SEEN: tuple[Link, ...] = (
 """What is concluded from all that the probe has seen; nothing where it could not see all."""
 
 
-def inside_reason(scene: Scene, node: str = "") -> Diagnosis | None:
+def inside_reason(scene: Scene, node: str = "") -> Reason | None:
     """Why a program that lives does nothing: the first broken link inside the program of `node`, or inside any."""
     return reason_inside(scene.inside_of(node) if node else scene.insides)
 
 
-def reason_inside(insides: Sequence[Inside]) -> Diagnosis | None:
+def reason_inside(insides: Sequence[Inside]) -> Reason | None:
     """The first broken link inside one of these programs."""
     return first(SAID, insides) or first(SEEN, [inside for inside in insides if inside.alive])

@@ -7,14 +7,31 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from autograder.diagnosis.blocked import WRONG_TYPE
 from autograder.diagnosis.callbacks import of_event
 from autograder.diagnosis.chain import inside_reason
 from autograder.diagnosis.inside import Inside, called
 from autograder.diagnosis.programs import program_trouble
-from autograder.diagnosis.reason import Diagnosis
 from autograder.diagnosis.scene import Scene
 from autograder.graph.names import nearest, type_name
+from autograder.reasons import Group, Kind, Reason
 from autograder.sandbox.inside.probe.events import BadMessage, BadReturn, CallbackError, Event, GoalLeft, Thing
+
+NO_CANCEL_CALLBACK = Kind("no-cancel-callback", "the action server has no cancel callback of its own", Group.GOALS)
+ACTION_NAME = Kind("action-name", "an action with a similar name is offered", Group.GOALS)
+NO_ACTION = Kind("no-action", "no such action, and none similar", Group.GOALS)
+NO_FEEDBACK = Kind("no-feedback", "an execute callback ran, and feedback was never published", Group.GOALS)
+GOAL_HOLDS_THREAD = Kind(
+    "goal-holds-thread",
+    "an execute callback that never awaited took its time on the only thread of its executor",
+    Group.GOALS,
+)
+GOAL_HOLDS_GROUP = Kind(
+    "goal-holds-group", "an accepted or goal callback took its time in the action server's exclusive group", Group.GOALS
+)
+NO_SUCCEED = Kind(
+    "no-succeed", "an execute callback returned while its goal was still under way, so rclpy aborted that", Group.GOALS
+)
 
 SEND_GOAL = "/_action/send_goal"
 """How the name of the service ends that takes an action's goals."""
@@ -26,7 +43,7 @@ KEPT = 0.3
 """Seconds that a run must have taken to count as one that keeps requests waiting."""
 
 
-def why_no_action(scene: Scene, name: str, action_type: type) -> Diagnosis:
+def why_no_action(scene: Scene, name: str, action_type: type) -> Reason:
     """Why there is no server for an action."""
     trouble = program_trouble(scene)
     if trouble:
@@ -36,24 +53,25 @@ def why_no_action(scene: Scene, name: str, action_type: type) -> Diagnosis:
     wanted = type_name(action_type)
     if name in offered:
         has = offered[name][0].removesuffix("_SendGoal")
-        return Diagnosis(f"The action `{name}` has the type {has}, not {wanted}.", "wrong-type")
+        return WRONG_TYPE(f"The action `{name}` has the type {has}, not {wanted}.")
     close = nearest(name, offered)
     if close:
         made = [thing for _, thing in _of_action(scene, close) if thing.kind == "action_server"]
         given = f" (`{made[0].given}` in the code)" if made and made[0].given not in ("", close) else ""
         hint = "A name that begins with a slash stays as it is; without one it follows the node's namespace."
-        return Diagnosis(
-            f"There is no action `{name}`; the nearest name on the graph is `{close}`{given}.", "action-name", hint
+        return ACTION_NAME(
+            f"There is no action `{name}`; the nearest name on the graph is `{close}`{given}.",
+            hint,
         )
-    return inside_reason(scene) or Diagnosis(f"No node offers the action `{name}`.", "no-action")
+    return inside_reason(scene) or NO_ACTION(f"No node offers the action `{name}`.")
 
 
-def why_rejected(scene: Scene, name: str) -> Diagnosis | None:
+def why_rejected(scene: Scene, name: str) -> Reason | None:
     """Why a goal was rejected. Must have seen: the goal callback return something else than a GoalResponse."""
     return _said(scene, name, "goal")
 
 
-def why_not_finished(scene: Scene, name: str, status: str = "succeeded") -> Diagnosis | None:
+def why_not_finished(scene: Scene, name: str, status: str = "succeeded") -> Reason | None:
     """Why a goal did not end as this status, or not at all.
 
     Must have seen: an error leave the execute callback, its result refused, or a return without an end of the goal.
@@ -64,22 +82,21 @@ def why_not_finished(scene: Scene, name: str, status: str = "succeeded") -> Diag
     for inside, _ in _of_action(scene, name):
         for event in inside.all(GoalLeft):
             if event.name == name:
-                return Diagnosis(
+                return NO_SUCCEED(
                     f"The execute callback of `{inside.name}` ({event.line}) returned without saying how the goal has "
                     "ended, so rclpy aborts it.",
-                    "no-succeed",
                     f"Call `goal_handle.{_ENDS[status]}` before `return`: a result alone does not say how the goal has "
                     "ended.",
                 )
     return None
 
 
-def why_no_result(scene: Scene, name: str) -> Diagnosis | None:
+def why_no_result(scene: Scene, name: str) -> Reason | None:
     """Why a goal that has ended got an empty result. Must have seen: an error leave the execute callback."""
     return _said(scene, name, "execute")
 
 
-def why_no_feedback(scene: Scene, name: str) -> Diagnosis | None:
+def why_no_feedback(scene: Scene, name: str) -> Reason | None:
     """Why no feedback came. Must have seen: an execute callback that ran, and no call of `publish_feedback`."""
     found = _said(scene, name, "execute")
     if found:
@@ -88,16 +105,15 @@ def why_no_feedback(scene: Scene, name: str) -> Diagnosis | None:
     servers = [thing for _, thing in things if thing.kind == "action_server"]
     for inside, thing in things:
         if thing.kind == "execute" and thing.runs and servers and not any(server.runs for server in servers):
-            return Diagnosis(
+            return NO_FEEDBACK(
                 f"`{inside.name}`: {called(thing)} {'runs' if thing.running else 'has run'}, and no feedback was "
                 "published.",
-                "no-feedback",
                 "`goal_handle.publish_feedback(...)` sends one feedback message; it belongs into the loop.",
             )
     return None
 
 
-def why_wrong_feedback(scene: Scene, name: str) -> Diagnosis | None:
+def why_wrong_feedback(scene: Scene, name: str) -> Reason | None:
     """Why feedback says something else. Must have seen: a field of it whose value is not of its type."""
     for inside in dict.fromkeys(inside for inside, _ in _of_action(scene, name)):
         for event in inside.all(BadMessage):
@@ -106,26 +122,25 @@ def why_wrong_feedback(scene: Scene, name: str) -> Diagnosis | None:
     return None
 
 
-def why_not_canceled(scene: Scene, name: str) -> Diagnosis | None:
+def why_not_canceled(scene: Scene, name: str) -> Reason | None:
     """Why a server did not agree to cancel, or did so too late."""
     return _said(scene, name, "cancel") or _no_cancel_callback(scene, name) or why_waits_for_a_goal(scene, name)
 
 
-def _no_cancel_callback(scene: Scene, name: str) -> Diagnosis | None:
+def _no_cancel_callback(scene: Scene, name: str) -> Reason | None:
     """Must have seen: the action's server, and no cancel callback of its own."""
     things = list(_of_action(scene, name))
     kinds = {thing.kind for _, thing in things}
     if not things or "action_server" not in kinds or "cancel" in kinds or not things[0][0].attached:
         return None
-    return Diagnosis(
+    return NO_CANCEL_CALLBACK(
         f"`{things[0][0].name}`: the action server of `{name}` was made without a cancel callback, and rclpy's own "
         "refuses every request to cancel.",
-        "no-cancel-callback",
         "Hand one over: `ActionServer(..., cancel_callback=...)`. It returns CancelResponse.ACCEPT.",
     )
 
 
-def why_waits_for_a_goal(scene: Scene, name: str) -> Diagnosis | None:
+def why_waits_for_a_goal(scene: Scene, name: str) -> Reason | None:
     """Why a request or a timer waits while a goal is executed.
 
     Must have seen: a run of the execute callback that took its time without awaiting anything, and an executor with
@@ -137,19 +152,17 @@ def why_waits_for_a_goal(scene: Scene, name: str) -> Diagnosis | None:
         executor = inside.executor_of(thing.node)
         if thing.kind == "execute" and executor and executor.size == 1 and not thing.awaited:
             alone = " `async` alone changes nothing: only an `await` gives the thread back." * ("async " in thing.code)
-            return Diagnosis(
+            return GOAL_HOLDS_THREAD(
                 f"`{inside.name}`: {called(thing)} holds the only thread of its {executor.type} until it returns, so "
                 f"nothing else of the node runs meanwhile: no timer, no new goal, no request to cancel.{alone}",
-                "goal-holds-thread",
                 "Give it two threads or more: `MultiThreadedExecutor(num_threads=2)`."
                 if executor.type == "MultiThreadedExecutor"
                 else "Add the node to a MultiThreadedExecutor(num_threads=...) and spin that.",
             )
         if thing.kind in ("accepted", "goal") and thing.exclusive:
-            return Diagnosis(
+            return GOAL_HOLDS_GROUP(
                 f"`{inside.name}`: {called(thing)} takes its time, and the action server is in a mutually exclusive "
                 "group: until it returns, no other goal and no request to cancel is taken.",
-                "goal-holds-group",
                 "Let it return at once: `goal_handle.execute()` starts the execute callback, which may take its time.",
             )
     return None
@@ -167,7 +180,7 @@ def _of_action(scene: Scene, name: str) -> Iterator[tuple[Inside, Thing]]:
                 yield inside, thing
 
 
-def _said(scene: Scene, name: str, kind: str) -> Diagnosis | None:
+def _said(scene: Scene, name: str, kind: str) -> Reason | None:
     """What a program says of an error in one of the action's callbacks."""
     for inside in dict.fromkeys(inside for inside, _ in _of_action(scene, name)):
         for event in inside.events:

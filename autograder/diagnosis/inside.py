@@ -11,8 +11,8 @@ from typing import TypeVar
 
 from autograder.arguments.rule_effect import full_name
 from autograder.diagnosis import sources
+from autograder.diagnosis.diagnosed import DiagnosedProgram
 from autograder.diagnosis.events import read
-from autograder.diagnosis.reason import DiagnosedProgram
 from autograder.graph.observer import Observer
 from autograder.sandbox.inside.probe.events import (
     Attached,

@@ -2,33 +2,56 @@
 
 from __future__ import annotations
 
+import ast
 from collections.abc import Sequence
 
 from autograder.arguments import remap_rules, rule_effect
+from autograder.arguments.rule_effect import ABSOLUTE_NAME, TOPIC_NAME
+from autograder.diagnosis.blocked import WRONG_TYPE
 from autograder.diagnosis.chain import inside_reason, reason_inside
 from autograder.diagnosis.inside import Inside
 from autograder.diagnosis.programs import program_trouble
-from autograder.diagnosis.reason import Diagnosis
 from autograder.diagnosis.scene import Scene
-from autograder.diagnosis.unmade import not_made_yet
 from autograder.graph.names import nearest, node_of, type_name
+from autograder.reasons import Group, Kind, Reason
 from autograder.sandbox.inside.probe.events import Thing
+
+NOT_MADE_YET = Kind(
+    "not-made-yet", "a method of the source makes the end in a line where the probe has seen none made", Group.NAMES
+)
+NODE_NAME = Kind("node-name", "the node is not there, others are", Group.NAMES)
+DUPLICATE_NODE = Kind("duplicate-node", "several nodes have one name", Group.NAMES)
+TOPIC_PRESENT = Kind("topic-present", "somebody uses the topic", Group.NAMES)
+NOTHING_STARTED = Kind("nothing-started", "the launch has no program", Group.PROGRAM)
+NO_NODE = Kind("no-node", "programs run, and no node is on the graph", Group.NAMES)
+NAMESPACE = Kind("namespace", "a node of this name is there in another namespace", Group.NAMES)
+WRONG_NODE = Kind("wrong-node", "the end is there and belongs to another node", Group.NAMES)
+WRONG_END = Kind("wrong-end", "only the other end is there", Group.NAMES)
+NO_TOPIC = Kind("no-topic", "no node has such an end, on no similar topic", Group.NAMES)
+NO_SERVICE = Kind("no-service", "no such service, and none similar", Group.NAMES)
+ONE_NAME_FOR_ALL = Kind(
+    "one-name-for-all", "one rule without a prefix gave several nodes of a process one name", Group.NAMES
+)
+SERVICE_NAME = Kind("service-name", "a service with a similar name is offered", Group.NAMES)
 
 _LETTER_BY_LETTER = "Compare the two names letter by letter, namespace included."
 _EVERY_NODES = ("/rosout", "/parameter_events")
+_MAKERS = {
+    "publisher": ("create_publisher", "create_lifecycle_publisher"),
+    "subscription": ("create_subscription",),
+}
 
 
-def _no_node_at_all(scene: Scene) -> Diagnosis:
+def _no_node_at_all(scene: Scene) -> Reason:
     """Nothing is on the graph, though nothing is known to be wrong with a program."""
     if not scene.programs:
-        return Diagnosis(
+        return NOTHING_STARTED(
             "No program was started: there is nothing to look at.",
-            "nothing-started",
             "A launch file starts what its `node` entries name.",
         )
     names = ", ".join(f"`{program.name}`" for program in scene.programs)
-    return inside_reason(scene) or Diagnosis(
-        f"{names} {'runs' if len(scene.programs) == 1 else 'run'}, but no node is on the graph.", "no-node"
+    return inside_reason(scene) or NO_NODE(
+        f"{names} {'runs' if len(scene.programs) == 1 else 'run'}, but no node is on the graph.",
     )
 
 
@@ -56,7 +79,7 @@ def _twins(scene: Scene, name: str) -> set[str]:
     }
 
 
-def _given_as_a_parameter(scene: Scene, insides: Sequence[Inside], wanted: str) -> remap_rules.Reason | None:
+def _given_as_a_parameter(scene: Scene, insides: Sequence[Inside], wanted: str) -> Reason | None:
     """Why a name given with `-p` to one of these programs is not there."""
     pairs = zip(scene.insides, scene.parameter_rules, strict=False)
     return next(
@@ -64,11 +87,11 @@ def _given_as_a_parameter(scene: Scene, insides: Sequence[Inside], wanted: str) 
     )
 
 
-def _nothing_of(silent: Sequence[Inside]) -> Diagnosis:
+def _nothing_of(silent: Sequence[Inside]) -> Reason:
     """Why programs that live show no node: what is wrong inside, or how far the first of them was seen to come."""
     made = [name for name, node in silent[0].nodes.items() if not node.destroyed]
     saw = f"it has made the node `{made[0]}`, which is not on this graph" if made else "it shows no node"
-    return reason_inside(silent) or Diagnosis(f"`{silent[0].name}` runs, but {saw}.", "no-node")
+    return reason_inside(silent) or NO_NODE(f"`{silent[0].name}` runs, but {saw}.")
 
 
 def _ending_in(base: str, names: Sequence[str]) -> list[str]:
@@ -76,7 +99,7 @@ def _ending_in(base: str, names: Sequence[str]) -> list[str]:
     return [name for name in names if name.rsplit("/", 1)[-1] == base]
 
 
-def why_no_node(scene: Scene, wanted: str) -> Diagnosis:
+def why_no_node(scene: Scene, wanted: str) -> Reason:
     """Why the node `wanted` is not on the graph.
 
     Another node is brought up only where each program that was started around this name shows one of its own.
@@ -98,48 +121,43 @@ def why_no_node(scene: Scene, wanted: str) -> Diagnosis:
     for inside, rules in zip(scene.insides, scene.rules, strict=False):
         idle = rule_effect.node_without_effect(rules, wanted, own) if inside in around else None
         if idle:
-            return Diagnosis(*idle)
+            return idle
     idle = _given_as_a_parameter(scene, around, wanted)
     if idle:
-        return Diagnosis(*idle)
+        return idle
     base = wanted.rsplit("/", 1)[-1]
     there = _ending_in(base, own) or _ending_in(base, names)  # a twin, where no other is of this name
     if there:
-        return Diagnosis(
+        return NAMESPACE(
             f"The node `{base}` exists, but in another namespace: {', '.join(f'`{name}`' for name in there)}.",
-            "namespace",
             "A namespace is given at the start (`-r __ns:=/name`, in a launch file `namespace` or "
             "`push_ros_namespace` above it in the same group, and each of these adds a level), and reaches every node "
             "that does not fix its own.",
         )
     space = wanted.rpartition("/")[0]
     if space in own:
-        return Diagnosis(
+        return NAMESPACE(
             f"The node is called `{space}`; that was to be its namespace.",
-            "namespace",
             "`__ns` gives the namespace, `__node` the name of the node: `-r __ns:=" + space + "`.",
         )
     close = nearest(wanted, own) or own[0]
-    return Diagnosis(
+    return NODE_NAME(
         f"There is no node `{wanted}`; the nearest name on the graph is `{close}`.",
-        "node-name",
         "The name given to the Node constructor (or by `-r __node:=`, in a launch file by `name`) decides.",
     )
 
 
-def why_doubled(scene: Scene, name: str) -> Diagnosis:
+def why_doubled(scene: Scene, name: str) -> Reason:
     """Why several nodes have one name."""
     count = scene.observer.nodes().count(name)
     for rule in map(remap_rules.parse, scene.rules_for(name)):
         if rule and rule.left in ("__node", "__name") and not rule.prefix and len(scene.programs) == 1:
-            return Diagnosis(
+            return ONE_NAME_FOR_ALL(
                 f"`{rule.text}` renames every node of its process: now {count} nodes are called `{name}`.",
-                "one-name-for-all",
                 "Say which node is meant by its name in the code: `NODE:__node:=NEW`.",
             )
-    return Diagnosis(
+    return DUPLICATE_NODE(
         f"{count} nodes are called `{name}`: their parameters and services cannot be told apart.",
-        "duplicate-node",
         "Give each node a name of its own.",
     )
 
@@ -154,15 +172,14 @@ def _made_as(scene: Scene, kind: str, name: str) -> list[Thing]:
     ]
 
 
-def absolute_name(scene: Scene, kind: str, name: str, wanted: str = "") -> Diagnosis | None:
+def absolute_name(scene: Scene, kind: str, name: str, wanted: str = "") -> Reason | None:
     """Must have seen: the code make this end with a name that begins with a slash; `wanted` should be there instead."""
     for thing in _made_as(scene, kind, name):
         if thing.given.startswith("/"):
             at = f" in {thing.made}" if thing.made else ""
-            return Diagnosis(
+            return ABSOLUTE_NAME(
                 f"The {kind} is on `{name}`: the code{at} gives the absolute name `{thing.given}`, which does not "
                 "follow the namespace.",
-                "absolute-name",
                 "A topic name with a leading slash is absolute: no namespace reaches it. "
                 + _not_absolute(thing, wanted),
             )
@@ -176,7 +193,7 @@ def _not_absolute(thing: Thing, wanted: str) -> str:
     return "Write it without the slash."
 
 
-def why_topic_present(scene: Scene, topic: str) -> Diagnosis:
+def why_topic_present(scene: Scene, topic: str) -> Reason:
     """Who uses a topic that nobody should use."""
     ends = scene.observer.publishers(topic) + scene.observer.subscriptions(topic)
     owners = sorted({node_of(end) for end in ends})
@@ -184,10 +201,10 @@ def why_topic_present(scene: Scene, topic: str) -> Diagnosis:
     absolute = absolute_name(scene, "publisher", topic) or absolute_name(scene, "subscription", topic)
     if outside and absolute:
         return absolute
-    return Diagnosis(f"{', '.join(owners) or 'A node'} uses `{topic}`.", "topic-present")
+    return TOPIC_PRESENT(f"{', '.join(owners) or 'A node'} uses `{topic}`.")
 
 
-def why_no_endpoint(scene: Scene, topic: str, msg_type: type | None, kind: str, node: str = "") -> Diagnosis:
+def why_no_endpoint(scene: Scene, topic: str, msg_type: type | None, kind: str, node: str = "") -> Reason:
     """Why no `kind` ("publisher" or "subscription") of this type (None: of any) is on the topic."""
     trouble = program_trouble(scene)
     if trouble:
@@ -198,10 +215,10 @@ def why_no_endpoint(scene: Scene, topic: str, msg_type: type | None, kind: str, 
     wanted = type_name(msg_type) if msg_type else ""
     others = sorted({end.topic_type for end in ends if end.topic_type != wanted})
     if others and wanted:
-        return Diagnosis(f"The {kind} on `{topic}` has the type {others[0]}, not {wanted}.", "wrong-type")
+        return WRONG_TYPE(f"The {kind} on `{topic}` has the type {others[0]}, not {wanted}.")
     if ends and node:
         owners = sorted({node_of(end) for end in ends})
-        return Diagnosis(f"The {kind} on `{topic}` belongs to {', '.join(owners)}, not to `{node}`.", "wrong-node")
+        return WRONG_NODE(f"The {kind} on `{topic}` belongs to {', '.join(owners)}, not to `{node}`.")
     if not observer.nodes():
         return _no_node_at_all(scene)
     if node and node not in observer.nodes():
@@ -222,18 +239,16 @@ def why_no_endpoint(scene: Scene, topic: str, msg_type: type | None, kind: str, 
         return found
     opposite = observer.subscriptions(topic) if kind == "publisher" else observer.publishers(topic)
     if opposite:
-        return Diagnosis(
+        return WRONG_END(
             f"On `{topic}` there is only the other end: a {'subscription' if kind == 'publisher' else 'publisher'}.",
-            "wrong-end",
         )
-    return inside_reason(scene, node) or Diagnosis(
+    return inside_reason(scene, node) or NO_TOPIC(
         f"No node has a {kind} on `{topic}`. The nodes are {', '.join(observer.nodes())}; "
         + (f"their topics are {', '.join(sorted(used))}." if used else "they have no topic of their own."),
-        "no-topic",
     )
 
 
-def _idle_rule(scene: Scene, topic: str, node: str) -> Diagnosis | None:
+def _idle_rule(scene: Scene, topic: str, node: str) -> Reason | None:
     """A remap rule, of the program in question, that was meant to make the topic's name and did not."""
     observer = scene.observer
     users = {
@@ -245,15 +260,15 @@ def _idle_rule(scene: Scene, topic: str, node: str) -> Diagnosis | None:
         own = [name for name in observer.nodes() if name in inside.nodes] or observer.nodes()
         nodes = [name for name in own if name == node] if node else own
         found = rule_effect.without_effect(rules, topic, nodes, users, inside.names_in_code)
-        named = [name for name in users if found and name in found[0]]
+        named = [name for name in users if found and name in found.because]
         absolute = any(absolute_name(scene, kind, name) for name in named for kind in ("publisher", "subscription"))
-        if found and (found[1] != "absolute-name" or absolute):
-            return Diagnosis(*found)
+        if found and (found.kind is not ABSOLUTE_NAME or absolute):
+            return found
     given = _given_as_a_parameter(scene, scene.inside_of(node) if node else scene.insides, topic)
-    return Diagnosis(*given) if given else None
+    return given
 
 
-def _elsewhere(scene: Scene, topic: str, kind: str, names: list[str]) -> Diagnosis | None:
+def _elsewhere(scene: Scene, topic: str, kind: str, names: list[str]) -> Reason | None:
     """The same end under another name: absolute in the code, or misspelt.
 
     A name that only the observer's own launch line or another node uses is not what the student meant.
@@ -268,18 +283,18 @@ def _elsewhere(scene: Scene, topic: str, kind: str, names: list[str]) -> Diagnos
     if not close:
         return None
     said = f"There is no {kind} on `{topic}`; the nearest topic with one is"
-    return _misspelt(scene, kind, close, said, code="topic-name")
+    return _misspelt(scene, kind, close, said, TOPIC_NAME)
 
 
-def _misspelt(scene: Scene, kind: str, close: str, said: str, code: str) -> Diagnosis:
+def _misspelt(scene: Scene, kind: str, close: str, said: str, missing: Kind) -> Reason:
     """There is only something of a similar name; `said` is the sentence that the name ends."""
     made = _made_as(scene, kind, close)
     given = made[0].given if made else ""
     in_code = f" (`{given}` in the code)" if given and given != close else ""
-    return Diagnosis(f"{said} `{close}`{in_code}.", code, _LETTER_BY_LETTER)
+    return missing(f"{said} `{close}`{in_code}.", _LETTER_BY_LETTER)
 
 
-def why_no_service(scene: Scene, name: str, srv_type: type) -> Diagnosis:
+def why_no_service(scene: Scene, name: str, srv_type: type) -> Reason:
     """Why there is no server for a service."""
     trouble = program_trouble(scene)
     if trouble:
@@ -287,7 +302,7 @@ def why_no_service(scene: Scene, name: str, srv_type: type) -> Diagnosis:
     services = scene.observer.services()
     wanted = type_name(srv_type)
     if name in services and wanted not in services[name]:
-        return Diagnosis(f"The service `{name}` has the type {services[name][0]}, not {wanted}.", "wrong-type")
+        return WRONG_TYPE(f"The service `{name}` has the type {services[name][0]}, not {wanted}.")
     if not scene.observer.nodes():
         return _no_node_at_all(scene)
     twins = _twins(scene, name)
@@ -296,5 +311,31 @@ def why_no_service(scene: Scene, name: str, srv_type: type) -> Diagnosis:
     close = nearest(name, [n for n in names if n not in elsewhere])
     if close and close != name:
         said = f"There is no service `{name}`; the nearest name on the graph is"
-        return _misspelt(scene, "service", close, said, code="service-name")
-    return inside_reason(scene) or Diagnosis(f"No node offers the service `{name}`.", "no-service")
+        return _misspelt(scene, "service", close, said, SERVICE_NAME)
+    return inside_reason(scene) or NO_SERVICE(f"No node offers the service `{name}`.")
+
+
+def not_made_yet(scene: Scene, topic: str, kind: str, node: str) -> Reason | None:
+    """Must have seen: a line in a method of the source that makes such an end, and no end made there."""
+    for inside in scene.inside_of(node) if node else scene.insides:
+        for method, call in _makers(inside, topic, kind) if inside.alive else []:
+            code = inside.source.line(call.lineno)
+            return NOT_MADE_YET(
+                f"The code makes the {kind} on `{topic}` in `{method}`, line {call.lineno} (`{code}`), and the program "
+                "has not come to that line.",
+                "Make it in the callback after which it is to be there.",
+            )
+    return None
+
+
+def _makers(inside: Inside, topic: str, kind: str) -> list[tuple[str, ast.Call]]:
+    """The calls that would make this end and have made none, each with its method, other than `__init__`."""
+    used = {int(thing.made.rpartition(":")[2] or 0) for thing in inside.things.values() if thing.kind == kind}
+    found = []
+    for method, call in inside.source.method_calls():
+        made = isinstance(call.func, ast.Attribute) and call.func.attr in _MAKERS[kind]
+        names = [word.value for word in call.args if isinstance(word, ast.Constant) and isinstance(word.value, str)]
+        named = any(topic.endswith("/" + name.lstrip("~/")) for name in names)
+        if made and named and used.isdisjoint(range(call.lineno, (call.end_lineno or 0) + 1)) and method != "__init__":
+            found.append((method, call))
+    return found

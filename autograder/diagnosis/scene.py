@@ -7,9 +7,10 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 
+from autograder.diagnosis.diagnosed import DiagnosedProgram
 from autograder.diagnosis.inside import Inside
-from autograder.diagnosis.reason import DiagnosedProgram, Diagnosis
 from autograder.graph.observer import Observer
+from autograder.reasons import Reason
 
 RECORDS_FOLLOW = 0.3
 """Seconds after which what the probes have counted is written."""
@@ -31,7 +32,7 @@ class Scene:
     """The parameter rules typed for each of the programs."""
     parameters: Sequence[Collection[str]] = ()
     """The names of the parameters given to each of the programs by the check."""
-    trouble: Sequence[Diagnosis] = field(default=())
+    trouble: Sequence[Reason] = field(default=())
     """What kept programs from being started at all."""
     stopped: Sequence[DiagnosedProgram] = ()
     """Programs that the check itself has ended."""
@@ -61,7 +62,7 @@ class Scene:
         return ()
 
 
-def first(links: Iterable[Callable[[Inside], Diagnosis | None]], insides: Sequence[Inside]) -> Diagnosis | None:
+def first(links: Iterable[Callable[[Inside], Reason | None]], insides: Sequence[Inside]) -> Reason | None:
     """What the first link that has seen enough says; programs are asked one after the other, links in their order."""
     for inside in insides:
         for link in links:

@@ -12,21 +12,35 @@ from autograder.diagnosis.inside import Inside, called, listed
 from autograder.diagnosis.matching import why_not_matched
 from autograder.diagnosis.names import why_no_endpoint
 from autograder.diagnosis.programs import program_trouble
-from autograder.diagnosis.reason import Diagnosis
 from autograder.diagnosis.scene import Scene, first
 from autograder.diagnosis.together import why_starved
 from autograder.graph import qos
 from autograder.graph.names import node_of, type_name
+from autograder.reasons import Group, Kind, Reason
 from autograder.sandbox.inside.probe.events import LifecyclePublishOff, Thing
+
+NO_ANSWER = Kind("no-answer", "no reason was established: what was seen is said", Group.SILENCE)
+TIMER_PERIOD = Kind(
+    "timer-period", "nothing published, a timer of the node is not due yet, and the others have run", Group.SILENCE
+)
+LIFECYCLE_INACTIVE = Kind(
+    "lifecycle-inactive", "a lifecycle publisher dropped a message in another state", Group.SILENCE
+)
+NO_SUPER_ON_ACTIVATE = Kind(
+    "no-super-on-activate",
+    "a lifecycle publisher that was not activated dropped a message in state active",
+    Group.SILENCE,
+)
+LIFESPAN = Kind(
+    "lifespan", "a transient local publisher's last message is older than its lifespan; nothing came", Group.SILENCE
+)
+SILENT = Kind("silent", "no reason was established: what was seen is said", Group.SILENCE)
 
 _EVERY_NODE = ("use_sim_time", "start_type_description_service")
 """Parameters that a node has without declaring them."""
 
-SILENT = "silent"
-"""The code where no reason is established."""
 
-
-def why_silent(scene: Scene, topic: str, msg_type: type, profile: QoSProfile) -> Diagnosis:
+def why_silent(scene: Scene, topic: str, msg_type: type, profile: QoSProfile) -> Reason:
     """Why nothing (more) arrived on a topic: the first link that is seen to be broken, or what was seen."""
     trouble = program_trouble(scene)
     if trouble:
@@ -45,33 +59,31 @@ def why_silent(scene: Scene, topic: str, msg_type: type, profile: QoSProfile) ->
         or not_due(scene, topic)
         or why_starved(scene)
         or first((callbacks.never_awaited,), scene.inside_of(node))
-        or Diagnosis(account(scene, topic), SILENT)
+        or SILENT(account(scene, topic))
     )
 
 
-def lifecycle_silence(scene: Scene, topic: str = "") -> Diagnosis | None:
+def lifecycle_silence(scene: Scene, topic: str = "") -> Reason | None:
     """Must have seen: a lifecycle publisher (of this topic) that dropped a message because it was not activated."""
     for inside in scene.insides:
         for event in inside.all(LifecyclePublishOff):
             if topic and event.name != topic:
                 continue
             if event.state == "active":
-                return Diagnosis(
+                return NO_SUPER_ON_ACTIVATE(
                     f"`{inside.name}` is active, but its lifecycle publisher was never activated: `on_activate` does "
                     "not call `super().on_activate(state)`.",
-                    "no-super-on-activate",
                     "End `on_activate` with `return super().on_activate(state)`.",
                 )
-            return Diagnosis(
+            return LIFECYCLE_INACTIVE(
                 f"`{inside.name}` publishes in {event.line} while it is {event.state or 'not active'}: a lifecycle "
                 "publisher drops such messages.",
-                "lifecycle-inactive",
                 "It sends from `on_activate` to `on_deactivate` only.",
             )
     return None
 
 
-def too_old(scene: Scene, topic: str, profile: QoSProfile) -> Diagnosis | None:
+def too_old(scene: Scene, topic: str, profile: QoSProfile) -> Reason | None:
     """Must have seen: a publisher that keeps messages for late joiners, all of them older than its lifespan by now."""
     if profile.durability != DurabilityPolicy.TRANSIENT_LOCAL:
         return None
@@ -83,17 +95,16 @@ def too_old(scene: Scene, topic: str, profile: QoSProfile) -> Diagnosis | None:
             if have["durability"] != "transient_local" or publisher.node != node or not publisher.runs:
                 continue
             if isinstance(lifespan, float) and lifespan < age:
-                return Diagnosis(
+                return LIFESPAN(
                     f"`{inside.name}` published {publisher.runs} message{'s' * (publisher.runs > 1)} on `{topic}`, "
                     f"{'the last of them ' * (publisher.runs > 1)}{age:.1f} s ago, and the publisher's lifespan is "
                     f"{qos.in_words(lifespan)}: nothing is kept for who comes later than that.",
-                    "lifespan",
                     "A publisher without a lifespan keeps its last messages for late joiners.",
                 )
     return None
 
 
-def not_due(scene: Scene, topic: str) -> Diagnosis | None:
+def not_due(scene: Scene, topic: str) -> Reason | None:
     """Must have seen: a node that has published nothing on a topic, and timers of it of which none is due yet."""
     for inside, publisher in _publishers(scene, topic):
         found = None if publisher.runs else _no_timer_due(inside, publisher.node)
@@ -102,20 +113,19 @@ def not_due(scene: Scene, topic: str) -> Diagnosis | None:
     return None
 
 
-def _no_timer_due(inside: Inside, node: str) -> Diagnosis | None:
+def _no_timer_due(inside: Inside, node: str) -> Reason | None:
     """Must have seen: a program that lives, and timers of its node of which none is due yet."""
     timers = [t for t in inside.callbacks if t.kind == "timer" and t.node == node and not t.cancelled]
     late = [t for t in timers if not t.runs and t.period > inside.age]
     if inside.alive and late and len(late) == len(timers):
-        return Diagnosis(
+        return TIMER_PERIOD(
             f"`{inside.name}`: {called(late[0])} has not fired yet; the program has run for {inside.age:.0f} s.",
-            "timer-period",
             "`create_timer` takes its period in seconds.",
         )
     return None
 
 
-def nothing_due(scene: Scene, node: str) -> Diagnosis | None:
+def nothing_due(scene: Scene, node: str) -> Reason | None:
     """Must have seen: a node without a subscription that lives, and timers of it of which none is due yet."""
     for inside in scene.insides:
         if not any(thing.kind == "subscription" and thing.node == node for thing in inside.callbacks):
@@ -195,7 +205,7 @@ def _ran(kind: str, runs: int) -> str:
     return {0: f"got no {came}", 1: f"got one {came}"}.get(runs, f"got {runs} {came}s")
 
 
-def why_no_answer(scene: Scene, name: str) -> Diagnosis:
+def why_no_answer(scene: Scene, name: str) -> Reason:
     """Why a service that exists did not answer."""
     found = program_trouble(scene) or inside_reason(scene, _owner(scene, name))
     if found:
@@ -209,12 +219,11 @@ def why_no_answer(scene: Scene, name: str) -> Diagnosis:
             if thing.kind == "service" and thing.name == name:
                 ran = {0: "has not run", 1: "ran once"}.get(thing.runs, f"ran {thing.runs} times")
                 ended = "" if thing.done == thing.runs else f"; of these runs, {thing.runs - thing.done} did not end"
-                return Diagnosis(
+                return NO_ANSWER(
                     f"The service `{name}` is on the graph and its node is spun, but no answer came; its callback "
                     f"{ran}{ended}.",
-                    "no-answer",
                 )
-    return Diagnosis(f"The service `{name}` is on the graph, but no answer came.", "no-answer")
+    return NO_ANSWER(f"The service `{name}` is on the graph, but no answer came.")
 
 
 def _owner(scene: Scene, name: str) -> str:

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from autograder.diagnosis.reason import DiagnosedProgram
+from autograder.diagnosis.diagnosed import DiagnosedProgram
 
 LOOKS = 4
 """How often the stacks are looked at: a busy loop is in another of its lines each time."""

@@ -3,7 +3,26 @@
 from __future__ import annotations
 
 from autograder.diagnosis.inside import Inside
-from autograder.diagnosis.reason import Diagnosis
+from autograder.reasons import Group, Kind, Reason
+
+STUCK_IN_INIT = Kind(
+    "stuck-in-init", "nothing was ever spun; the program is in one place of an __init__ each time", Group.SPINNING
+)
+NODE_NOT_ADDED = Kind("node-not-added", "an executor without nodes spins; the node was never spun", Group.SPINNING)
+NOT_SPINNING = Kind(
+    "not-spinning", "a node with callbacks was never spun, or the program ended without spinning", Group.SPINNING
+)
+SHUTDOWN_IN_CALLBACK = Kind(
+    "shutdown-in-callback", "a callback called shutdown, and the program did not end as it should", Group.PROGRAM
+)
+THREAD_LEFT = Kind(
+    "thread-left",
+    "the main thread has come to its end and waits for another, which is in the student's code",
+    Group.SPINNING,
+)
+SPINNING_ENDED = Kind(
+    "spinning-ended", "the node was spun, and no spinning executor has held it for a while", Group.SPINNING
+)
 
 SHUT_DOWN_IN_MAIN = "Let the callback set a future or a flag, and let `main` end the spinning and shut down."
 
@@ -18,75 +37,71 @@ def _unspun(inside: Inside) -> list[str]:
     return [node.name for node in inside.nodes.values() if not node.spun and not node.destroyed]
 
 
-def in_the_constructor(inside: Inside) -> Diagnosis | None:
+def in_the_constructor(inside: Inside) -> Reason | None:
     """Must have seen: no node spun yet, and the program in one place of an `__init__` each time it is looked at."""
     if not _unspun(inside) or any(executor.spins for executor in inside.executors):
         return None
     place = inside.main_place()
     if place is None or place.function != "__init__":
         return None
-    return Diagnosis(
+    return STUCK_IN_INIT(
         f"`{inside.name}` is still in `__init__`, in {place}: it has not reached its spinning, so no callback can run.",
-        "stuck-in-init",
         "A constructor has to end. What must happen again and again belongs in a timer.",
     )
 
 
-def not_added(inside: Inside) -> Diagnosis | None:
+def not_added(inside: Inside) -> Reason | None:
     """Must have seen: an executor that spins without any node, and a node that no executor has ever spun."""
     unspun = _unspun(inside)
     empty = [executor for executor in inside.executors if executor.spinning and not executor.nodes]
     if unspun and empty and not any(executor.nodes for executor in inside.executors):
-        return Diagnosis(
+        return NODE_NOT_ADDED(
             f"`{inside.name}` spins a {empty[0].type}, but that holds no node: `{unspun[0]}` was never added to it.",
-            "node-not-added",
             "`executor.add_node(node)` comes before `executor.spin()`.",
         )
     return None
 
 
-def never_spun(inside: Inside) -> Diagnosis | None:
+def never_spun(inside: Inside) -> Reason | None:
     """Must have seen: a node with callbacks, and no executor that ever spun while it held that node."""
     with_callbacks = {thing.node for thing in inside.callbacks}
     return _never_spun(inside, [name for name in _unspun(inside) if name in with_callbacks])
 
 
-def cannot_answer(inside: Inside) -> Diagnosis | None:
+def cannot_answer(inside: Inside) -> Reason | None:
     """For a service of every node's, such as those of its parameters. Must have seen: what `never_spun` must, but
     of any node.
     """
     return _never_spun(inside, _unspun(inside))
 
 
-def _never_spun(inside: Inside, names: list[str]) -> Diagnosis | None:
+def _never_spun(inside: Inside, names: list[str]) -> Reason | None:
     for name in names:
         others = [node.name for node in inside.nodes.values() if node.spun]
         place = inside.main_place() if not others else None
-        return Diagnosis(
+        return NOT_SPINNING(
             f"`{inside.name}` made its node `{name}` but nothing spins it, so no callback of it can run."
             + (f" The program is in {place}." if place else "")
             + (f" Only {', '.join(f'`{other}`' for other in others)} is spun." if others else ""),
-            "not-spinning",
             "Call `rclpy.spin(node)`, or `spin()` of the executor that the node was added to.",
         )
     return None
 
 
-def pulled_down(inside: Inside) -> Diagnosis | None:
+def pulled_down(inside: Inside) -> Reason | None:
     """Must have seen: a shutdown in a callback, and a program that runs on while none of its nodes is spun."""
     spun = any(executor.spinning and executor.nodes for executor in inside.executors)
     for call in inside.calls:
         if call.what == "shutdown" and call.in_callback and not spun:
-            return Diagnosis(
+            return SHUTDOWN_IN_CALLBACK(
                 f"`{inside.name}`, {call.line} (`{call.code}`) shuts down inside a callback, so what spins the node is "
                 "pulled away under it; the program itself runs on.",
-                "shutdown-in-callback",
                 SHUT_DOWN_IN_MAIN,
             )
     return None
 
 
-def thread_left(inside: Inside) -> Diagnosis | None:
+def thread_left(inside: Inside) -> Reason | None:
     """Must have seen: the main thread wait for others at the end of Python, and one of them in the student's code."""
     mains = [next(reversed(stacks.values()), []) for stacks in inside.stacks]
     if not mains or not all(any(frame[2] == "_shutdown" for frame in frames) for frames in mains):
@@ -94,26 +109,24 @@ def thread_left(inside: Inside) -> Diagnosis | None:
     for thread in inside.stacks[0]:
         place = inside.place(thread)
         if place:
-            return Diagnosis(
+            return THREAD_LEFT(
                 f"`{inside.name}`: `main` has come to its end, but a thread of the program still runs "
                 f"`{place.function}`, in {place}. Python waits for each thread that is no daemon.",
-                "thread-left",
                 "Tell the thread to end and `join` it, or make it with `daemon=True`.",
             )
     return None
 
 
-def no_longer_spun(inside: Inside) -> Diagnosis | None:
+def no_longer_spun(inside: Inside) -> Reason | None:
     """Must have seen: a node that was spun, and that no spinning executor holds now, while the program lives on."""
     for node in inside.nodes.values():
         left = node.spun and not inside.spinning(node.name) and inside.now - node.spun > ENDED_AFTER
         if left and not node.destroyed and not node.foreign:
             busy = any(executor.spinning for executor in inside.executors)
             place = None if busy else inside.main_place()
-            return Diagnosis(
+            return SPINNING_ENDED(
                 f"`{inside.name}`: the node `{node.name}` was spun for a while, and nothing spins it now."
                 + (f" The program is in {place}." if place else ""),
-                "spinning-ended",
                 "Only while something spins the node can its callbacks run.",
             )
     return None

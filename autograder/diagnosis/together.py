@@ -1,14 +1,59 @@
-"""Why callbacks did not run at the same time, or some hardly at all: the executor, its threads, the groups."""
+"""Why callbacks did not run at the same time, or some hardly at all: the executor, its threads, the groups, a lock."""
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 
+from autograder.diagnosis.blocked import ONE_LOCK, WAITS_FOR_LOCK
 from autograder.diagnosis.inside import Inside, called, listed
-from autograder.diagnosis.reason import Diagnosis
 from autograder.diagnosis.scene import Scene
-from autograder.diagnosis.turns import one_lock
+from autograder.reasons import Group, Kind, Reason
 from autograder.sandbox.inside.probe.events import ExecutorSeen, Thing
+
+ONE_GROUP = Kind(
+    "one-group", "all timers and all callbacks that ran are in one exclusive group", Group.TOGETHER, "timeline"
+)
+SINGLE_THREADED_EXECUTOR = Kind(
+    "single-threaded-executor", "all callbacks ran on one single-threaded executor", Group.TOGETHER, "timeline"
+)
+FEW_THREADS = Kind("few-threads", "fewer threads than callbacks that must run at once", Group.TOGETHER, "timeline")
+GROUP_LIMIT = Kind(
+    "group-limit",
+    "the groups of all timers and all callbacks that ran let fewer run at once than must",
+    Group.TOGETHER,
+    "timeline",
+)
+EXCLUSIVE_GROUP = Kind(
+    "exclusive-group",
+    "all callbacks that ran are in exclusive groups, where one was to overlap itself",
+    Group.TOGETHER,
+    "timeline",
+)
+NO_CALLBACK_GROUPS = Kind(
+    "no-callback-groups",
+    "all timers and all callbacks that ran are in the node's default group",
+    Group.TOGETHER,
+    "timeline",
+)
+STARVED = Kind(
+    "starved",
+    "a timer ran far less often than due; others of its exclusive group took most of the time",
+    Group.TOGETHER,
+    "timeline",
+)
+MACHINE_THREADS = Kind(
+    "machine-threads",
+    "fewer threads than callbacks that must run at once, and no number given",
+    Group.TOGETHER,
+    "timeline",
+)
+TIMER_SAME_GROUP = Kind(
+    "timer-same-group",
+    "a callback waits for an answer, and all timers of its node are in its exclusive group",
+    Group.TOGETHER,
+    "timeline",
+)
 
 MOST_OF_THE_TIME = 0.6
 """Share of the time that others must have taken for a callback to count as kept waiting by them."""
@@ -26,7 +71,7 @@ def _active(inside: Inside) -> list[Thing]:
     return [thing for thing in inside.callbacks if thing.runs]
 
 
-def single_threaded(inside: Inside) -> Diagnosis | None:
+def single_threaded(inside: Inside) -> Reason | None:
     """Must have seen: callbacks run, one of which takes time, and every executor that ran one has one thread and is no
     MultiThreadedExecutor.
     """
@@ -47,56 +92,51 @@ def single_threaded(inside: Inside) -> Diagnosis | None:
         because = f"It is spun by a {used[0].type}, one callback at a time: a reentrant group changes nothing there."
     else:
         because = f"It is spun by a {used[0].type} (that is what `rclpy.spin` uses), which runs one callback at a time."
-    return Diagnosis(
+    return SINGLE_THREADED_EXECUTOR(
         f"`{inside.name}`: {because}",
-        "single-threaded-executor",
         "Add the node to a MultiThreadedExecutor(num_threads=...) and spin that.",
     )
 
 
-def few_threads(inside: Inside, at_once: int) -> Diagnosis | None:
+def few_threads(inside: Inside, at_once: int) -> Reason | None:
     """Must have seen: an executor that ran callbacks on fewer threads than have to run at once."""
     for executor in _used(inside):
         if executor.threads is None or executor.threads >= at_once:
             continue
         have = f"{executor.threads} thread{'s' * (executor.threads != 1)}"
         if not executor.threads_given:
-            return Diagnosis(
+            return MACHINE_THREADS(
                 f"`{inside.name}` leaves the number of threads to the machine: MultiThreadedExecutor() took {have} "
                 f"here, as many as there are CPUs, and {at_once} callbacks have to run at once.",
-                "machine-threads",
                 "Name the number that the task asks for: MultiThreadedExecutor(num_threads=...).",
             )
-        return Diagnosis(
+        return FEW_THREADS(
             f"`{inside.name}`: its MultiThreadedExecutor has {have}, and {at_once} callbacks have to run at once.",
-            "few-threads",
             "Each callback that runs needs a thread of its own while it runs: count those that may run at once.",
         )
     return None
 
 
-def one_group(inside: Inside) -> Diagnosis | None:
+def one_group(inside: Inside) -> Reason | None:
     """Must have seen: several callbacks, those that ran and all timers, in one and the same exclusive group."""
     active = [thing for thing in inside.callbacks if thing.runs or thing.kind == "timer"]
     groups = {thing.group_id for thing in active}
     if len(active) < 2 or len(groups) != 1 or not all(thing.exclusive for thing in active):
         return None
     if active[0].default_group:
-        return Diagnosis(
+        return NO_CALLBACK_GROUPS(
             f"`{inside.name}` has a MultiThreadedExecutor, but all its callbacks are in the node's default group, "
             "which is mutually exclusive: they run one after another.",
-            "no-callback-groups",
             "Give the callbacks that may overlap a callback group of their own.",
         )
-    return Diagnosis(
+    return ONE_GROUP(
         f"`{inside.name}` has all its callbacks in one mutually exclusive group ({listed(active)}): they run one after "
         "another.",
-        "one-group",
         "Callbacks that may overlap need different groups.",
     )
 
 
-def groups_allow_fewer(inside: Inside, at_once: int) -> Diagnosis | None:
+def groups_allow_fewer(inside: Inside, at_once: int) -> Reason | None:
     """Must have seen: the groups of all timers and of all callbacks that ran, which let fewer of them run at once.
 
     A reentrant callback that overlapped itself may stand for any number of them: nothing is said then.
@@ -106,10 +146,9 @@ def groups_allow_fewer(inside: Inside, at_once: int) -> Diagnosis | None:
     limit = sum(1 if members[0].exclusive else len(members) for members in groups)
     if len(active) < at_once or limit >= at_once or any(thing.most > 1 for thing in active):
         return None
-    return Diagnosis(
+    return GROUP_LIMIT(
         f"`{inside.name}`: its groups let no more than {limit} callbacks run at once, and {at_once} have to: "
         f"{_kinds(groups)}.",
-        "group-limit",
         "Of a mutually exclusive group one callback runs at a time: what may overlap the others belongs in another "
         "group.",
     )
@@ -129,15 +168,14 @@ def _kinds(groups: Sequence[Sequence[Thing]]) -> str:
     )
 
 
-def exclusive_itself(inside: Inside) -> Diagnosis | None:
+def exclusive_itself(inside: Inside) -> Reason | None:
     """Must have seen: callbacks run, and none of them in a reentrant group. (For a callback that overlaps itself.)"""
     active = _active(inside)
     if not active or any(not thing.exclusive for thing in active):
         return None
-    return Diagnosis(
+    return EXCLUSIVE_GROUP(
         f"`{inside.name}`: every callback is in a mutually exclusive group ({listed(active)}). In such a group a "
         "callback never runs beside itself, however many threads there are.",
-        "exclusive-group",
         "A callback may overlap itself only in a ReentrantCallbackGroup.",
     )
 
@@ -152,7 +190,7 @@ def _publishing(scene: Scene, topic: str) -> list[Inside]:
     return publishing or scene.insides
 
 
-def why_not_together(scene: Scene, topic: str, at_once: int = 2, itself: bool = False) -> Diagnosis | None:
+def why_not_together(scene: Scene, topic: str, at_once: int = 2, itself: bool = False) -> Reason | None:
     """Why callbacks did not overlap; None where what was seen excludes none of the ways in which that happens.
 
     Args:
@@ -173,7 +211,7 @@ def why_not_together(scene: Scene, topic: str, at_once: int = 2, itself: bool = 
     return None
 
 
-def waits_for_its_group(scene: Scene) -> Diagnosis | None:
+def waits_for_its_group(scene: Scene) -> Reason | None:
     """Why timers pause while a service is called. Must have seen: a callback that waits for an answer, and every timer
     of its node in the mutually exclusive group of that callback.
     """
@@ -187,17 +225,16 @@ def waits_for_its_group(scene: Scene) -> Diagnosis | None:
             timers = [other for other in inside.callbacks if other.kind == "timer" and other.node == thing.node]
             if timers and all(timer.group_id == thing.group_id and timer.id != thing.id for timer in timers):
                 group = "the node's default group" if thing.default_group else "one group"
-                return Diagnosis(
+                return TIMER_SAME_GROUP(
                     f"`{inside.name}`: {called(thing)} holds its group while it waits for the answer, and "
                     f"{listed(timers)} {'is' if len(timers) == 1 else 'are'} in the same one ({group}, mutually "
                     "exclusive): no tick until the answer is there.",
-                    "timer-same-group",
                     "Give the timer a callback group of its own.",
                 )
     return None
 
 
-def why_starved(scene: Scene) -> Diagnosis | None:
+def why_starved(scene: Scene) -> Reason | None:
     """Why some timers ran far less often than they were due.
 
     Must have seen: such a timer, and others of its exclusive group, or of its executor, take most of the time.
@@ -212,7 +249,7 @@ def why_starved(scene: Scene) -> Diagnosis | None:
     return None
 
 
-def _starved(inside: Inside, timer: Thing) -> Diagnosis | None:
+def _starved(inside: Inside, timer: Thing) -> Reason | None:
     node, executor = inside.nodes.get(timer.node), inside.executor_of(timer.node)
     if not node or not node.spun or not executor or not timer.period:
         return None
@@ -222,19 +259,18 @@ def _starved(inside: Inside, timer: Thing) -> Diagnosis | None:
     others = [other for other in inside.group(timer) if other.id != timer.id and other.has_callback and other.runs]
     if timer.exclusive and _taken(inside, others) > MOST_OF_THE_TIME * lasted:
         group = "the node's default group" if timer.default_group else "one mutually exclusive group"
-        return Diagnosis(
+        return STARVED(
             f"`{inside.name}`: {called(timer)} {_ran(timer.runs)}. It is in {group} with {listed(others)}; while "
             "one of a mutually exclusive group runs, the others wait, and these took most of the time.",
-            "starved",
             "Callbacks that must not wait for each other need different groups.",
         )
     others = [other for other in _active(inside) if other.id != timer.id]
     if _taken(inside, others) > MOST_OF_THE_TIME * lasted * executor.size and executor.most >= executor.size:
         threads = "the only thread" if executor.size == 1 else f"all {executor.size} threads"
-        return Diagnosis(
+        kind = SINGLE_THREADED_EXECUTOR if executor.threads is None else FEW_THREADS
+        return kind(
             f"`{inside.name}`: {called(timer)} {_ran(timer.runs)}: {listed(others)} kept {threads} of the "
             f"{executor.type} busy most of the time.",
-            "single-threaded-executor" if executor.threads is None else "few-threads",
             "Callbacks that must not wait for each other need threads of their own."
             if executor.threads is not None
             else "Spin the node with a MultiThreadedExecutor(num_threads=...), and give these callbacks own groups.",
@@ -264,3 +300,78 @@ def layout(scene: Scene, topic: str) -> str:
             f"{executor.most} were busy at once; {_kinds(_by_group(_active(inside)))}."
         )
     return " ".join(said)
+
+
+def why_kept_waiting(scene: Scene, service: str) -> Reason | None:
+    """Why a service answers only when another callback of its program has ended.
+
+    Must have seen: another callback whose runs take time, and the service's in its exclusive group, or on its only
+    thread; or runs of the service's callback that take time themselves, and a lock that the source of both takes.
+    """
+    for inside in scene.insides:
+        asked = [thing for thing in inside.callbacks if (thing.kind, thing.name) == ("service", service)]
+        slow = [thing for thing in inside.callbacks if thing.takes_time and thing.name != service]
+        for answers in asked:
+            for works in slow:
+                found = _group(inside, answers, works) or _thread(inside, answers, works)
+                found = found or _lock(inside, answers, works)
+                if found:
+                    return found
+    return None
+
+
+def _group(inside: Inside, answers: Thing, works: Thing) -> Reason | None:
+    if not works.exclusive or works.group_id != answers.group_id:
+        return None
+    group = "the node's default group" if works.default_group else "one group"
+    return ONE_GROUP(
+        f"`{inside.name}`: {called(answers)} and {called(works)} are in {group}, which is mutually exclusive: the "
+        "answer waits until the other callback has ended.",
+        "Callbacks that may overlap need different groups.",
+    )
+
+
+def _thread(inside: Inside, answers: Thing, works: Thing) -> Reason | None:
+    executor = inside.executor_of(works.node)
+    if not executor or executor.size != 1 or executor is not inside.executor_of(answers.node):
+        return None
+    kind = SINGLE_THREADED_EXECUTOR if executor.threads is None else FEW_THREADS
+    return kind(
+        f"`{inside.name}`: its {executor.type} has one thread, so {called(answers)} waits until {called(works)} has "
+        "ended.",
+        "Callbacks that must not wait for each other need threads of their own.",
+    )
+
+
+def _lock(inside: Inside, answers: Thing, works: Thing) -> Reason | None:
+    if not answers.takes_time:
+        return None
+    mine, others = (inside.source.locks(int(t.line.rpartition(":")[2] or 0)) for t in (answers, works))
+    for lock, line in mine.items():
+        if lock in others:
+            return WAITS_FOR_LOCK(
+                f"`{inside.name}`: {called(answers)} takes `{lock}` in line {line}, and {called(works)} holds that "
+                f"while it works (from line {others[lock]} on): the answer waits for it.",
+                ONE_LOCK,
+            )
+    return None
+
+
+def one_lock(inside: Inside, at_once: int) -> Reason | None:
+    """Why callbacks that were on threads at once worked one after another.
+
+    Must have seen: so many callbacks on the threads of an executor at once, and a lock that the source of two takes;
+    runs of one of these take time.
+    """
+    most = max((executor.most for executor in inside.executors), default=0)
+    ran = [thing for thing in inside.callbacks if thing.runs] if most >= at_once else []
+    taken = [(thing, inside.source.locks(int(thing.line.rpartition(":")[2] or 0))) for thing in ran]
+    for (one, mine), (other, others) in itertools.combinations(taken, 2):
+        for lock in [lock for lock in mine if lock in others and (one.takes_time or other.takes_time)]:
+            lines = f"line {mine[lock]}" if mine[lock] == others[lock] else f"lines {mine[lock]} and {others[lock]}"
+            return WAITS_FOR_LOCK(
+                f"`{inside.name}`: up to {most} callbacks were on threads at once, but {called(one)} and "
+                f"{called(other)} take the same `{lock}` ({lines}): one waits while the other holds it.",
+                f"{ONE_LOCK} One that waits keeps its thread.",
+            )
+    return None

@@ -5,119 +5,136 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
-from autograder.diagnosis.reason import Diagnosis
+from autograder.reasons import Group, Kind, Reason
+
+CRASHED = Kind("crashed", "the program ended with an error that it printed, or by a signal", Group.PROGRAM)
+SYNTAX_ERROR = Kind(
+    "syntax-error", "Python printed a SyntaxError, IndentationError or TabError and the program ended", Group.PROGRAM
+)
+PARAMETER_NOT_DECLARED = Kind("parameter-not-declared", "the error is a ParameterNotDeclaredException", Group.PROGRAM)
+PARAMETER_TYPE = Kind("parameter-type", "the error is an InvalidParameterTypeException", Group.PROGRAM)
+REFUSED_CALL = Kind("refused-call", "the error is the system's refusal of a call", Group.PROGRAM)
+BUILTIN_CALLBACK = Kind(
+    "builtin-callback", "rclpy found no signature of a callback that is no Python function", Group.PROGRAM
+)
+NOT_COPIED = Kind(
+    "not-copied",
+    "the error says that an object of rclpy cannot be pickled, which is how deepcopy copies",
+    Group.PROGRAM,
+)
+USED_AFTER_DESTROY = Kind("used-after-destroy", "the error says that something destroyed was used", Group.PROGRAM)
 
 KNOWN_ERRORS = (
     (
         "add_entity() missing 1 required positional argument",
-        "crashed",
+        CRASHED,
         "A callback group is an object: it is made with brackets, `ReentrantCallbackGroup()`, and then handed over.",
     ),
     (
         "handle cannot be modified after node creation",
-        "crashed",
+        CRASHED,
         "`handle` is an attribute of rclpy's own `Node`: give yours another name, such as `self.goal_handle`.",
     ),
     (
         "'method' object does not support the context manager protocol",
-        "crashed",
+        CRASHED,
         "If the line of rclpy's own is `with self.handle:`, a method of yours is called `handle`. That is an attribute "
         "of rclpy's own `Node`: give yours another name.",
     ),
     (
         "object has no setter",
-        "crashed",
+        CRASHED,
         "rclpy's own `Node` has `clients`, `context`, `default_callback_group`, `guards`, `publishers`, `services`, "
         "`subscriptions`, `timers` and `waitables`, and none of them can be set. An attribute of your node needs "
         "another name, such as `self.my_timers`.",
     ),
     (
         "ModuleNotFoundError",
-        "crashed",
+        CRASHED,
         "Python finds no module of this name. Is the name right? The code of a package of yours is only installed if "
         "`packages` in its setup.py names the folder.",
     ),
     (
         "EOF when reading a line",
-        "crashed",
+        CRASHED,
         "A node that a launch starts has no keyboard, so `input()` finds nothing to read. Give it values as "
         "parameters, or by a topic or a service.",
     ),
     (
         "'NoneType' object does not support the context manager protocol",
-        "crashed",
+        CRASHED,
         "`with` was given None. In ROS 2 Jazzy, `rclpy.init()` returns None: call it in a line of its own, and "
         "`rclpy.try_shutdown()` at the end.",
     ),
     (
         "Logger severity cannot be changed between calls",
-        "crashed",
+        CRASHED,
         "rclpy remembers for each place in the code at which level it logs, and allows no other one there: give `info` "
         "a call of its own and `warning` one of its own, with `if` and `else`.",
     ),
     (
         "generator already executing",
-        "crashed",
+        CRASHED,
         "If a `spin` raised it: two threads spin one executor. Every `rclpy.spin(node)` uses the same one of the "
         "process. Add all nodes to one executor and spin that, or make an executor for each thread.",
     ),
     (
         "coroutine raised StopIteration",
-        "crashed",
+        CRASHED,
         "A callback let a StopIteration out, its own or that of a `next()` that found nothing more. rclpy runs "
         "callbacks in a coroutine, where Python makes a RuntimeError of it: raise another error, or end without one.",
     ),
     *(
         (
-            f"'{kind}' object has no attribute 'add_node'",
-            "crashed",
+            f"'{number}' object has no attribute 'add_node'",
+            CRASHED,
             "In this place rclpy expects an executor. A time is given by its name: `timeout_sec=…`.",
         )
-        for kind in ("float", "int")
+        for number in ("float", "int")
     ),
     (
         "ParameterNotDeclaredException",
-        "parameter-not-declared",
+        PARAMETER_NOT_DECLARED,
         "A parameter exists from `declare_parameter` on: declare it before you read it, even if a value was given.",
     ),
     (
         "expecting type 'BYTE_ARRAY'",
-        "parameter-type",
+        PARAMETER_TYPE,
         "An empty list as the default is a list of bytes for rclpy. Give the type in its place, as in "
         '`declare_parameter("names", rclpy.Parameter.Type.STRING_ARRAY)`, or a list that holds something.',
     ),
     (
         "InvalidParameterTypeException",
-        "parameter-type",
+        PARAMETER_TYPE,
         "The value's type must be the declared one: 40 is an integer, 40.0 a double, '40' a string.",
     ),
     (
         "PermissionError: [Errno 1]",
-        "refused-call",
+        REFUSED_CALL,
         "A program may not ask this of the system. New processes (`fork`, `subprocess`, `multiprocessing`) are among "
         "what it may not ask for: use threads, or one more program in the launch.",
     ),
     (
         "no signature found for builtin",
-        "builtin-callback",
+        BUILTIN_CALLBACK,
         "rclpy takes only functions and methods written in Python as callbacks: put the call into a `def` or a "
         "`lambda` of your own.",
     ),
     (
         "'NoneType' object is not callable",
-        "crashed",
+        CRASHED,
         "What is called there is None. A callback is handed over without brackets: with brackets it is called at once, "
         "and what it returns, often None, is handed over.",
     ),
     (
         "cannot pickle 'rclpy.",
-        "not-copied",
+        NOT_COPIED,
         "`deepcopy` cannot copy what rclpy keeps in C++, such as the durations in a QoS profile. `copy.copy(profile)` "
         "makes a second profile whose policies can be set without a change to the first.",
     ),
     (
         "InvalidHandle",
-        "used-after-destroy",
+        USED_AFTER_DESTROY,
         "It used something that had been destroyed. What a node made is destroyed by the node, as with "
         "`self.destroy_publisher(…)`: after a `destroy()` of its own it stays in the node's list, and `spin` uses it. "
         "Under a MultiThreadedExecutor the executor uses it, now and then, while a callback destroys it (rclpy issue "
@@ -125,7 +142,7 @@ KNOWN_ERRORS = (
     ),
     (
         "timer argument is null",
-        "used-after-destroy",
+        USED_AFTER_DESTROY,
         "A MultiThreadedExecutor asked a timer that a callback had just destroyed (rclpy issue 1355): spin a node that "
         "destroys its timers with a SingleThreadedExecutor, or use `cancel()` and `reset()`.",
     ),
@@ -141,7 +158,7 @@ def quoted(code: str, error: str) -> str:
     return f" (`{code}`)" if code and kind not in code else ""
 
 
-def last_traceback(output: str, program: str) -> Diagnosis | None:
+def last_traceback(output: str, program: str) -> Reason | None:
     """The last error that a Python program printed. Must have seen: a line that is one by its name or its frames."""
     lines = output.splitlines()
     error_at = None
@@ -156,15 +173,17 @@ def last_traceback(output: str, program: str) -> Diagnosis | None:
         error += f" {lines[error_at + 1].strip()}"
     where, code = _own_line(lines[:error_at], program)
     said = f"{where}{quoted(code, error)}: {error}"
-    for exception, word, hint in KNOWN_ERRORS:
+    for exception, kind, hint in KNOWN_ERRORS:
         if exception in error:
-            return Diagnosis(f"`{program}` ended with an error{said}", word, hint)
+            return kind(f"`{program}` ended with an error{said}", hint)
     if error.startswith(("SyntaxError", "IndentationError", "TabError")):
-        return Diagnosis(
-            f"`{program}` is not a Python program{said}", "syntax-error", "Python stops reading at this line or before."
+        return SYNTAX_ERROR(
+            f"`{program}` is not a Python program{said}",
+            "Python stops reading at this line or before.",
         )
-    return Diagnosis(
-        f"`{program}` ended with an error{said}", "crashed", "The lines above it in the log say how it got there."
+    return CRASHED(
+        f"`{program}` ended with an error{said}",
+        "The lines above it in the log say how it got there.",
     )
 
 

@@ -18,16 +18,16 @@ from autograder.grading.follower import Ear, Follower, Told
 from autograder.grading.job import CELL_SECONDS, STUCK_SECONDS, Job
 from autograder.grading.validation import undecided, validated, was_killed
 from autograder.graph.patience import ALONE
+from autograder.reasons import KINDS, Group, Kind
 from autograder.sandbox.outer import OuterRun, run_in_sandbox
+
+STUCK = Kind("stuck", "the grader did not come on at this check; an instructor decides", Group.GRADER)
+DIED = Kind("died", "the grader died at this check, twice; an instructor decides", Group.GRADER)
 
 SECONDS_PER_CHECK = 120.0
 """Seconds that each check may take on average; besides, one of them may get stuck. It takes 10 on a quiet machine."""
 LOST = 2
 """Checks that a submission may lose to a worker; then the rest of them is given up, too."""
-STUCK = "stuck"
-"""The reason code of a check at which the worker got stuck."""
-DIED = "died"
-"""The reason code of a check at which the worker died, and died again when it was tried once more."""
 _LINES = 6
 """Lines that are kept of the stack of a worker that got stuck."""
 _STACKS = b"\nTimeout ("
@@ -163,7 +163,7 @@ def _run_share(
         else:
             died_at = open_at.grade_id
     because = "It was not run: at other checks of this submission the grader got stuck or died."
-    return [*decided, *lost, *(undecided(cell, because, code=lost[-1].outcomes[0].code) for cell in left)]
+    return [*decided, *lost, *(undecided(cell, because, kind=KINDS[lost[-1].outcomes[0].code]) for cell in left)]
 
 
 def limit(checks: int) -> float:

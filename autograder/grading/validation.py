@@ -11,11 +11,13 @@ from collections.abc import Sequence
 
 from autograder.core.results import CheckResult, Outcome, Status, SubmissionResult
 from autograder.course.lab import Cell
+from autograder.reasons import Group, Kind
 
-NO_RESULT = "no-result"
-"""The reason code of a check about which the grading process said nothing."""
-TOO_BUSY = "too-busy"
-"""The reason code of a check whose programs others kept from the CPUs, twice."""
+NO_RESULT = Kind("no-result", "the grader said nothing about this check; an instructor decides", Group.GRADER)
+TOO_BUSY = Kind(
+    "too-busy", "the machine was too busy, also when the check was run again alone; an instructor decides", Group.GRADER
+)
+
 _LINES, _CHARACTERS = 7, 1000
 """As much of what the worker printed last is kept."""
 
@@ -34,14 +36,14 @@ def believed(cell: Cell, check: CheckResult | None) -> CheckResult:
     return check.model_copy(update={"title": cell.title})
 
 
-def undecided(cell: Cell, because: str, printed: str = "", code: str = NO_RESULT) -> CheckResult:
+def undecided(cell: Cell, because: str, printed: str = "", kind: Kind = NO_RESULT) -> CheckResult:
     """Return the result of a check that nobody could decide.
 
     Args:
         cell: the check.
         because: why, as a sentence.
         printed: what the worker printed.
-        code: the reason's.
+        kind: of the reason.
     """
     outcome = Outcome(
         status=Status.UNKNOWN,
@@ -49,7 +51,7 @@ def undecided(cell: Cell, because: str, printed: str = "", code: str = NO_RESULT
         because=because,
         observed="\n".join(printed.strip().splitlines()[-_LINES:])[-_CHARACTERS:],
         hint="No points are taken. Your instructor decides.",
-        code=code,
+        code=kind.code,
     )
     return all_for_one_reason(cell, outcome, points=None)
 
@@ -60,7 +62,7 @@ def too_busy(cell: Cell, seconds: float) -> CheckResult:
         f"Even when the check was run again alone, other processes kept its programs from the CPU for {seconds:.1f} s"
         " of the time in which it was decided. Run it again when the machine has less to do."
     )
-    return undecided(cell, because, code=TOO_BUSY)
+    return undecided(cell, because, kind=TOO_BUSY)
 
 
 def all_for_one_reason(cell: Cell, outcome: Outcome, points: float | None) -> CheckResult:
@@ -76,7 +78,7 @@ def lacks_a_result(result: SubmissionResult) -> bool:
     What was decided stands, and so does a check at which the worker got stuck or died twice: the same programs would
     bring it about again, and a person has to look.
     """
-    return any(outcome.code in (NO_RESULT, TOO_BUSY) for check in result.checks for outcome in check.outcomes)
+    return any(outcome.code in (NO_RESULT.code, TOO_BUSY.code) for check in result.checks for outcome in check.outcomes)
 
 
 def was_killed(check: CheckResult) -> bool:

@@ -86,7 +86,7 @@ def _check_result(cell: Cell, value: object, error: str) -> CheckResult:
         because = error or f"The check cell did not end in a score of {cell.points:g} points."
         found_out = [
             *findings.current.outcomes,
-            outcomes.worded(Status.UNKNOWN, code="grader", title="The check itself broke", because=because),
+            outcomes.worded(Status.UNKNOWN, code=outcomes.GRADER.code, title="The check itself broke", because=because),
         ]
         found = CellResult(
             max_points=cell.points or 0.0,

@@ -8,7 +8,7 @@ A student wrote the file: it is parsed by the loader for students' files, in the
 that could grow has a limit.
 """
 
-from autograder.launch_files.errors import INCLUDE_DEPTH, MOST_NODES, LaunchFileError
+from autograder.launch_files.errors import INCLUDE_DEPTH, MOST_NODES
 from autograder.launch_files.nodes import ForAll, Inline, LaunchedNode, ParamsFile, ParamsText, remove_written
 from autograder.launch_files.reader import declared_arguments, read_launch_file
 
@@ -17,7 +17,6 @@ __all__ = [
     "MOST_NODES",
     "ForAll",
     "Inline",
-    "LaunchFileError",
     "LaunchedNode",
     "ParamsFile",
     "ParamsText",

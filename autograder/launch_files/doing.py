@@ -14,11 +14,12 @@ from autograder.core import student_yaml
 from autograder.core.student_yaml import FILE_BYTES
 from autograder.graph.names import nearest
 from autograder.launch_files import substitutions, values
-from autograder.launch_files.errors import Place, ValueRefused
+from autograder.launch_files.errors import Place, refused
 from autograder.launch_files.nodes import Inline, LaunchedNode, ParamsFile, ParamsText
 from autograder.launch_files.schema import Action, refusing
 from autograder.launch_files.substitutions import Context
 from autograder.launch_files.texts import Text, parse
+from autograder.reasons import Refused
 
 # `launch_ros` keeps these three among the launch configurations; the lists are not copied for a group.
 NAMESPACE, RULES, PARAMETERS = "ros_namespace", "ros_remaps", "global_params"
@@ -163,9 +164,9 @@ class Doing:
             done = substitutions.perform(text, self.context, self.place.folder)
             try:
                 student_yaml.load(done, f"`{path.name}` with its substitutions done")
-            except student_yaml.StudentFileError as error:
-                if error.code == "not-yaml":  # `launch` looks; what it lets pass is the program's to read
-                    raise ValueRefused(error.because, "A value that holds a colon stands in quotes.") from None
+            except Refused as error:
+                if error.reason.kind is student_yaml.NOT_YAML:  # what `launch` lets pass is the program's to read
+                    raise refused(error.reason.because, "A value that holds a colon stands in quotes.") from None
             return ParamsText(text=done)
 
         found: ParamsText = refusing(place.at("from"), read)
@@ -195,16 +196,16 @@ def _text_of(path: Path) -> str:
     """The text of a file, which the build of a package may have made.
 
     Raises:
-        ValueRefused: it is no text, or too large.
+        Refused: it is no text, or too large.
     """
     try:
         with path.open("rb") as file:
             content = file.read(FILE_BYTES + 1)
         if len(content) > FILE_BYTES:
-            raise ValueRefused(f"`{path.name}` is larger than {FILE_BYTES // 1024} KiB.")
+            raise refused(f"`{path.name}` is larger than {FILE_BYTES // 1024} KiB.")
         return content.decode("utf-8")
     except (OSError, UnicodeDecodeError):
-        raise ValueRefused(f"`{path.name}` cannot be read as text in UTF-8.") from None
+        raise refused(f"`{path.name}` cannot be read as text in UTF-8.") from None
 
 
 def _beside(folder: Path) -> list[str]:

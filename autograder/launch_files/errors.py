@@ -5,6 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from autograder.reasons import Group, Kind, Refused
+
+LAUNCH_FILE = Kind("launch-file", "the launch file cannot be run; the sentence names the line", Group.FILES)
+
 INCLUDE_DEPTH = 8
 """Launch files that may include one another, one inside the next."""
 MOST_NODES = 32
@@ -17,23 +21,9 @@ SUBSTITUTION_DEPTH = 10
 """Substitutions that may stand inside one another."""
 
 
-class LaunchFileError(Exception):
-    """A launch file cannot be used: in which file and where in it, why, and what to do."""
-
-    def __init__(self, file: str, where: str, because: str, hint: str = "") -> None:
-        """Keep the parts; the message joins them."""
-        place = f"{file}, {where}" if where else file
-        super().__init__(f"{place}: {because}")
-        self.file, self.where, self.because, self.hint = file, where, because, hint
-
-
-class ValueRefused(Exception):
-    """Something in a value is refused; the place is not known yet."""
-
-    def __init__(self, because: str, hint: str = "") -> None:
-        """Keep the reason and the advice."""
-        super().__init__(because)
-        self.because, self.hint = because, hint
+def refused(because: str, hint: str = "") -> Refused:
+    """The error to raise for something in a value whose place is not known yet."""
+    return Refused(LAUNCH_FILE(because, hint))
 
 
 @dataclass(frozen=True)
@@ -50,6 +40,7 @@ class Place:
         """A place further inside."""
         return Place(self.file, self.folder, f"{self.where} > {more}" if self.where else more, written)
 
-    def error(self, because: str, hint: str = "") -> LaunchFileError:
+    def error(self, because: str, hint: str = "") -> Refused:
         """The error to raise for this place."""
-        return LaunchFileError(self.file, self.where, because, hint)
+        place = f"{self.file}, {self.where}" if self.where else self.file
+        return Refused(LAUNCH_FILE(f"{place}: {because}", hint), place)

@@ -9,7 +9,8 @@ import operator
 from collections.abc import Callable
 from typing import Any
 
-from autograder.launch_files.errors import TEXT_LENGTH, ValueRefused
+from autograder.launch_files.errors import TEXT_LENGTH, refused
+from autograder.reasons import Refused
 
 _LONGEST = 1000
 _LARGEST = 10**100
@@ -72,38 +73,39 @@ def evaluate(expression: str) -> str:
     """Work out an expression and return what Python's `str` makes of the result.
 
     Raises:
-        ValueRefused: it is no expression, is not covered here, or fails as it would fail in Python.
+        Refused: it is no expression, is not covered here, or fails as it would fail in Python.
     """
     shown = f"`$(eval …)` of `{expression[:80]}`"
     if len(expression) > _LONGEST:
-        raise ValueRefused(f"{shown}: it is longer than {_LONGEST} characters.")
+        raise refused(f"{shown}: it is longer than {_LONGEST} characters.")
     try:
         tree = ast.parse(expression.lstrip(" \t"), mode="eval")
         return str(_value(tree.body))
-    except ValueRefused as error:
-        raise ValueRefused(f"{shown}: {error.because}", error.hint) from None
+    except Refused as error:
+        raise refused(f"{shown}: {error.reason.because}", error.reason.hint) from None
     except SyntaxError:
-        raise ValueRefused(f"{shown} is not an expression of Python.", "Put texts inside it in quotes.") from None
+        raise refused(f"{shown} is not an expression of Python.", "Put texts inside it in quotes.") from None
     except (RecursionError, MemoryError):
-        raise ValueRefused(f"{shown} is nested too deep.") from None
+        raise refused(f"{shown} is nested too deep.") from None
     except Exception as error:
-        raise ValueRefused(f"{shown}: {type(error).__name__}: {error}.", "Try the expression in Python.") from None
+        raise refused(f"{shown}: {type(error).__name__}: {error}.", "Try the expression in Python.") from None
 
 
 def _value(node: ast.expr) -> Any:
     method = _NODES.get(type(node))
     if method is None:
-        raise ValueRefused(
-            f"`{ast.unparse(node)[:60]}` is not covered here.", "Comparisons, arithmetic and functions of `math` are."
+        raise refused(
+            f"`{ast.unparse(node)[:60]}` is not covered here.",
+            "Comparisons, arithmetic and functions of `math` are.",
         )
     return _bounded(method(node))
 
 
 def _bounded(value: Any) -> Any:
     if isinstance(value, int) and not isinstance(value, bool) and abs(value) > _LARGEST:
-        raise ValueRefused("a number in it is too large.")
+        raise refused("a number in it is too large.")
     if _size(value) > TEXT_LENGTH:
-        raise ValueRefused("a text or a list in it is too long.")
+        raise refused("a text or a list in it is too long.")
     return value
 
 
@@ -118,29 +120,29 @@ def _name(node: ast.Name) -> Any:
     if node.id in _NAMES:
         return _NAMES[node.id]
     if hasattr(builtins, node.id) or hasattr(math, node.id):
-        raise ValueRefused(f"`{node.id}` is not covered here.")
+        raise refused(f"`{node.id}` is not covered here.")
     quoted = f"Python has `True` and `False`; a text stands in quotes: `'{node.id}'`."
-    raise ValueRefused(f"Python knows no name `{node.id}` there.", quoted)
+    raise refused(f"Python knows no name `{node.id}` there.", quoted)
 
 
 def _binary(node: ast.BinOp) -> Any:
     left, right = _value(node.left), _value(node.right)
     if type(node.op) not in _BINARY:
-        raise ValueRefused("an operator in it is not covered here.")
+        raise refused("an operator in it is not covered here.")
     if isinstance(left, str) and isinstance(node.op, ast.Mod):
-        raise ValueRefused("`%` with a text is not covered here.")
+        raise refused("`%` with a text is not covered here.")
     if isinstance(node.op, ast.Pow) and isinstance(right, int) and abs(right) > 300:
-        raise ValueRefused("an exponent in it is too large.")
+        raise refused("an exponent in it is too large.")
     if isinstance(node.op, ast.Mult):
         for one, times in ((left, right), (right, left)):
             if isinstance(one, (str, list, tuple)) and isinstance(times, int) and _size(one) * times > TEXT_LENGTH:
-                raise ValueRefused("a text or a list in it is too long.")
+                raise refused("a text or a list in it is too long.")
     return _BINARY[type(node.op)](left, right)
 
 
 def _unary(node: ast.UnaryOp) -> Any:
     if type(node.op) not in _UNARY:
-        raise ValueRefused("an operator in it is not covered here.")
+        raise refused("an operator in it is not covered here.")
     return _UNARY[type(node.op)](_value(node.operand))
 
 
@@ -166,18 +168,18 @@ def _comparison(node: ast.Compare) -> Any:
 
 def _call(node: ast.Call) -> Any:
     if node.keywords or any(isinstance(value, ast.Starred) for value in node.args):
-        raise ValueRefused("named arguments are not covered here.")
+        raise refused("named arguments are not covered here.")
     values = [_value(value) for value in node.args]
     if isinstance(node.func, ast.Attribute) and not _is_math(node.func):
         owner = _value(node.func.value)
         if isinstance(owner, str) and node.func.attr in _METHODS:
             return getattr(owner, node.func.attr)(*values)
-        raise ValueRefused(f"`.{node.func.attr}()` is not covered here.")
+        raise refused(f"`.{node.func.attr}()` is not covered here.")
     function = _value(node.func)
     if not callable(function):
-        raise ValueRefused(f"`{ast.unparse(node.func)[:60]}` is not a function.")
+        raise refused(f"`{ast.unparse(node.func)[:60]}` is not a function.")
     if function is round and any(isinstance(digits, int) and abs(digits) > 300 for digits in values[1:]):
-        raise ValueRefused("a number of digits in it is too large.")
+        raise refused("a number of digits in it is too large.")
     return function(*values)
 
 
@@ -188,18 +190,18 @@ def _is_math(node: ast.Attribute) -> bool:
 def _attribute(node: ast.Attribute) -> Any:
     if _is_math(node) and node.attr in _MATH:
         return _MATH[node.attr]
-    raise ValueRefused(f"`{ast.unparse(node)[:60]}` is not covered here.")
+    raise refused(f"`{ast.unparse(node)[:60]}` is not covered here.")
 
 
 def _item(node: ast.Subscript) -> Any:
     if isinstance(node.slice, ast.Slice):
-        raise ValueRefused("slices are not covered here.")
+        raise refused("slices are not covered here.")
     return _value(node.value)[_value(node.slice)]
 
 
 def _constant(node: ast.Constant) -> Any:
     if not isinstance(node.value, (bool, int, float, str, type(None))):
-        raise ValueRefused(f"`{ast.unparse(node)[:60]}` is not covered here.")
+        raise refused(f"`{ast.unparse(node)[:60]}` is not covered here.")
     return node.value
 
 

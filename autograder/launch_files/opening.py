@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from autograder.core import student_yaml
-from autograder.launch_files.errors import LaunchFileError, Place
+from autograder.launch_files.errors import Place
+from autograder.reasons import Refused
 
 _IN_PYTHON = re.compile(
     r"^\s*(from\s+(launch|launch_ros)[\w.]*\s+import\b|import\s+launch|def\s+generate_launch_description\b)"
@@ -44,7 +45,7 @@ def content(path: Path, place: Place) -> Any:
     """What stands below `launch:` in a launch file.
 
     Raises:
-        LaunchFileError: it is missing, or no launch file in YAML.
+        Refused: it is missing, or no launch file in YAML.
     """
     if not path.is_file():
         hint = "Its name is the one after `%%file` in the first line of its cell."
@@ -53,13 +54,14 @@ def content(path: Path, place: Place) -> Any:
         raise place.error("there is no such file.", hint)
     try:
         found = student_yaml.read(path, written=True)
-    except student_yaml.StudentFileError as error:
+    except Refused as error:
         _refuse_python(path, place)
-        where = f"line {error.line} of the cell" if error.line else ""
-        because = error.because.removeprefix(f"`{path.name}`").lstrip(", ").removeprefix(where).lstrip(" :")
+        because = (
+            error.reason.because.removeprefix(f"`{path.name}`").lstrip(", ").removeprefix(error.place).lstrip(" :")
+        )
         because = f"it {because}" if because.startswith("is ") else because
         hint = "Look at the indentation and the `-` there." if "not YAML" in because else ""
-        raise LaunchFileError(path.name, where, because, hint) from None
+        raise Place(path.name, place.folder, error.place).error(because, hint) from None
     if not isinstance(found, dict) or list(found) != ["launch"]:
         _refuse_python(path, place)
         xml = "XML is not covered here; in YAML " if str(found).startswith("<") else ""
@@ -72,7 +74,7 @@ def _refuse_python(path: Path, place: Place) -> None:
     """Say that a file is a launch file in Python, if it is one.
 
     Raises:
-        LaunchFileError: it is.
+        Refused: it is.
     """
     with path.open("rb") as file:
         text = file.read(student_yaml.FILE_BYTES).decode("utf-8", "replace")

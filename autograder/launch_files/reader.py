@@ -36,7 +36,7 @@ def read_launch_file(
         around: the namespace that a file which includes this one would push.
 
     Raises:
-        LaunchFileError: it is missing, is no launch file, is refused by `ros2 launch`, or uses what is not covered.
+        Refused: it is missing, is no launch file, is refused by `ros2 launch`, or uses what is not covered.
     """
     folder = path.resolve().parent
     reader = _Reader()
@@ -54,7 +54,7 @@ def declared_arguments(path: Path) -> list[str]:
     """The names of the arguments that a launch file declares, included files left out.
 
     Raises:
-        LaunchFileError: it cannot be read.
+        Refused: it cannot be read.
     """
 
     def among(actions: list[Action]) -> list[str]:

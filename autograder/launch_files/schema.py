@@ -13,8 +13,9 @@ from typing import Any
 
 from autograder.core import student_yaml
 from autograder.launch_files import opening, substitutions, values, words
-from autograder.launch_files.errors import Place, ValueRefused
+from autograder.launch_files.errors import Place
 from autograder.launch_files.texts import Text, parse, unescaped
+from autograder.reasons import Refused
 
 _ELSEWHERE = {
     "append_env", "composable_node", "emit_event", "executable", "for_each", "for_loop", "keep",
@@ -45,7 +46,7 @@ def read_file(path: Path) -> list[Action]:
     """Read and check a launch file.
 
     Raises:
-        LaunchFileError: it is missing, is no launch file, or has what `ros2 launch` refuses or what is not covered.
+        Refused: it is missing, is no launch file, or has what `ros2 launch` refuses or what is not covered.
     """
     place = Place(path.name, path.resolve().parent)
     body = opening.content(path, place)
@@ -131,8 +132,10 @@ def refusing(place: Place, what: Callable[[], Any]) -> Any:
     """Do something, and say the place if it is refused."""
     try:
         return what()
-    except ValueRefused as error:
-        raise place.error(error.because, error.hint) from None
+    except Refused as error:
+        if error.place:
+            raise
+        raise place.error(error.reason.because, error.reason.hint) from None
 
 
 def _string(value: Any, place: Place) -> str:

@@ -10,9 +10,10 @@ from typing import Any
 from autograder.core import student_yaml
 from autograder.graph.names import nearest
 from autograder.launch_files import expressions
-from autograder.launch_files.errors import TEXT_LENGTH, ValueRefused
+from autograder.launch_files.errors import TEXT_LENGTH, refused
 from autograder.launch_files.files import Packages
 from autograder.launch_files.texts import Call, Text, calls
+from autograder.reasons import Refused
 
 _VALUES = {
     "var": (1, 2), "env": (1, 2), "dirname": (0, 0), "find-pkg-share": (1, 1), "eval": (1, 2), "equals": (2, 2),
@@ -60,19 +61,19 @@ def check(text: Text) -> None:
     """Refuse substitutions that `launch` refuses when it reads a file, and those that are not covered here.
 
     Raises:
-        ValueRefused: for the first of them.
+        Refused: for the first of them.
     """
     covered = ", ".join(f"`{name}`" for name in sorted(_VALUES))
     for call in calls(text):
         if call.name in _NOT_COVERED:
-            raise ValueRefused(f"the substitution `{call.written}` is not covered here.", f"Covered are {covered}.")
+            raise refused(f"the substitution `{call.written}` is not covered here.", f"Covered are {covered}.")
         if call.name not in _VALUES:
             hint = _IN_ROS_2.get(call.name, f"Covered here are {covered}.")
-            raise ValueRefused(f"there is no substitution `{call.name}`.", hint)
+            raise refused(f"there is no substitution `{call.name}`.", hint)
         least, most = _VALUES[call.name]
         if not least <= len(call.values) <= most:
             wanted = f"{least}" if least == most else f"{least} or {most}"
-            raise ValueRefused(
+            raise refused(
                 f"`{call.written}`: `{call.name}` takes {wanted} value{'s' if most != 1 else ''}, "
                 f"and {len(call.values)} {'is' if len(call.values) == 1 else 'are'} given.",
                 "A value with spaces stands in quotes.",
@@ -88,14 +89,14 @@ def perform(text: Text, context: Context, folder: Path) -> str:
         folder: of the launch file that the text stands in.
 
     Raises:
-        ValueRefused: one of them cannot be done, or the text grows too long.
+        Refused: one of them cannot be done, or the text grows too long.
     """
     done, length = [], 0
     for part in text:
         done.append(part if isinstance(part, str) else _value(part, context, folder))
         length += len(done[-1])
         if length > TEXT_LENGTH:
-            raise ValueRefused(f"the text grows longer than {TEXT_LENGTH} characters.", "Does it repeat itself?")
+            raise refused(f"the text grows longer than {TEXT_LENGTH} characters.", "Does it repeat itself?")
     return "".join(done)
 
 
@@ -118,14 +119,14 @@ def _value(call: Call, context: Context, folder: Path) -> str:
             try:
                 return context.packages.share(said(0))
             except KeyError:
-                raise ValueRefused(f"there is no package `{said(0)}`.") from None
+                raise refused(f"there is no package `{said(0)}`.") from None
         case "eval":
             if len(call.values) == 2 and said(1).strip() != "math":
-                raise ValueRefused(f"`{call.written}`: of Python's modules only `math` is covered here.")
+                raise refused(f"`{call.written}`: of Python's modules only `math` is covered here.")
             return expressions.evaluate(said(0))
         case "equals" | "not-equals":
             if () in call.values:
-                raise ValueRefused(
+                raise refused(
                     f"`{call.written}`: an empty text `''` means something else there and is not covered here.",
                     "Write `$(eval \"'$(var NAME)' == ''\")`.",
                 )
@@ -142,25 +143,26 @@ def _configuration(name: str, context: Context) -> str:
     value = context.configurations.get(name)
     if value is None:
         near = nearest(name, [known for known, text in context.configurations.items() if isinstance(text, str)])
-        raise ValueRefused(
+        raise refused(
             f"there is no launch argument `{name}` here." + (f" `{near}` is there; is that meant?" if near else ""),
             f"An argument is declared above with `- arg:` and `name: {name}`.",
         )
     if not isinstance(value, str):
-        raise ValueRefused(f"`{name}` is a name that `launch_ros` uses itself; it is not covered here.")
+        raise refused(f"`{name}` is a name that `launch_ros` uses itself; it is not covered here.")
     return value
 
 
 def _variable(name: str, default: str | None, context: Context) -> str:
     if name not in context.environment and of_the_machine(name):
-        raise ValueRefused(
+        raise refused(
             f"the environment variable `{name}` differs from machine to machine; it is not covered here.",
             "Use a variable that the launch file sets with `set_env`, or a launch argument.",
         )
     value = context.environment.get(name)
     if value is None and default is None:
-        raise ValueRefused(
-            f"the environment variable `{name}` is not set.", f"Give it a default: `$(env {name} VALUE)`."
+        raise refused(
+            f"the environment variable `{name}` is not set.",
+            f"Give it a default: `$(env {name} VALUE)`.",
         )
     return value if value is not None else str(default)
 
@@ -173,10 +175,10 @@ def of_the_machine(name: str) -> bool:
 def _truth(text: str, call: Call) -> bool:
     try:
         value = student_yaml.load(text, "the value")
-    except student_yaml.StudentFileError:
+    except Refused:
         value = None
     if not isinstance(value, bool):
-        raise ValueRefused(f"`{call.written}` wants `true` or `false`, not `{text[:60]}`.")
+        raise refused(f"`{call.written}` wants `true` or `false`, not `{text[:60]}`.")
     return value
 
 

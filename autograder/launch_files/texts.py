@@ -11,7 +11,8 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from autograder.launch_files.errors import SUBSTITUTION_DEPTH, ValueRefused
+from autograder.launch_files.errors import SUBSTITUTION_DEPTH, refused
+from autograder.reasons import Refused
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
 
@@ -53,7 +54,7 @@ def parse(text: str) -> Text:
     """Take a text apart.
 
     Raises:
-        ValueRefused: a substitution in it is not well formed.
+        Refused: a substitution in it is not well formed.
     """
     if not text:
         return ("",)
@@ -66,9 +67,9 @@ class _Reader:
     def __init__(self, text: str) -> None:
         self.text = text
 
-    def error(self, because: str, hint: str = "") -> ValueRefused:
+    def error(self, because: str, hint: str = "") -> Refused:
         shown = self.text if len(self.text) <= 80 else f"{self.text[:80]}…"
-        return ValueRefused(f"in `{shown}`, {because}", hint)
+        return refused(f"in `{shown}`, {because}", hint)
 
     def quoted(self, at: int, quote: str | None, depth: int) -> tuple[list[str | Call], int]:
         """The parts up to the closing quote; without a quote, up to the end of the text."""

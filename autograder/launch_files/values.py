@@ -8,8 +8,9 @@ from typing import Any
 
 from autograder.core import student_yaml
 from autograder.launch_files import substitutions
-from autograder.launch_files.errors import ValueRefused
+from autograder.launch_files.errors import refused
 from autograder.launch_files.texts import Text, parse, plain
+from autograder.reasons import Refused
 
 _SIMPLE = (bool, int, float, str)
 _TYPES: dict[str, tuple[type | None, bool]] = {
@@ -38,25 +39,25 @@ def read(value: Any, kind: Any) -> Value:
         kind: what stands behind `type:`, None without it.
 
     Raises:
-        ValueRefused: `launch` refuses it.
+        Refused: `launch` refuses it.
     """
     if kind is not None and (not isinstance(kind, str) or kind not in _TYPES):
-        raise ValueRefused(f"`{kind}` is no type.", f"Types are {', '.join(_TYPES)}.")
+        raise refused(f"`{kind}` is no type.", f"Types are {', '.join(_TYPES)}.")
     wanted, is_list = _TYPES[kind] if kind is not None else (None, False)
     if isinstance(value, list):
         if kind not in (None, "yaml") and not is_list:
-            raise ValueRefused(f"a list cannot be of the type `{kind}`.", f"Write `type: list_of_{kind}`.")
+            raise refused(f"a list cannot be of the type `{kind}`.", f"Write `type: list_of_{kind}`.")
         return Value(_list(value, wanted), wanted)
     if not isinstance(value, _SIMPLE):
-        raise ValueRefused(
+        raise refused(
             f"a parameter is a bool, a number, a text or a list of such, not {_shown(value)}.",
             "A text stands in quotes.",
         )
     if is_list:  # `launch` takes no text there, not even one that would become a list
-        raise ValueRefused(f"{_shown(value)} is not of the type `{kind}`.", "Write a list, such as `[1, 2]`.")
+        raise refused(f"{_shown(value)} is not of the type `{kind}`.", "Write a list, such as `[1, 2]`.")
     content = _text(value) if isinstance(value, str) else value
     if not isinstance(content, tuple) and wanted is not None and not isinstance(content, wanted):
-        raise ValueRefused(
+        raise refused(
             f"{_shown(value)} is not of the type `{kind}`: a value without `$(…)` is not converted.",
             "Write the value as YAML has it, without `type`.",
         )
@@ -73,13 +74,13 @@ def _text(value: str) -> Text | str:
 
 def _list(value: list[Any], wanted: type | None) -> list[Any]:
     if not value:
-        raise ValueRefused("a list without items has no type; it is not covered here.")
+        raise refused("a list without items has no type; it is not covered here.")
     if not all(isinstance(item, _SIMPLE) for item in value):
-        raise ValueRefused("a list of bools, numbers or texts is expected.")
+        raise refused("a list of bools, numbers or texts is expected.")
     items = [_text(item) if isinstance(item, str) else item for item in value]
     kinds = {type(item) for item in items if not isinstance(item, tuple)}
     if len(kinds) > 1 or (wanted is not None and kinds not in (set(), {wanted})):
-        raise ValueRefused("a list of values of one type is expected.", "`1` is an integer, `1.0` a double.")
+        raise refused("a list of values of one type is expected.", "`1` is an integer, `1.0` a double.")
     return items
 
 
@@ -87,7 +88,7 @@ def settle(value: Value, perform: Callable[[Text], str]) -> Any:
     """Do the substitutions of a value and convert what comes of them.
 
     Raises:
-        ValueRefused: it cannot be converted.
+        Refused: it cannot be converted.
     """
     content = value.content
     if isinstance(content, tuple):
@@ -102,16 +103,16 @@ def read_as_yaml(text: str) -> Any:
     """A parameter's text, read as YAML: a bool, a number, a text or a list of values of one type.
 
     Raises:
-        ValueRefused: it is something else.
+        Refused: it is something else.
     """
     try:
         value = student_yaml.load(text, "the value")
-    except student_yaml.StudentFileError:
-        raise ValueRefused(f"`{text[:60]}` is read as YAML, and it is not YAML.", _OWN_QUOTES) from None
+    except Refused:
+        raise refused(f"`{text[:60]}` is read as YAML, and it is not YAML.", _OWN_QUOTES) from None
     if isinstance(value, list):
         return _uniform(value)
     if not isinstance(value, _SIMPLE):
-        raise ValueRefused(
+        raise refused(
             f"`{text[:60]}` is read as YAML, which makes {_shown(value)} of it; a parameter is a bool, a number, a "
             "text or a list of such.",
             _OWN_QUOTES,
@@ -121,7 +122,7 @@ def read_as_yaml(text: str) -> Any:
 
 def _uniform(items: list[Any]) -> list[Any]:
     if not items or len({type(item) for item in items}) != 1 or not isinstance(items[0], _SIMPLE):
-        raise ValueRefused(f"a list of values of one type is expected, not {_shown(items)}.")
+        raise refused(f"a list of values of one type is expected, not {_shown(items)}.")
     return items
 
 
@@ -131,12 +132,12 @@ def _converted(text: str, kind: type | None) -> Any:
     if kind is bool:
         value = read_as_yaml(text)
         if not isinstance(value, bool):
-            raise ValueRefused(f"`{text[:60]}` is not of the type `bool`.")
+            raise refused(f"`{text[:60]}` is not of the type `bool`.")
         return value
     try:
         return kind(text)
     except ValueError:
-        raise ValueRefused(f"`{text[:60]}` is not of the type `{kind.__name__}`.") from None
+        raise refused(f"`{text[:60]}` is not of the type `{kind.__name__}`.") from None
 
 
 def _shown(value: Any) -> str:

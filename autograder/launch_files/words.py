@@ -9,7 +9,7 @@ from __future__ import annotations
 import itertools
 import shlex
 
-from autograder.launch_files.errors import ValueRefused
+from autograder.launch_files.errors import refused
 from autograder.launch_files.texts import Text
 
 
@@ -17,11 +17,12 @@ def split(text: Text) -> list[Text]:
     """Split a text into words.
 
     Raises:
-        ValueRefused: a quotation mark between two substitutions is not closed there.
+        Refused: a quotation mark between two substitutions is not closed there.
     """
     if sum(isinstance(part, str) for part in text) and _both_quotes(text):
-        raise ValueRefused(
-            "both kinds of quotation marks in one command line are not covered here.", "Use one kind of them."
+        raise refused(
+            "both kinds of quotation marks in one command line are not covered here.",
+            "Use one kind of them.",
         )
     words, word = list[Text](), list[object]()
 
@@ -59,7 +60,7 @@ def _pieces(part: str) -> list[str]:
     try:
         return shlex.split(part)
     except ValueError:
-        raise ValueRefused(
+        raise refused(
             f"a quotation mark is not closed in `{part.strip()[:60]}`: a command line is split into words before its "
             "substitutions are done.",
             "What `$(var …)` stands for is one word in any case: leave the quotation marks around it out.",

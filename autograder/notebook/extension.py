@@ -10,8 +10,10 @@ import re
 from typing import TYPE_CHECKING, Any
 
 from autograder.core import front_end
+from autograder.core.errors import KitError
+from autograder.course.book import NO_BOOK, Book, read_book
 from autograder.course.cells import CELL_BYTES, BadNameError, CellFile, check_free, check_name, parse
-from autograder.course.folder import book_of_kit
+from autograder.course.folder import book_of_kit, course_root, is_students_kit, trusted_course
 from autograder.notebook import completion, lab_magic, ros2_magic
 from autograder.notebook.kernel import Kernel, now
 from autograder.notebook.program_folder import Written, shown
@@ -83,15 +85,24 @@ def shown_score(score: Score, **_: object) -> dict[str, str]:
 
     # nbgrader takes the points from the plain text, and all of them where that is no number.
     graded = "NBGRADER_EXECUTION" in os.environ
+    book = NO_BOOK if graded else _book()
     return {
-        "text/plain": repr(score) if graded else check_text(score.result, score.remarks, score.origin),
+        "text/plain": repr(score) if graded else check_text(score.result, score.remarks, score.origin, book),
         "text/html": check_html(
-            score.result, remarks=score.remarks, origin=score.origin, on_demand=not graded, book=_book()
+            score.result, remarks=score.remarks, origin=score.origin, on_demand=not graded, book=book
         ),
     }
 
 
-def _book() -> str:
+def _book() -> Book:
+    """The lectures of the course that the student works in; without one, hints lead nowhere."""
+    try:
+        return read_book(trusted_course(None) if is_students_kit() else course_root(), _address())
+    except KitError:
+        return NO_BOOK
+
+
+def _address() -> str:
     """Link to the lectures of a student's kit: below the server's address, in VS Code a path; elsewhere empty."""
     lectures = book_of_kit()
     here = front_end.active
@@ -166,11 +177,12 @@ def _defect(file: CellFile) -> str:
             return f"it is not Python: {error}"
     elif file.name.endswith((".yaml", ".yml")):
         from autograder.core import student_yaml
+        from autograder.reasons import Refused
 
         try:
             student_yaml.load(file.text)
-        except student_yaml.StudentFileError as error:
-            return error.because.removeprefix("the file, ").rstrip(".")
+        except Refused as error:
+            return error.reason.because.removeprefix("the file, ").rstrip(".")
     elif file.name.endswith(".json"):
         import json  # the magic above is line 1
 

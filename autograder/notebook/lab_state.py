@@ -11,6 +11,7 @@ from typing import Any
 from autograder.core import student_yaml
 from autograder.core.results import CellResult
 from autograder.course.cells import TEXT_STUB, cell_digest, grade_id_of, headings, nbgrader_of, source_of
+from autograder.reasons import Refused
 from autograder.report import words
 from autograder.report.words import Verdict
 from autograder.submission.copies import answers_in, named_file
@@ -206,7 +207,7 @@ def _guesses(folder: Path) -> list[Guess]:
     for path in sorted(folder.glob("*.y*ml")):
         try:
             table = student_yaml.read(path, table=True)
-        except student_yaml.StudentFileError:
+        except Refused:
             continue
         for question, value in (table if isinstance(table, dict) else {}).items():
             key = str(question)  # YAML also has numbers and truth values for keys

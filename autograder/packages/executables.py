@@ -5,14 +5,20 @@ from __future__ import annotations
 import difflib
 import re
 
-from autograder.diagnosis.reason import Diagnosis
 from autograder.packages.built import Built
+from autograder.reasons import Group, Kind, Reason
+
+ENTRY_POINT = Kind("entry-point", "setup.py has no entry point of this name", Group.BUILT)
+ENTRY_POINT_TARGET = Kind(
+    "entry-point-target", "the entry point leads to a module or function that is not installed", Group.BUILT
+)
+EXECUTABLE_PLACE = Kind("executable-place", "the executable is installed, and not where `ros2 run` looks", Group.BUILT)
 
 _MISSPELT = 0.85
 """How alike two names of programs have to be for one to be the other misspelt: `speed_sensor` is no `speed_monitor`."""
 
 
-def why_no_executable(built: Built, name: str) -> Diagnosis | None:
+def why_no_executable(built: Built, name: str) -> Reason | None:
     """Why `ros2 run` finds no executable of a name; None if it does."""
     if name in built.executables:
         return None
@@ -23,14 +29,14 @@ def why_no_executable(built: Built, name: str) -> Diagnosis | None:
         because = f"`{name}` is installed in {f'`{where}`' if where else 'another place'}."
         because += f" `ros2 run` looks in `lib/{built.name}` only."
         wanted = f"setup.cfg says where scripts go, below `[install]`: `install_scripts=$base/lib/{built.name}`."
-        return Diagnosis(because, "executable-place", wanted)
+        return EXECUTABLE_PLACE(because, wanted)
     near = next(iter(difflib.get_close_matches(name, points, 1, _MISSPELT)), "")
     has = ", ".join(f"`{one}`" for one in sorted(points)) or "none"
     because = f"setup.py has no entry point of the name `{name}`; its console_scripts are: {has}."
-    return Diagnosis(because + (f" Is `{near}` meant to be it?" if near else ""), "entry-point")
+    return ENTRY_POINT(because + (f" Is `{near}` meant to be it?" if near else ""))
 
 
-def why_other_target(built: Built, name: str, wanted: str = "") -> Diagnosis | None:
+def why_other_target(built: Built, name: str, wanted: str = "") -> Reason | None:
     """Why an executable does not lead to its function; None if it does, or to something that is made at run time.
 
     Args:
@@ -48,14 +54,14 @@ def why_other_target(built: Built, name: str, wanted: str = "") -> Diagnosis | N
     elif not path:
         because = f"The entry point names the module `{module}`, and no such module is installed."
         where = "Only the folders of code that `packages` in setup.py names are installed."
-        return Diagnosis(because, "entry-point-target", where)
+        return ENTRY_POINT_TARGET(because, where)
     elif not re.search(defined, built.text(path), re.MULTILINE):
         because = f"The entry point names `{function}`, and the module `{module}` has no function of that name."
     elif wanted and target != wanted:
         because = f"The entry point `{name}` leads to `{target}`, not to `{wanted}`."
     else:
         return None
-    return Diagnosis(because, "entry-point-target")
+    return ENTRY_POINT_TARGET(because)
 
 
 def _entry_points(built: Built) -> dict[str, str]:

@@ -10,34 +10,57 @@ import re
 from collections.abc import Callable
 from pathlib import Path
 
-from autograder.diagnosis.reason import Diagnosis
 from autograder.packages.built import Built
+from autograder.reasons import Group, Kind, Reason
 
-CODES = {
-    "package-xml": "package.xml is missing, or is no package description that ROS's tools accept",
-    "package-name": "package.xml gives the package another name than its folder has",
-    "build-type": "package.xml exports no build type that fits: colcon does not know how to build the package",
-    "setup-py": "setup.py ended with an error, which is quoted, or without a call of `setup` that names what is there",
-    "package-file": "setup.py names a file or folder that is not in the package",
-    "cmake": "CMake stopped at a line of CMakeLists.txt with the error that is quoted",
-    "cmake-package": "CMakeLists.txt uses a package that it has not looked up with find_package",
-    "interface-line": "a line of an interface file is no field, or its name or type is not allowed",
-    "interface-parts": "a service or action file does not have the parts that `---` separates",
-    "interface-file": "CMakeLists.txt names an interface file that is not there",
-    "interface-type": "an interface file uses a message type that the package does not have",
-    "interface-dependency": "an interface file uses a package that DEPENDENCIES does not name",
-    "interface-group": "package.xml does not make the package a member of the group of interface packages",
-    "build-failed": "the build failed in another way; its first error is quoted",
-    "build-files": "the build made too many files and was ended",
-    "build-time": "the build took too long and was ended",
-    "build-limit": "the build went over one of the limits of builds, which is named, and was ended",
-}
-"""The reason codes of builds, with what must have been seen for each."""
+INTERFACE_LINE = Kind(
+    "interface-line", "a line of an interface file is no field, or its name or type is not allowed", Group.BUILDING
+)
+INTERFACE_TYPE = Kind(
+    "interface-type", "an interface file uses a message type that the package does not have", Group.BUILDING
+)
+BUILD_FAILED = Kind("build-failed", "the build failed in another way; its first error is quoted", Group.BUILDING)
+BUILD_TIME = Kind("build-time", "the build took too long and was ended", Group.BUILDING)
+BUILD_LIMIT = Kind(
+    "build-limit", "the build went over one of the limits of builds, which is named, and was ended", Group.BUILDING
+)
+PACKAGE_XML = Kind(
+    "package-xml", "package.xml is missing, or is no package description that ROS's tools accept", Group.BUILDING
+)
+PACKAGE_NAME = Kind("package-name", "package.xml gives the package another name than its folder has", Group.BUILDING)
+BUILD_TYPE = Kind(
+    "build-type",
+    "package.xml exports no build type that fits: colcon does not know how to build the package",
+    Group.BUILDING,
+)
+CMAKE = Kind("cmake", "CMake stopped at a line of CMakeLists.txt with the error that is quoted", Group.BUILDING)
+BUILD_FILES = Kind("build-files", "the build made too many files and was ended", Group.BUILDING)
+PACKAGE_FILE = Kind("package-file", "setup.py names a file or folder that is not in the package", Group.BUILDING)
+SETUP_PY = Kind(
+    "setup-py",
+    "setup.py ended with an error, which is quoted, or without a call of `setup` that names what is there",
+    Group.BUILDING,
+)
+INTERFACE_PARTS = Kind(
+    "interface-parts", "a service or action file does not have the parts that `---` separates", Group.BUILDING
+)
+INTERFACE_FILE = Kind("interface-file", "CMakeLists.txt names an interface file that is not there", Group.BUILDING)
+INTERFACE_DEPENDENCY = Kind(
+    "interface-dependency", "an interface file uses a package that DEPENDENCIES does not name", Group.BUILDING
+)
+CMAKE_PACKAGE = Kind(
+    "cmake-package", "CMakeLists.txt uses a package that it has not looked up with find_package", Group.BUILDING
+)
+INTERFACE_GROUP = Kind(
+    "interface-group",
+    "package.xml does not make the package a member of the group of interface packages",
+    Group.BUILDING,
+)
 
-_Reason = Callable[[re.Match[str]], Diagnosis]
+_Reason = Callable[[re.Match[str]], Reason]
 
 
-def why_not_built(built: Built, sources: Path) -> Diagnosis | None:
+def why_not_built(built: Built, sources: Path) -> Reason | None:
     """Return why a build failed; None if it did not.
 
     Args:
@@ -51,14 +74,14 @@ def why_not_built(built: Built, sources: Path) -> Diagnosis | None:
         return None
     if built.over == "time":
         hint = "Does a build file wait for something?"
-        return Diagnosis("The build took too long and was ended.", "build-time", hint)
+        return BUILD_TIME("The build took too long and was ended.", hint)
     if built.over:
         hint = "Does a build file start programs without an end, or keep more and more?"
-        return Diagnosis(f"The build went over its limit of {built.over} and was ended.", "build-limit", hint)
+        return BUILD_LIMIT(f"The build went over its limit of {built.over} and was ended.", hint)
     return said_of_files(built.log) or _quoted(built.log)
 
 
-def said_of_files(log: str) -> Diagnosis | None:
+def said_of_files(log: str) -> Reason | None:
     """Return what the tools have said of the package's own files, in words that nothing else brings about; or None.
 
     Args:
@@ -81,92 +104,88 @@ def needed_packages(sources: Path, to_build: bool = False) -> list[str]:
     return [str(one) for one in named]
 
 
-def not_described(sources: Path, name: str) -> Diagnosis | None:
+def not_described(sources: Path, name: str) -> Reason | None:
     """What in package.xml keeps colcon from building the package, or from building it under its name."""
     from catkin_pkg.package import InvalidPackage, parse_package
 
     path = sources / "package.xml"
     if not path.is_file():
-        return Diagnosis(f"There is no `src/{name}/package.xml`: without it, no folder is a package.", "package-xml")
+        return PACKAGE_XML(f"There is no `src/{name}/package.xml`: without it, no folder is a package.")
     try:
         package = parse_package(str(path))
     except InvalidPackage as error:
         words = str(error).replace(str(path), "package.xml").split("\n")
         lines = [line.removeprefix("- ") for line in words if line and not line.startswith("Error(s)")]
         said = "; ".join(lines[:2]).rstrip(".")
-        return Diagnosis(f"`src/{name}/package.xml` is not accepted: {said}.", "package-xml")
+        return PACKAGE_XML(f"`src/{name}/package.xml` is not accepted: {said}.")
     except Exception as error:  # what it cannot parse comes as errors of several libraries
-        return Diagnosis(f"`src/{name}/package.xml` cannot be read as XML: {error}.", "package-xml")
+        return PACKAGE_XML(f"`src/{name}/package.xml` cannot be read as XML: {error}.")
     if package.name != name:
         because = f"package.xml names the package `{package.name}`; its folder, and this task, name it `{name}`."
-        return Diagnosis(because, "package-name")
+        return PACKAGE_NAME(because)
     exported = [export.content for export in package.exports if export.tagname == "build_type"]
     wanted = "ament_cmake" if (sources / "CMakeLists.txt").is_file() else "ament_python"
     if exported != [wanted]:
         has = f"exports the build type `{exported[0]}`" if exported else "exports no build type"
         because = f"package.xml {has}, so colcon does not build the package as an `{wanted}` package."
         hint = f"It needs `<export><build_type>{wanted}</build_type></export>`."
-        return Diagnosis(because, "build-type", hint)
+        return BUILD_TYPE(because, hint)
     return None
 
 
-def _interface_line(match: re.Match[str]) -> Diagnosis:
+def _interface_line(match: re.Match[str]) -> Reason:
     line, name, said = match.groups()
     said = said.strip() + "'" * (said.count("'") % 2)  # the pattern leaves the last one out
     if line.startswith(" "):
         because = f"The line `{line.strip()}` of the interface `{name}` begins with a blank, so no type is read there."
-        return Diagnosis(because, "interface-line", "Each line begins with the type, at the very left.")
+        return INTERFACE_LINE(because, "Each line begins with the type, at the very left.")
     because = f"The line `{line}` of the interface `{name}` is not accepted: {said}."
     full = re.search(r"\b(\w+)/msg/(\w+)", line)
     if full:
-        return Diagnosis(because, "interface-line", f"In an interface file it is `{full[1]}/{full[2]}`, without `msg`.")
+        return INTERFACE_LINE(because, f"In an interface file it is `{full[1]}/{full[2]}`, without `msg`.")
     hint = (
         "A line is a type and a name. Types are built in (`string`, `int32`, `float32`, `bool`, …) or messages; names"
         " of fields are written in small letters."
     )
-    return Diagnosis(because, "interface-line", hint)
+    return INTERFACE_LINE(because, hint)
 
 
-def _unknown_type(match: re.Match[str]) -> Diagnosis:
+def _unknown_type(match: re.Match[str]) -> Reason:
     because = f"An interface uses the message `{match[1]}/{match[2]}`, and the package does not have it."
     hint = "A message of another package is written with that package: `std_msgs/Header`."
-    return Diagnosis(because, "interface-type", hint)
+    return INTERFACE_TYPE(because, hint)
 
 
 _REASONS: list[tuple[str, _Reason]] = [
     (
         r"The build was ended: it made more than ([\d,]+) files",
-        lambda m: Diagnosis(
+        lambda m: BUILD_FILES(
             f"The build was ended because it made more than {m[1]} files and folders.",
-            "build-files",
             "Does a build file make files in a loop?",
         ),
     ),
     (
         r"error: can't copy '([^']+)': doesn't exist",
-        lambda m: Diagnosis(
+        lambda m: PACKAGE_FILE(
             f"setup.py installs `{m[1]}`, and the package has no such file.",
-            "package-file",
             f'A pattern has to be looked up: `glob("{m[1]}")`, with `from glob import glob`.' if "*" in m[1] else "",
         ),
     ),
     (
         r"error: package directory '([^']+)' does not exist",
-        lambda m: Diagnosis(f"setup.py names the Python package `{m[1]}`; there is no such folder.", "package-file"),
+        lambda m: PACKAGE_FILE(f"setup.py names the Python package `{m[1]}`; there is no such folder."),
     ),
     (
         r"Multiple top-level packages discovered in a flat-layout: \[([^\]]{0,1000})\]",
-        lambda m: Diagnosis(
+        lambda m: SETUP_PY(
             f"setup.py does not name the Python package; setuptools looked for one, and found several folders: {m[1]}.",
-            "setup-py",
             "`packages=[…]` names it.",
         ),
     ),
     (
         r"RuntimeError: 'distutils.core.setup\(\)' was never called",
-        lambda m: Diagnosis(
+        lambda m: SETUP_PY(
             "setup.py ends without a call of `setup(…)` whose arguments setuptools accepts.",
-            "setup-py",
             "Is `setup(…)` called? Has each entry point the form `name = module:function`, and a comma after it?",
         ),
     ),
@@ -176,24 +195,22 @@ _REASONS: list[tuple[str, _Reason]] = [
     ),
     (
         r"InvalidServiceSpecification: Could not find separator '---'",
-        lambda m: Diagnosis("A service file has no line `---` between request and response.", "interface-parts"),
+        lambda m: INTERFACE_PARTS("A service file has no line `---` between request and response."),
     ),
     (
         r"InvalidActionSpecification: Number of '---' separators",
-        lambda m: Diagnosis(
+        lambda m: INTERFACE_PARTS(
             "An action file needs exactly two lines `---`: one before the result, and one before the feedback.",
-            "interface-parts",
         ),
     ),
     (
         r"passed file '([^']+)' doesn't exist",
-        lambda m: Diagnosis(f"CMakeLists.txt names `{m[1]}`; the package has no such file.", "interface-file"),
+        lambda m: INTERFACE_FILE(f"CMakeLists.txt names `{m[1]}`; the package has no such file."),
     ),
     (
         r"include_map\[pkg\].{0,2000}?KeyError: '([^']{1,200})'",
-        lambda m: Diagnosis(
+        lambda m: INTERFACE_DEPENDENCY(
             f"An interface uses a message of `{m[1]}`, which rosidl_generate_interfaces is not told of.",
-            "interface-dependency",
             f"Its last line names the packages whose messages are used: `DEPENDENCIES {m[1]}`.",
         ),
     ),
@@ -203,52 +220,48 @@ _REASONS: list[tuple[str, _Reason]] = [
     ),
     (
         r"the passed dependency '([^']+)' has not been found before",
-        lambda m: Diagnosis(
+        lambda m: CMAKE_PACKAGE(
             f"CMakeLists.txt uses `{m[1]}` before it has looked it up.",
-            "cmake-package",
             f"`find_package({m[1]} REQUIRED)` has to stand above.",
         ),
     ),
     (
         r'Unknown CMake command "rosidl_generate_interfaces"',
-        lambda m: Diagnosis(
+        lambda m: CMAKE_PACKAGE(
             "CMake does not know `rosidl_generate_interfaces`: the package that brings it was not looked up.",
-            "cmake-package",
             "`find_package(rosidl_default_generators REQUIRED)` has to stand above.",
         ),
     ),
     (
         r'Unknown CMake command "ament_(\w+)"',
-        lambda m: Diagnosis(
+        lambda m: CMAKE_PACKAGE(
             f"CMake does not know `ament_{m[1]}`: the package that brings it was not looked up.",
-            "cmake-package",
             "`find_package(ament_cmake REQUIRED)` has to stand above.",
         ),
     ),
     (
         r"Packages installing interfaces must include",
-        lambda m: Diagnosis(
+        lambda m: INTERFACE_GROUP(
             "package.xml does not say that this is a package of interfaces.",
-            "interface-group",
             "It needs `<member_of_group>rosidl_interface_packages</member_of_group>`.",
         ),
     ),
 ]
 
 
-def _quoted(log: str) -> Diagnosis:
+def _quoted(log: str) -> Reason:
     """The first error that the build printed, as the reason."""
     error = re.search(r"CMake Error at (\S+):(\d+) \((\w+)\):\n((?:  .*\n?)+)(Call Stack.*\n(?:  .*\n?)*)?", log)
     if error:
         own = re.search(r"CMakeLists\.txt:(\d+) \((\w+)\)", f"{error[1]}:{error[2]} ({error[3]}) {error[5] or ''}")
         where = f"line {own[1]} of CMakeLists.txt, `{own[2]}`" if own else f"`{error[3]}`"
         said = " ".join(error[4].split()).rstrip(".")[:300]
-        return Diagnosis(f"CMake stops at {where}: {said}.", "cmake")
+        return CMAKE(f"CMake stops at {where}: {said}.")
     if "setup.py" in log:
         wrong = _python_error(log)
         if wrong:
-            return Diagnosis(f"setup.py ends with an error: {wrong}.", "setup-py")
-    return Diagnosis(f"The build fails: {first_error(log)}", "build-failed", "The whole log is below.")
+            return SETUP_PY(f"setup.py ends with an error: {wrong}.")
+    return BUILD_FAILED(f"The build fails: {first_error(log)}", "The whole log is below.")
 
 
 def first_error(log: str) -> str:

@@ -5,6 +5,9 @@ from __future__ import annotations
 from typing import Literal, TypeVar
 
 from autograder.core.results import CellResult, Outcome, Status, SubmissionResult
+from autograder.reasons import Group, Kind
+
+HIDDEN = Kind("hidden", "a check that students do not see failed; they are told no more than that", Group.OUTPUT)
 
 Audience = Literal["student", "instructor"]
 _Result = TypeVar("_Result", bound=CellResult)
@@ -22,7 +25,7 @@ def outcome_for(outcome: Outcome, audience: Audience) -> Outcome:
     if audience == "instructor" or not outcome.hidden:
         return outcome
     return Outcome(
-        status=outcome.status, title=_HIDDEN_TITLE[outcome.status], hint=outcome.hint, code="hidden", hidden=True
+        status=outcome.status, title=_HIDDEN_TITLE[outcome.status], hint=outcome.hint, code=HIDDEN.code, hidden=True
     )
 
 

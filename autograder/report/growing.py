@@ -11,6 +11,7 @@ from rich.table import Column
 from rich.text import Text
 
 from autograder.core.results import CheckResult, Outcome, SubmissionResult
+from autograder.course.book import Book
 from autograder.report.audience import Audience, check_for, result_for
 from autograder.report.terminal import check_view, console, plain, problems_view, total_view
 
@@ -24,10 +25,12 @@ class GrowingReport:
     Args:
         checks: the grade_ids of the lab's checks, in order.
         audience: who reads it; None prints no report, only the line.
+        book: the course's lectures.
     """
 
-    def __init__(self, checks: Sequence[str], audience: Audience | None) -> None:
+    def __init__(self, checks: Sequence[str], audience: Audience | None, book: Book) -> None:
         """Nothing is known yet."""
+        self._book = book
         self._audience = audience
         self._screen = console()
         self._left = list(checks)
@@ -49,7 +52,7 @@ class GrowingReport:
     def begun(self, problems: Sequence[Outcome]) -> None:
         """The submission has been read: this is wrong with it as a whole."""
         if self._audience:
-            for part in problems_view(problems):
+            for part in problems_view(problems, self._book):
                 self._screen.print(part)
 
     def at(self, worker: int, what: str) -> None:
@@ -75,7 +78,8 @@ class GrowingReport:
 
     def _print(self, check: CheckResult) -> None:
         if self._audience:
-            self._screen.print(check_view(check_for(check, self._audience), title=check.title or check.grade_id))
+            title = check.title or check.grade_id
+            self._screen.print(check_view(check_for(check, self._audience), title=title, book=self._book))
 
     def _says(self) -> str:
         done = f"{len(self._known)} of {len(self._known.keys() | set(self._left))} checks done"

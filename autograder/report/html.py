@@ -15,6 +15,7 @@ from markupsafe import Markup, escape
 
 from autograder.core.output import last_lines, plain
 from autograder.core.results import CellResult, Status
+from autograder.course.book import NO_BOOK, Book
 from autograder.report import words
 from autograder.report.audience import Audience, check_for
 from autograder.report.reading import hints
@@ -88,7 +89,7 @@ def check_html(
     origin: str = "",
     fold_pictures: bool = False,
     on_demand: bool = False,
-    book: str = "",
+    book: Book = NO_BOOK,
 ) -> str:
     """Return one check's report as an HTML fragment: what was found first, then what holds, folded.
 
@@ -100,7 +101,7 @@ def check_html(
         origin: those cells, in words.
         fold_pictures: where there are many checks, and others matter more.
         on_demand: whether hints open one after the other, for a student who still works on it.
-        book: link to the folder of the lectures as HTML; empty if there is none.
+        book: the course's lectures, to which hints on demand lead.
     """
     shown = _each_thing_once(check_for(check, audience))
     verdict, found = words.verdict(shown), words.findings(shown)

@@ -13,9 +13,9 @@ from rich.text import Text
 
 from autograder.core.output import last_lines
 from autograder.core.results import CellResult, CheckResult, Isolation, NodeLog, Outcome, Status, SubmissionResult
+from autograder.course.book import NO_BOOK, Book
 from autograder.report import words
 from autograder.report.audience import Audience, check_for, reason, result_for
-from autograder.report.reading import section_for
 from autograder.report.words import Verdict
 from autograder.submission.similar import Pair
 
@@ -45,16 +45,16 @@ def plain(text: str) -> str:
     return text.replace("\t", "    ").translate(_SHOWN)
 
 
-def submission_view(result: SubmissionResult, audience: Audience = "student") -> RenderableType:
+def submission_view(result: SubmissionResult, audience: Audience = "student", book: Book = NO_BOOK) -> RenderableType:
     """Return everything that this audience may know of one submission."""
     seen = result_for(result, audience)
-    checks = [check_view(check, title=check.title or check.grade_id) for check in seen.checks]
-    return Group(*problems_view(seen.problems), *checks, total_view(seen))
+    checks = [check_view(check, title=check.title or check.grade_id, book=book) for check in seen.checks]
+    return Group(*problems_view(seen.problems, book), *checks, total_view(seen))
 
 
-def problems_view(problems: Sequence[Outcome]) -> list[RenderableType]:
+def problems_view(problems: Sequence[Outcome], book: Book) -> list[RenderableType]:
     """Return what is wrong with a submission as a whole."""
-    lines = [line for problem in problems for line in (_outcome_line(problem), *_details(problem))]
+    lines = [line for problem in problems for line in (_outcome_line(problem), *_details(problem, book))]
     return [*lines, Text()] if lines else []
 
 
@@ -78,7 +78,13 @@ def summary_view(result: SubmissionResult) -> RenderableType:
     return Group(table, Text(), _total(result))
 
 
-def check_view(check: CellResult, remarks: Sequence[str] = (), origin: str = "", title: str = "") -> RenderableType:
+def check_view(
+    check: CellResult,
+    remarks: Sequence[str] = (),
+    origin: str = "",
+    title: str = "",
+    book: Book = NO_BOOK,
+) -> RenderableType:
     """Return one check's report: what was found first, then what holds. Of a check that passed, a line."""
     verdict, found = words.verdict(check), words.findings(check)
     style = _VERDICT_STYLE[verdict]
@@ -91,7 +97,7 @@ def check_view(check: CellResult, remarks: Sequence[str] = (), origin: str = "",
     lines += [Text(f"  {plain(text)}") for text in (words.not_attempted(check),) if text]
     lines += [Text(f"  ! {plain(remark)}", "bold") for remark in [*remarks, *check.flags]]
     if verdict is not Verdict.NOT_ATTEMPTED:
-        lines += _findings(found)
+        lines += _findings(found, book)
     if verdict in (Verdict.FAILED, Verdict.PARTLY, Verdict.UNKNOWN):
         lines += [Text(f"  {text}", "dim") for text in (words.holding(found),) if text]
         lines += [_output(log) for log in check.logs if log.text.strip()]
@@ -99,36 +105,39 @@ def check_view(check: CellResult, remarks: Sequence[str] = (), origin: str = "",
     return Group(*lines)
 
 
-def _findings(found: words.Findings) -> list[RenderableType]:
+def _findings(found: words.Findings, book: Book) -> list[RenderableType]:
     lines: list[RenderableType] = []
     for outcome in found.bad:
-        lines += [Text("  ") + _outcome_line(outcome), *_details(outcome)]
+        lines += [Text("  ") + _outcome_line(outcome), *_details(outcome, book)]
     for part in found.lost:
         mark = (f"{words.SYMBOL[part.verdict]} ", _VERDICT_STYLE[part.verdict])
         lines.append(Text.assemble("  ", mark, f"{plain(part.title)}: {part.points}"))
         for outcome in part.bad:
-            lines += [Text("    ") + _outcome_line(outcome), *_details(outcome)]
+            lines += [Text("    ") + _outcome_line(outcome), *_details(outcome, book)]
     return lines + [Text(f"  {text}", "dim") for text in (found.not_looked_at,) if text]
 
 
-def check_text(check: CellResult, remarks: Sequence[str], origin: str) -> str:
+def check_text(check: CellResult, remarks: Sequence[str], origin: str, book: Book = NO_BOOK) -> str:
     """Return a student's view of one check as plain text, for a notebook in a terminal."""
     screen = Console(file=io.StringIO(), width=100, highlight=False, color_system=None, force_jupyter=False)
-    screen.print(check_view(check_for(check, "student"), remarks, origin))
+    screen.print(check_view(check_for(check, "student"), remarks, origin, book=book))
     assert isinstance(screen.file, io.StringIO)
     return "\n".join(line.rstrip() for line in screen.file.getvalue().splitlines())
 
 
-def evidence_view(check: CheckResult) -> RenderableType:
+def evidence_view(check: CheckResult, book: Book) -> RenderableType:
     """Return all that is known of a check, for an instructor: what passed, too, and all that its programs printed."""
-    lines: list[RenderableType] = [check_view(check, title=check.title or check.grade_id), Text()]
+    lines: list[RenderableType] = [
+        check_view(check, title=check.title or check.grade_id, book=book),
+        Text(),
+    ]
     part = ""
     for outcome in check.outcomes:
         if outcome.part != part:
             part = outcome.part
             lines.append(Text(plain(part) or "all parts", "bold"))
         mark = Text("  (hidden)", "dim") if outcome.hidden else Text()
-        lines += [Text("  ") + _outcome_line(outcome) + mark, *_details(outcome)]
+        lines += [Text("  ") + _outcome_line(outcome) + mark, *_details(outcome, book)]
     printed = {log.program for log in check.logs if log.text.strip()}
     return Group(*lines, *(_output(log, None) for log in check.logs if log.program in printed))
 
@@ -157,13 +166,13 @@ def _outcome_line(outcome: Outcome) -> Text:
     return Text.assemble(mark, plain(outcome.title), (words, STYLE[outcome.status]))
 
 
-def _details(outcome: Outcome) -> list[RenderableType]:
+def _details(outcome: Outcome, book: Book) -> list[RenderableType]:
     pairs = [
         ("because", outcome.because),
         ("expected", outcome.expected),
         ("observed", outcome.observed),
         ("try", outcome.hint),
-        ("read on", "" if outcome.hint else str(section_for(outcome.code) or "")),
+        ("read on", "" if outcome.hint else str(book.sections.get(outcome.code, ""))),
     ]
     table = Table.grid(padding=(0, 1))
     table.add_column(justify="right", style="dim", min_width=12)

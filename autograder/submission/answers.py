@@ -6,6 +6,7 @@ from typing import Any
 
 from autograder.course.cells import CELL_BYTES, grade_id_of, nbgrader_of, source_of
 from autograder.course.lab import Lab
+from autograder.reasons import Group, Kind
 from autograder.submission.copies import (
     DELETE_COPIES,
     SPLIT,
@@ -15,8 +16,21 @@ from autograder.submission.copies import (
     told_of_copies,
     told_of_given_copies,
 )
-from autograder.submission.notebook_file import UnreadableError, problem
+from autograder.submission.notebook_file import NOT_A_NOTEBOOK, UnreadableError, problem
 from autograder.submission.submission import Submission
+
+WRONG_NOTEBOOK = Kind(
+    "wrong-notebook", "it is another notebook, or hardly a cell of the lab is left in it", Group.NOTEBOOK
+)
+FORGED_CELL = Kind("forged-cell", "a cell has a grading mark that the lab does not know", Group.NOTEBOOK)
+SPLIT_CELL = Kind(
+    "split-cell", "an answer's cell was split; the piece without its first line is left out", Group.NOTEBOOK
+)
+DUPLICATED_CELL = Kind("duplicated-cell", "a cell with a grading mark is there more than once", Group.NOTEBOOK)
+FORGED_FLAGS = Kind("forged-flags", "a cell's grading marks are not the lab's", Group.NOTEBOOK)
+MISSING_CELL = Kind("missing-cell", "an answer's cell was deleted, or is no code cell any more", Group.NOTEBOOK)
+OVERSIZED_CELL = Kind("oversized-cell", "a cell is larger than is read", Group.NOTEBOOK)
+CHANGED_CELL = Kind("changed-cell", "a check cell was edited; the lab's own is run", Group.NOTEBOOK)
 
 
 def take_answers(cells: list[dict[str, Any]], lab: Lab, submission: Submission) -> None:
@@ -34,10 +48,12 @@ def take_answers(cells: list[dict[str, Any]], lab: Lab, submission: Submission) 
     if not known or (2 * known < len(found.keys() - (released.keys() - ours)) and 2 * answers < len(lab.answers)):
         raise UnreadableError(
             problem(
-                "wrong-notebook",
                 f"the notebook is {lab.name}",
-                f"Hardly a cell of it belongs to {lab.name}: it is another notebook, or the graded cells were deleted.",
-                f"Start from labs/{lab.name}/{lab.name}.ipynb and submit that notebook.",
+                WRONG_NOTEBOOK(
+                    f"Hardly a cell of it belongs to {lab.name}: it is another notebook, or the graded cells were"
+                    " deleted.",
+                    f"Start from labs/{lab.name}/{lab.name}.ipynb and submit that notebook.",
+                ),
             )
         )
     forged = sorted(found.keys() - released.keys())
@@ -45,10 +61,11 @@ def take_answers(cells: list[dict[str, Any]], lab: Lab, submission: Submission) 
         listed = ", ".join(f"`{grade_id[:40]}`" for grade_id in forged[:5]) + (", …" if len(forged) > 5 else "")
         submission.problems.append(
             problem(
-                "forged-cell",
                 "every graded cell belongs to the lab",
-                f"The lab has no graded cell {listed}: ignored.",
-                "Use ordinary cells for your own notes and experiments.",
+                FORGED_CELL(
+                    f"The lab has no graded cell {listed}: ignored.",
+                    "Use ordinary cells for your own notes and experiments.",
+                ),
             )
         )
     for grade_id, original in released.items():
@@ -66,22 +83,21 @@ def _take_cell(
         copies = copies_of(marked, file.file_name if file is not None else "")
     if file is not None and pieces_of(marked, file.file_name):
         title = f"the cell `{grade_id}` is in one piece"
-        submission.problems.append(problem("split-cell", title, SPLIT.format(name)))
+        submission.problems.append(problem(title, SPLIT_CELL(SPLIT.format(name))))
     if len(copies) > 1:
         because = told_of_given_copies(grade_id, len(copies))
         if answer is not None:
             because = told_of_copies(name, len(copies), is_file=file is not None)
-        submission.problems.append(
-            problem("duplicated-cell", f"there is one cell `{grade_id}`", because, DELETE_COPIES)
-        )
+        submission.problems.append(problem(f"there is one cell `{grade_id}`", DUPLICATED_CELL(because, DELETE_COPIES)))
     flags = ("grade", "solution", "locked")
     meant = {flag: bool(nbgrader_of(original).get(flag, False)) for flag in flags}
     if any({flag: bool(nbgrader_of(cell).get(flag, False)) for flag in flags} != meant for cell in copies):
         submission.problems.append(
             problem(
-                "forged-flags",
                 f"the cell `{grade_id}` is marked as in the lab",
-                f"The grading marks of the cell `{grade_id}` were changed; the lab's own marks count.",
+                FORGED_FLAGS(
+                    f"The grading marks of the cell `{grade_id}` were changed; the lab's own marks count.",
+                ),
             )
         )
     if answer is None:
@@ -93,7 +109,7 @@ def _take_cell(
         if marked:
             because = f"The answer cell `{grade_id}` is no code cell any more: there is no answer to grade."
             hint = "Select the cell and make it a code cell again (key Y)."
-        submission.problems.append(problem("missing-cell", f"the answer cell `{grade_id}` is there", because, hint))
+        submission.problems.append(problem(f"the answer cell `{grade_id}` is there", MISSING_CELL(because, hint)))
         return
     try:
         # A text may have been split or begun anew: whoever reads it decides.
@@ -102,15 +118,16 @@ def _take_cell(
         source = "\n\n".join(dict.fromkeys(written))
     except ValueError:
         submission.problems.append(
-            problem("not-a-notebook", f"the cell `{grade_id}` holds text", f"The cell `{grade_id}` holds no text.")
+            problem(f"the cell `{grade_id}` holds text", NOT_A_NOTEBOOK(f"The cell `{grade_id}` holds no text."))
         )
         return
     if len(source.encode("utf-8")) > CELL_BYTES:
         submission.problems.append(
             problem(
-                "oversized-cell",
                 f"the cell `{grade_id}` is at most {CELL_BYTES // 1024} KiB",
-                f"The cell `{grade_id}` is larger than {CELL_BYTES // 1024} KiB; it is not graded.",
+                OVERSIZED_CELL(
+                    f"The cell `{grade_id}` is larger than {CELL_BYTES // 1024} KiB; it is not graded.",
+                ),
             )
         )
         return
@@ -133,8 +150,9 @@ def _compare(grade_id: str, copies: list[dict[str, Any]], lab: Lab, submission: 
     if any(text(cell) not in originals for cell in copies):
         submission.problems.append(
             problem(
-                "changed-cell",
                 f"the cell `{grade_id}` is as in the lab",
-                f"The cell `{grade_id}` was edited; the lab's own cell is run instead.",
+                CHANGED_CELL(
+                    f"The cell `{grade_id}` was edited; the lab's own cell is run instead.",
+                ),
             )
         )

@@ -9,6 +9,12 @@ from typing import Any
 from autograder.core.files import read_plain
 from autograder.core.results import Outcome, Status
 from autograder.course.cells import grade_id_of
+from autograder.reasons import Group, Kind, Reason
+
+NO_NOTEBOOK = Kind("no-notebook", "there is no file of the lab's name, or it is empty", Group.NOTEBOOK)
+OVERSIZED_NOTEBOOK = Kind("oversized-notebook", "the notebook is larger than is read", Group.NOTEBOOK)
+NOT_A_NOTEBOOK = Kind("not-a-notebook", "the file is JSON and no notebook, or a cell holds no text", Group.NOTEBOOK)
+NOT_JSON = Kind("not-json", "the file is not JSON", Group.NOTEBOOK)
 
 NOTEBOOK_BYTES = 8 * 1024 * 1024
 """The largest notebook that is read, in bytes."""
@@ -23,9 +29,9 @@ class UnreadableError(Exception):
         self.problem = problem
 
 
-def problem(code: str, title: str, because: str, hint: str = "") -> Outcome:
+def problem(title: str, reason: Reason) -> Outcome:
     """Return an outcome that says what is wrong with a submission."""
-    return Outcome(status=Status.FAILED, title=title, because=because, hint=hint, code=code)
+    return Outcome(status=Status.FAILED, title=title, because=reason.because, hint=reason.hint, code=reason.kind.code)
 
 
 def cells_of(path: Path) -> list[dict[str, Any]]:
@@ -77,18 +83,19 @@ def _bytes(path: Path) -> bytes:
         content = read_plain(*_way(path), NOTEBOOK_BYTES + 1)
     except OSError as error:
         because = f"There is no file {path.name} to read ({error.strerror or error})."
-        raise UnreadableError(problem("no-notebook", title, because, f"Submit {path.name}.")) from error
+        raise UnreadableError(problem(title, NO_NOTEBOOK(because, f"Submit {path.name}."))) from error
     if not content.strip():
         raise UnreadableError(
-            problem("no-notebook", title, f"No {path.name} was handed in.", f"Submit the file {path.name} itself.")
+            problem(title, NO_NOTEBOOK(f"No {path.name} was handed in.", f"Submit the file {path.name} itself."))
         )
     if len(content) > NOTEBOOK_BYTES:
         raise UnreadableError(
             problem(
-                "oversized-notebook",
                 title,
-                f"The notebook is larger than {NOTEBOOK_BYTES // 1024**2} MiB.",
-                "Clear all outputs, save, and submit again.",
+                OVERSIZED_NOTEBOOK(
+                    f"The notebook is larger than {NOTEBOOK_BYTES // 1024**2} MiB.",
+                    "Clear all outputs, save, and submit again.",
+                ),
             )
         )
     return content
@@ -101,9 +108,9 @@ def _cells(content: bytes) -> list[dict[str, Any]]:
         notebook = json.loads(content.decode("utf-8-sig"))
     except (ValueError, RecursionError) as error:
         because = "The file is not a notebook: it is not valid JSON."
-        raise UnreadableError(problem("not-json", title, because, hint)) from error
+        raise UnreadableError(problem(title, NOT_JSON(because, hint))) from error
     cells = notebook.get("cells") if isinstance(notebook, dict) else None
     if not isinstance(cells, list) or notebook.get("nbformat") != 4 or not all(isinstance(c, dict) for c in cells):
         because = "The file is JSON, but not a notebook of format 4: it has no list of cells."
-        raise UnreadableError(problem("not-a-notebook", title, because, hint))
+        raise UnreadableError(problem(title, NOT_A_NOTEBOOK(because, hint)))
     return cells

@@ -16,10 +16,13 @@ from typing import Any
 from autograder.core.errors import KitError
 from autograder.core.files import signature
 from autograder.course.lab import Lab, lab_names, load_lab
+from autograder.reasons import Group, Kind
 from autograder.submission.answers import take_answers
 from autograder.submission.cell_files import take_files, take_own_files
 from autograder.submission.notebook_file import UnreadableError, cells_of, grade_ids_in, problem
 from autograder.submission.submission import Submission
+
+MORE_PROBLEMS = Kind("more-problems", "the notebook has more problems than are listed", Group.NOTEBOOK)
 
 PROBLEMS_KEPT = 100
 """As many problems of a notebook are listed."""
@@ -58,7 +61,7 @@ def _keep_first_problems(submission: Submission) -> None:
     left_out = len(submission.problems) - PROBLEMS_KEPT
     if left_out > 0:
         because = f"The notebook has {left_out} more problem{'s' * (left_out != 1)}, not listed here."
-        submission.problems[PROBLEMS_KEPT:] = [problem("more-problems", "the notebook has few problems", because)]
+        submission.problems[PROBLEMS_KEPT:] = [problem("the notebook has few problems", MORE_PROBLEMS(because))]
 
 
 def lab_of(notebook: Path, name: str | None, root: Path) -> Lab:

@@ -1,4 +1,4 @@
-"""The page of the check API: signatures, docstrings, an example of each call, and the codes it can fail with."""
+"""The page of the check API: signatures, docstrings, an example of each call, and the codes that it can fail with."""
 
 from __future__ import annotations
 
@@ -14,11 +14,10 @@ from dataclasses import dataclass, field
 from functools import cache
 from typing import Any
 
-from kit_source import KIT, ROOT, failures, fits
-from reason_codes import by_comment, label
+from reason_codes import ROOT, label
 
-GENERAL = 4
-"""So many groups of the diagnosis' codes, from the first, are about the program itself: every expectation has them."""
+from autograder.reasons import all_kinds
+
 _SECTION = re.compile(r"^(Args|Returns|Raises|Example|Codes):\s*$", re.MULTILINE)
 
 
@@ -126,10 +125,7 @@ def _undented(text: str) -> str:
     return first + newline + textwrap.indent(textwrap.dedent(rest), indent)
 
 
-def _entry(name: str, thing: Any, with_failures: bool, of: str = "") -> list[str]:
-    from autograder.checks.codes import GROUPS
-    from autograder.diagnosis.codes import CODES
-
+def _entry(name: str, thing: Any, of: str = "") -> list[str]:
     said = documented(thing)
     heading = name if of in ("", "ros") else f"{of}.{name}"
     lines = [f"### {heading}", "", "```python", signature_of(f"{of}.{name}" if of else name, thing), "```", ""]
@@ -144,24 +140,12 @@ def _entry(name: str, thing: Any, with_failures: bool, of: str = "") -> list[str
         lines += ["Example:", "", "```python", example.strip("\n"), "```", ""]
     if "Codes" in said.others:
         lines += [f"Can fail with {re.sub('`([a-z-]+)`', _linked, ' '.join(said.others['Codes'].split()))}", ""]
-    elif with_failures:
-        general = list(by_comment(KIT / "diagnosis" / "codes.py", CODES).values())[:GENERAL]
-        known = [code for code in CODES if not any(code in group for group in general)]
-        known += [code for group in GROUPS.values() for code in group]
-        fitting = [code for code in known if any(fits(code, pattern) for pattern in failures(name))]
-        if fitting:
-            links = ", ".join(f"[`{code}`](#{label(code)})" for code in dict.fromkeys(fitting))
-            lines += [f"Can fail with {links}.", ""]
     return lines
 
 
 def _linked(word: re.Match[str]) -> str:
     """A code in a docstring as a link to what it stands for; another word as it is."""
-    from autograder.checks.codes import GROUPS
-    from autograder.diagnosis.codes import CODES
-
-    listed = word[1] in CODES or any(word[1] in group for group in GROUPS.values())
-    return f"[{word[0]}](#{label(word[1])})" if listed else word[0]
+    return f"[{word[0]}](#{label(word[1])})" if word[1] in all_kinds() else word[0]
 
 
 def check_api() -> str:
@@ -182,20 +166,20 @@ def check_api() -> str:
                 lines += [f"- `{signature_of(f'{name}.{function.__name__}', function)}`: {inspect.getdoc(function)}"]
             lines.append("")
         elif callable(thing):
-            lines += _entry(name, thing, with_failures=False)
+            lines += _entry(name, thing)
     owner = None
     for name, group in offered(Launch):
         if group is not owner:
             lines += [f"## {_title(group)}", ""]
             owner = group
-        lines += _entry(name, inspect.unwrap(getattr(Launch, name)), with_failures=True, of="ros")
+        lines += _entry(name, inspect.unwrap(getattr(Launch, name)), of="ros")
     lines += ["## A table of answers", "", "`answers` gives a table, which a check looks at in a block of its own.", ""]
     for name, _ in offered(Answers):
-        lines += _entry(name, getattr(Answers, name), with_failures=False, of="table")
+        lines += _entry(name, getattr(Answers, name), of="table")
     lines += ["## A package", "", "`build` gives a package, which a check looks at in a block of its own.", ""]
     for name, _ in offered(Package):
-        lines += _entry(name, getattr(Package, name), with_failures=False, of="package")
-    lines += [*_entry("seal", seal, with_failures=False, of="forms"), "## What these calls give", ""]
+        lines += _entry(name, getattr(Package, name), of="package")
+    lines += [*_entry("seal", seal, of="forms"), "## What these calls give", ""]
     for thing in _given_back(Launch):
         lines += [f"### {thing.__name__}", "", documented(thing).text, ""]
         lines += [f"- `{field}`: {meaning}" for field, meaning in _fields(thing)]

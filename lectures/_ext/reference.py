@@ -1,15 +1,16 @@
-"""Writes the reference pages from the kit's own source, so that they cannot say something else than the code does.
+"""Writes the reference pages from the kit itself, so that they cannot say something else than the code does.
 
 In a page, a line `<!-- generated: NAME -->` is replaced by what the code says of itself:
 
 - `check api`: what a check cell can say, from its signatures and docstrings;
-- `reason codes`: every reason code with what it must have seen;
+- `reason codes`: every reason code with what it must have seen, from the registry of reasons;
 - `layers`: the folders of the package in the order in which they may import each other.
 """
 
 from __future__ import annotations
 
-import ast
+import importlib
+import inspect
 import re
 import tomllib
 from collections.abc import Callable
@@ -18,20 +19,19 @@ from typing import Any
 
 from check_api import check_api
 from docutils import nodes
-from kit_source import KIT, ROOT, parsed
-from reason_codes import reason_codes
+from reason_codes import ROOT, reason_codes
 from sphinx.application import Sphinx
 
 
 def layers() -> str:
-    """The folders of the package from the top down, as import-linter holds them, with what each says it is for."""
+    """The folders and modules of the package from the top down, as import-linter holds them, each with its purpose."""
     settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
     contract = next(one for one in settings["tool"]["importlinter"]["contracts"] if one["type"] == "layers")
-    lines = ["| folder | what it is for |", "|---|---|"]
+    lines = ["| folder or module | what it is for |", "|---|---|"]
     for layer in contract["layers"]:
-        for folder in re.findall(r"\w+", layer):  # `one | other` stand beside each other and do not use each other
-            about = (ast.get_docstring(parsed(KIT / folder / "__init__.py")) or "").split("\n\n")[0]
-            lines.append(f"| `{folder}` | {' '.join(about.split())} |")
+        for name in re.findall(r"\w+", layer):  # `one | other` stand beside each other and do not use each other
+            about = (inspect.getdoc(importlib.import_module(f"autograder.{name}")) or "").split("\n\n")[0]
+            lines.append(f"| `{name}` | {' '.join(about.split())} |")
     return "\n".join(lines)
 
 
@@ -44,8 +44,9 @@ def on_read(app: Sphinx, docname: str, source: list[str]) -> None:
         line = f"<!-- generated: {name} -->"
         if line in source[0]:
             source[0] = source[0].replace(line, make())
-            made_from = [*Path(__file__).parent.glob("*.py"), *KIT.rglob("*.py"), *ROOT.glob("labs/*/*.ipynb")]
-            for path in (ROOT / "pyproject.toml", *made_from):
+            kit = (ROOT / "autograder").rglob("*.py")
+            made_from = [*Path(__file__).parent.glob("*.py"), *kit, *ROOT.glob("labs/*/*.ipynb")]
+            for path in (ROOT / "pyproject.toml", ROOT / "course.toml", *made_from):
                 app.env.note_dependency(str(path))
 
 

@@ -11,11 +11,21 @@ from autograder.checks.expect.expectations import WITHIN
 from autograder.checks.expect.meeting import Meeting
 from autograder.checks.message_text import set_fields
 from autograder.checks.misuse import Misuse
-from autograder.diagnosis import Diagnosis
 from autograder.graph.services import ServiceMissing
+from autograder.reasons import Group, Kind
 
 if TYPE_CHECKING:
     from autograder.graph.actions import ActionSeen, Goal
+
+GOAL_ACCEPTED = Kind("goal-accepted", "a goal was accepted that should be rejected", Group.STATES)
+GOAL_STATUS = Kind("goal-status", "a goal ended with another status; no reason was established", Group.STATES)
+GOAL_REJECTED = Kind(
+    "goal-rejected", "a goal was rejected that should be accepted; no reason was established", Group.STATES
+)
+GOAL_UNFINISHED = Kind("goal-unfinished", "a goal did not end in the time; no reason was established", Group.STATES)
+CANCEL_REFUSED = Kind("cancel-refused", "the server did not agree to cancel; no reason was established", Group.STATES)
+CANCEL_LATE = Kind("cancel-late", "the server went on too long after it had agreed to cancel", Group.STATES)
+GOALS_TOGETHER = Kind("goals-together", "the status topic showed two goals that were executed at once", Group.STATES)
 
 _STEPS = 3
 """Feedback messages after which a server that has agreed to cancel must have ended the goal: 0.3 s at 10 Hz."""
@@ -87,10 +97,10 @@ class ActionExpectations(Meeting):
             return sent
         if accepted:
             because = f"The server rejected a goal that it should accept: {set_fields(goal)}."
-            reason = diagnosis.why_rejected(self._scene(), name) or Diagnosis(because, "goal-rejected")
+            reason = diagnosis.why_rejected(self._scene(), name) or GOAL_REJECTED(because)
             title = f"The action `{name}` accepts the goal"
             self._fail(title, reason, expected="accepted", observed=observed, hint=hint)
-        reason = Diagnosis(f"The server accepted a goal that it should reject: {set_fields(goal)}.", "goal-accepted")
+        reason = GOAL_ACCEPTED(f"The server accepted a goal that it should reject: {set_fields(goal)}.")
         self._fail(f"The action `{name}` rejects the goal", reason, expected="rejected", observed=observed, hint=hint)
 
     def _offered_action(self, name: str) -> bool:
@@ -134,7 +144,7 @@ class ActionExpectations(Meeting):
                 diagnosis.why_not_finished(scene, goal.name, status)
                 or diagnosis.program_trouble(scene)
                 or diagnosis.inside_reason(scene)
-                or Diagnosis(because, "goal-unfinished", advice)
+                or GOAL_UNFINISHED(because, advice)
             )
             self._fail(title, reason, expected=status, observed="no end", hint=hint)
         found = diagnosis.why_not_finished(scene, goal.name, status) if goal.status == "aborted" else None
@@ -142,7 +152,7 @@ class ActionExpectations(Meeting):
         if goal.agreed:
             because = f"The server had agreed to cancel the goal, and it ended as `{goal.status}` all the same."
             advice = "While `is_cancel_requested` is true, call `canceled()` and no other end."
-        found = found or Diagnosis(because, "goal-status", advice)
+        found = found or GOAL_STATUS(because, advice)
         self._fail(title, found, expected=status, observed=goal.status, hint=hint)
 
     def expect_canceled(self, goal: Goal, *, within: float = 3.0, hint: str = "") -> Any:
@@ -179,7 +189,7 @@ class ActionExpectations(Meeting):
                 or (diagnosis.why_not_finished(scene, goal.name, "canceled") if goal.status == "aborted" else None)
                 or diagnosis.program_trouble(scene)
                 or diagnosis.inside_reason(scene)
-                or Diagnosis(said, "cancel-refused")
+                or CANCEL_REFUSED(said)
             )
             self._fail(title, reason, expected="agreed", observed=said, hint=hint)
         outcomes.passed(title, observed="agreed")
@@ -192,7 +202,7 @@ class ActionExpectations(Meeting):
         self._expect_that(
             len(after) <= _STEPS,
             f"`{goal.name}` ends a goal soon after it has agreed to cancel it",
-            lambda: Diagnosis(because, "cancel-late"),
+            lambda: CANCEL_LATE(because),
             expected=f"at most {_STEPS} more feedback messages",
             observed=f"{len(after)}{taken}",
             hint=hint,
@@ -219,7 +229,7 @@ class ActionExpectations(Meeting):
         self._expect_that(
             most <= 1,
             f"`{name}` never executes two goals at once",
-            lambda: Diagnosis(because, "goals-together"),
+            lambda: GOALS_TOGETHER(because),
             expected="1",
             observed=str(most),
             hint=hint,

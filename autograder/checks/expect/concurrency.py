@@ -14,8 +14,22 @@ from autograder.checks import outcomes
 from autograder.checks.concurrency import Concurrency
 from autograder.checks.expect.expectations import WITHIN, Expectations
 from autograder.checks.misuse import Misuse
-from autograder.diagnosis import Diagnosis
 from autograder.graph.recording import quiet_profile
+from autograder.reasons import Group, Kind, Reason
+
+TOO_FEW_RUNS = Kind(
+    "too-few-runs",
+    "a callback told of fewer runs than asked for; no other reason was established",
+    Group.MESSAGES,
+    "timeline",
+)
+NO_OVERLAP = Kind(
+    "no-overlap",
+    "callbacks that should run at once did not; no other reason was established",
+    Group.MESSAGES,
+    "timeline",
+)
+OVERLAP = Kind("overlap", "callbacks that should exclude each other ran at once", Group.MESSAGES, "timeline")
 
 DECISIVE_RUNS = 6
 """Complete runs of each callback after which "they never overlapped" is a finding, not bad luck."""
@@ -65,7 +79,7 @@ class ConcurrencyExpectations(Expectations):
         reason = self._why_too_few(topic, counts, runs)
         self._fail(title, reason, expected=f"{runs} complete runs of each", observed=told or "no run", hint=hint)
 
-    def _why_too_few(self, topic: str, counts: Mapping[str, int], runs: int) -> Diagnosis:
+    def _why_too_few(self, topic: str, counts: Mapping[str, int], runs: int) -> Reason:
         scene = self._scene()
         alike = diagnosis.why_all_alike(scene) if 0 in counts.values() else None
         if alike:
@@ -75,7 +89,7 @@ class ConcurrencyExpectations(Expectations):
         trouble = diagnosis.program_trouble(scene) or diagnosis.inside_reason(scene)
         if trouble:
             return trouble
-        reason = diagnosis.why_starved(scene) or Diagnosis(diagnosis.account(scene, topic), "too-few-runs")
+        reason = diagnosis.why_starved(scene) or TOO_FEW_RUNS(diagnosis.account(scene, topic))
         missing = ", ".join(name for name, count in counts.items() if count < runs)
         others = " while others did" if any(count >= runs for count in counts.values()) else ""
         because = f"{missing} did not run {'once' if runs == 1 else f'{runs} times'}{others}. {reason.because}"
@@ -168,7 +182,7 @@ class ConcurrencyExpectations(Expectations):
             diagnosis.program_trouble(scene)
             or diagnosis.inside_reason(scene)
             or diagnosis.why_not_together(scene, topic, 2 if together.others else together.at_least, together.itself)
-            or Diagnosis(f"{together.apart(most)} {diagnosis.layout(scene, topic)}".strip(), "no-overlap"),
+            or NO_OVERLAP(f"{together.apart(most)} {diagnosis.layout(scene, topic)}".strip()),
             expected="one of each at once" if together.others else f"{together.at_least} at once",
             observed="never one of each" if together.others else f"{most} at once" if most > 1 else "one at a time",
             hint=hint,
@@ -198,9 +212,8 @@ class ConcurrencyExpectations(Expectations):
         self._expect_that(
             most <= 1,
             title,
-            lambda: Diagnosis(
+            lambda: OVERLAP(
                 f"Up to {most} of them ran at once: they are not all in one mutually exclusive group.",
-                "overlap",
                 "Callbacks exclude each other only within the same MutuallyExclusiveCallbackGroup object. "
                 "A lock does it, too, if it is taken before `begin` is published and kept until after `end`.",
             ),

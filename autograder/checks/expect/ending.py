@@ -12,8 +12,24 @@ from autograder.checks.expect.expectations import WITHIN
 from autograder.checks.expect.programs import ProgramExpectations
 from autograder.checks.misuse import Misuse
 from autograder.core.output import tidy
-from autograder.diagnosis import Diagnosis, last_traceback
+from autograder.diagnosis import last_traceback
+from autograder.diagnosis.programs import EXITED
+from autograder.diagnosis.spinning import NOT_SPINNING, SPINNING_ENDED
+from autograder.reasons import Group, Kind, Reason
 from autograder.sandbox.running_program import RunningProgram
+
+EXIT_STATUS = Kind("exit-status", "the program ended with another status", Group.OUTPUT)
+SIGNAL_IGNORED = Kind(
+    "signal-ignored",
+    "the program was told to end by a signal, and still ran when the time for that was over",
+    Group.OUTPUT,
+)
+UNCLEAN_END = Kind(
+    "unclean-end",
+    "told to end by a signal, the program ended with another status than 0 or printed an error",
+    Group.OUTPUT,
+)
+STILL_RUNNING = Kind("still-running", "a program runs on that should have ended", Group.OUTPUT)
 
 _SAID = {"SIGINT": "Ctrl-C (SIGINT)", "SIGTERM": "SIGTERM"}
 """How a program is told to end, in words."""
@@ -83,11 +99,11 @@ class EndingExpectations(ProgramExpectations):
             hint = f"{_comes_back(where, self._never_spun(program))} {hint}".strip()
             others = self._other_runs(program)
             reason = diagnosis.reason_inside([one for one in self._scene().insides if one.program not in others])
-            if reason and reason.code in ("spinning-ended", "not-spinning"):  # a program that ends need not spin
+            if reason and reason.kind in (SPINNING_ENDED, NOT_SPINNING):  # a program that ends need not spin
                 reason = None
             self._fail(
                 title,
-                reason or Diagnosis(f"It still runs after {within:g} s{where}.", "still-running"),
+                reason or STILL_RUNNING(f"It still runs after {within:g} s{where}."),
                 expected="ended",
                 observed="still running",
                 hint=hint,
@@ -108,15 +124,15 @@ class EndingExpectations(ProgramExpectations):
         """Earlier runs of the same program: what became of them explains nothing."""
         return [one for _, one in self._running.programs if one.name == program.name and one is not program]
 
-    def _why_this_status(self, program: RunningProgram) -> Diagnosis:
+    def _why_this_status(self, program: RunningProgram) -> Reason:
         """Why a program that had to end did so with another status: an error, or what it said last."""
         scene = self._scene()
         reason = diagnosis.program_trouble(replace(scene, stopped=[*scene.stopped, *self._other_runs(program)]))
-        if reason is not None and reason.code not in ("exited", "not-spinning"):  # it had to end, and need not spin
+        if reason is not None and reason.kind not in (EXITED, NOT_SPINNING):  # it had to end, and need not spin
             return reason
         said = [line.strip() for line in tidy(program.output()).splitlines() if line.strip()]
         last = f" The last line it printed is `{_STAMP.sub('', said[-1])[:120]}`." if said else ""
-        return Diagnosis(f"It ended with status {program.exit_status()}.{last}", "exit-status")
+        return EXIT_STATUS(f"It ended with status {program.exit_status()}.{last}")
 
     def expect_clean_end(self, name: str, *, by: str = "SIGINT", within: float = 3.0, hint: str = "") -> None:
         """A program that is told to end does so: with exit status 0, and without printing an error.
@@ -160,7 +176,7 @@ class EndingExpectations(ProgramExpectations):
             because, advice = f"{within:g} s after {_SAID[by]} it still runs{self._place_of(program)}.", ""
             if left := self._thread_left(program):
                 because, advice = f"{because} {left.because}", left.hint
-            reason = Diagnosis(because, "signal-ignored", advice)
+            reason = SIGNAL_IGNORED(because, advice)
             self._fail(title, reason, expected="ended", observed="still running", hint=hint)
         self._running.stopped.append(program)
         status, said = program.exit_status(), program.output()[said_before:]
@@ -174,7 +190,7 @@ class EndingExpectations(ProgramExpectations):
         self._expect_that(
             status == 0 and error is None,
             title,
-            lambda: Diagnosis(because, "unclean-end", advice),
+            lambda: UNCLEAN_END(because, advice),
             expected="exit status 0 and no error",
             observed=f"exit status {status}" + (" and an error" if error is not None else ""),
             hint=hint,
@@ -199,7 +215,7 @@ class EndingExpectations(ProgramExpectations):
         inside = self._scene().inside(program)
         return inside.attached and not any(executor.spins for executor in inside.executors)
 
-    def _thread_left(self, program: RunningProgram) -> Diagnosis | None:
+    def _thread_left(self, program: RunningProgram) -> Reason | None:
         """What is known of a thread that keeps a program alive whose `main` is over."""
         insides = (inside for inside in self._scene().insides if inside.program is program)
         return next((found for inside in insides if (found := diagnosis.thread_left(inside))), None)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import replace
 from typing import Literal
 
 from rclpy.topic_endpoint_info import TopicEndpointInfo
@@ -12,10 +11,22 @@ from autograder import diagnosis
 from autograder.checks import outcomes
 from autograder.checks.expect.expectations import WITHIN
 from autograder.checks.expect.graph import GONE_WITHIN, GraphExpectations
-from autograder.diagnosis import Diagnosis
 from autograder.graph.names import node_of, type_name
+from autograder.reasons import Group, Kind
+
+COUNT = Kind("count", "a topic has another number of such ends than asked for", Group.ENDS)
+PUBLISHER_PRESENT = Kind("publisher-present", "a publisher is still on a topic that should have none", Group.ENDS)
+SUBSCRIPTION_PRESENT = Kind(
+    "subscription-present", "a subscription is still on a topic that should have none", Group.ENDS
+)
+EXTRA_PUBLISHER = Kind(
+    "extra-publisher",
+    "more nodes publish than may, or the messages of one topic carry several senders' numbers",
+    Group.ENDS,
+)
 
 End = Literal["publisher", "subscription"]
+_PRESENT: dict[End, Kind] = {"publisher": PUBLISHER_PRESENT, "subscription": SUBSCRIPTION_PRESENT}
 
 
 class EndExpectations(GraphExpectations):
@@ -46,9 +57,9 @@ class EndExpectations(GraphExpectations):
             return
         those = f"{number()} {kind}{'s' * (number() != 1)}"
         owners = self._owners(topic, kind, msg_type, node)
-        reason = Diagnosis(f"`{topic}` has {those}, not {count}: {owners}.", "count")
+        reason = COUNT(f"`{topic}` has {those}, not {count}: {owners}.")
         if found:
-            reason = replace(reason, code="extra-publisher")
+            reason = EXTRA_PUBLISHER(reason.because)
         elif not number():
             reason = diagnosis.why_no_endpoint(self._scene(), topic, msg_type, kind, node)
         self._fail(
@@ -112,10 +123,7 @@ class EndExpectations(GraphExpectations):
         self._expect_that(
             gone,
             f"`{topic}` has no {kind}",
-            lambda: Diagnosis(
-                f"A {kind} on `{topic}` is still there, of {self._owners(topic, kind)}.",
-                f"{kind}-present",
-            ),
+            lambda: _PRESENT[kind](f"A {kind} on `{topic}` is still there, of {self._owners(topic, kind)}."),
             hint=hint,
         )
 

@@ -4,23 +4,27 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any, NoReturn
 
 from autograder import diagnosis
 from autograder.checks import outcomes, parts, seen
 from autograder.checks.running import Running
-from autograder.diagnosis import Diagnosis, Scene
+from autograder.diagnosis import Scene
 from autograder.diagnosis.inside import Inside
+from autograder.diagnosis.programs import EXITED
 from autograder.graph.observer import Observer
+from autograder.reasons import Reason
 
 WITHIN = 10.0
 """Seconds that an expectation waits at the most: far beyond what a start takes on a busy machine."""
 
-_POINTER = re.compile(r"lecture \d", re.IGNORECASE)
+_POINTER = re.compile(r"\w, (?:sections? )?'[^']+'")
+"""`Week 2, section 'Groups'`, whatever a course calls its parts."""
 
 
 def where_to_read(hint: str) -> str:
-    """The parts of a check's hint that point to a lecture; the others presume what went wrong."""
+    """The parts of a check's hint that say where to read on; the others presume what went wrong."""
     parts = [part.strip() for part in hint.split(";")]
     return " ".join(f"{part[:1].upper()}{part[1:]}" for part in parts if _POINTER.search(part))
 
@@ -95,7 +99,7 @@ class Expectations:
             self._observer.patience.is_sure()
 
     def _fail(
-        self, title: str, reason: Diagnosis | None, *, expected: str = "", observed: str = "", hint: str = ""
+        self, title: str, reason: Reason | None, *, expected: str = "", observed: str = "", hint: str = ""
     ) -> NoReturn:
         """Record a failure with the first broken link as its reason, and end the block.
 
@@ -110,24 +114,19 @@ class Expectations:
             scene = self._scene()
             # An error in a callback is the reason whether or not it has ended the program by now.
             trouble = diagnosis.program_trouble(scene) or diagnosis.inside_reason(scene)
-            reason = trouble if trouble and trouble.code != "exited" else reason or trouble
-        because = reason.because if reason else ""
-        code = reason.code if reason else ""
-        hint = reason.hint + " " * bool(reason.hint) + where_to_read(hint) if reason and reason.hint else hint
+            reason = trouble if trouble and trouble.kind is not EXITED else reason or trouble
+        reason = reason or outcomes.FAILED("")
+        reason = replace(reason, hint=f"{reason.hint} {where_to_read(hint)}" if reason.hint else hint)
         if gone is None:
-            picture = seen.explaining(code, f"{title} {because}", self._observer, self._insides())
-            outcomes.failed(
-                title, expected=expected, observed=observed, because=because, hint=hint, code=code, picture=picture
-            )
+            picture = seen.explaining(reason, title, self._observer, self._insides())
+            outcomes.failed(title, reason, expected=expected, observed=observed, picture=picture)
         led_to = diagnosis.called_from_outside(gone)
         outcomes.failed_as_a_whole(
             f"`{gone.name}` runs until it is stopped",
+            reason,
             expected="running",
             observed=gone.stopped_by()
             or ("an error in a callback" if gone.running() else f"ended with status {gone.exit_status()}"),
-            because=because,
-            hint=hint,
-            code=code,
             standing=parts.before(*led_to) if led_to else (),
         )
 
@@ -135,7 +134,7 @@ class Expectations:
         self,
         holds: object,
         title: str,
-        diagnose: Callable[[], Diagnosis | None] = lambda: None,
+        diagnose: Callable[[], Reason | None] = lambda: None,
         *,
         expected: str = "",
         observed: Any = "",

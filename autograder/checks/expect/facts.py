@@ -9,10 +9,17 @@ from autograder import diagnosis
 from autograder.checks import outcomes
 from autograder.checks.expect.expectations import Expectations
 from autograder.checks.misuse import Misuse
-from autograder.diagnosis import Diagnosis
+from autograder.diagnosis.programs import EXITED
+from autograder.diagnosis.spinning import NOT_SPINNING, SPINNING_ENDED
+from autograder.reasons import Group, Kind, kind_of_lab
 
 if TYPE_CHECKING:
     from autograder.graph.actions import Goal
+
+CONTENT = Kind("content", "messages came, and what they say is not what was asked for", Group.MESSAGES)
+REQUIRED = Kind(
+    "required", "a fact that the check established does not hold; the check gave no code of its own", Group.OUTPUT
+)
 
 
 class Facts(Expectations):
@@ -69,13 +76,14 @@ class Facts(Expectations):
             None if evident else diagnosis.inside_reason(scene, node),
         )
         # Where the check has a reason, these say less: they are what a program looks like that does nothing more.
-        vague = ("exited", "not-spinning", "spinning-ended") if because else ()
-        trouble = next((one for one in found if one and one.code not in vague), None)
-        reason = trouble or (Diagnosis(because, code or "required") if because else None)
+        vague = (EXITED, NOT_SPINNING, SPINNING_ENDED) if because else ()
+        trouble = next((one for one in found if one and one.kind not in vague), None)
+        kind = kind_of_lab(code) if code else REQUIRED
+        reason = trouble or (kind(because) if because else None)
         self._fail(title, reason, expected=expected, observed=observed, hint=hint)
 
     def require_equal(
-        self, title: str, observed: Any, expected: Any, *, because: str = "", hint: str = "", code: str = "content"
+        self, title: str, observed: Any, expected: Any, *, because: str = "", hint: str = "", code: str = CONTENT.code
     ) -> None:
         """State that two values are equal; the report shows both.
 

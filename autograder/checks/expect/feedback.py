@@ -10,11 +10,17 @@ from autograder.checks import outcomes
 from autograder.checks.expect import rates
 from autograder.checks.expect.actions import ActionExpectations, state_of
 from autograder.checks.expect.expectations import WITHIN, objection
+from autograder.checks.expect.facts import CONTENT
+from autograder.checks.expect.rates import RATE
 from autograder.checks.misuse import Misuse
-from autograder.diagnosis import Diagnosis
+from autograder.reasons import Group, Kind, Reason
 
 if TYPE_CHECKING:
     from autograder.graph.actions import Goal
+
+GOAL_FEEDBACK = Kind(
+    "goal-feedback", "another number of feedback messages came; no reason was established", Group.STATES
+)
 
 
 class FeedbackExpectations(ActionExpectations):
@@ -76,25 +82,25 @@ class FeedbackExpectations(ActionExpectations):
         outcomes.passed(title, observed=str(len(heard)))
         return goal.feedback
 
-    def _why_not_so_much_feedback(self, goal: Goal, *, too_few: bool) -> Diagnosis:
+    def _why_not_so_much_feedback(self, goal: Goal, *, too_few: bool) -> Reason:
         scene, came = self._scene(), len(goal.heard)
         said = f"{came} feedback message{'s' * (came != 1)} came; the goal is `{state_of(goal)}`."
         return (
             (diagnosis.why_no_feedback(scene, goal.name) if too_few else None)
             or (diagnosis.inside_reason(scene) if goal.result is None else None)
-            or Diagnosis(said, "goal-feedback")
+            or GOAL_FEEDBACK(said)
         )
 
     def _say_what_they_should(self, goal: Goal, values: Callable[[list[Any]], object], hint: str) -> None:
         wrong = objection(values(goal.feedback), "What the feedback says is not what was asked for.")
         if wrong:
-            reason = diagnosis.why_wrong_feedback(self._scene(), goal.name) or Diagnosis(wrong, "content")
+            reason = diagnosis.why_wrong_feedback(self._scene(), goal.name) or CONTENT(wrong)
             self._fail(f"The feedback of `{goal.name}` says what it should", reason, observed=wrong, hint=hint)
 
     def _keep_their_rate(self, goal: Goal, rate: float | None, tolerance: float, hint: str) -> None:
         if rate is None or rates.at_rate(goal.heard, rate, tolerance):
             return
         measured = rates.in_words(goal.heard)
-        reason = Diagnosis(f"Most of the gaps between feedback messages are those of {measured}.", "rate")
+        reason = RATE(f"Most of the gaps between feedback messages are those of {measured}.")
         title = f"Feedback of `{goal.name}` comes at {rate:.3g} Hz"
         self._fail(title, reason, expected=f"{rate:.3g} Hz", observed=measured, hint=hint)

@@ -7,8 +7,10 @@ from autograder.checks import outcomes
 from autograder.checks.expect.expectations import WITHIN
 from autograder.checks.expect.meeting import MATCHES_WITHIN, Meeting
 from autograder.checks.running import SETTLE
-from autograder.diagnosis import Diagnosis
 from autograder.graph.names import type_name
+from autograder.reasons import Group, Kind
+
+NODE_PRESENT = Kind("node-present", "a node is on the graph that should have gone", Group.ENDS)
 
 GONE_WITHIN = 2.0
 """Seconds that an absence may take to show, for example after a node was stopped."""
@@ -81,7 +83,7 @@ class GraphExpectations(Meeting):
         self._expect_that(
             gone,
             f"No node is called `{name}`",
-            lambda: Diagnosis(f"`{name}` is still on the graph.", "node-present"),
+            lambda: NODE_PRESENT(f"`{name}` is still on the graph."),
             observed=", ".join(self._observer.nodes()),
             hint=hint,
         )

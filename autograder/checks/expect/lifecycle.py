@@ -11,10 +11,16 @@ from autograder import diagnosis
 from autograder.checks import outcomes
 from autograder.checks.expect.expectations import WITHIN
 from autograder.checks.expect.meeting import Meeting
-from autograder.diagnosis import Diagnosis
 from autograder.graph.lifecycle import Change, LifecycleClient, Requested, in_order
 from autograder.graph.parameters import NoAnswer
 from autograder.graph.services import ServiceMissing
+from autograder.reasons import Group, Kind, Reason, kind_of_lab
+
+STATE = Kind("state", "the node's state is another one; no reason was established inside the program", Group.STATES)
+TRANSITION_SUCCEEDED = Kind("transition-succeeded", "a transition succeeded that should not", Group.STATES)
+NOT_LIFECYCLE = Kind("not-lifecycle", "the node is on the graph and offers no lifecycle services", Group.STATES)
+TRANSITION_FAILED = Kind("transition-failed", "the callback of a transition did not return SUCCESS", Group.STATES)
+TRANSITIONS = Kind("transitions", "the node went through other states than asked for", Group.STATES)
 
 WORD_FROM_INSIDE = 0.5
 """Seconds that a failed check waits for what the student's process says about it."""
@@ -67,8 +73,8 @@ class LifecycleExpectations(Meeting):
             reason = diagnosis.why_no_answer(scene, f"{node}/get_state")
             expected, observed = "an answer", "no answer"
         elif node in self._observer.nodes():
-            reason = diagnosis.program_trouble(scene) or Diagnosis(
-                f"`{node}` is not a lifecycle node: it offers no `{node}/get_state`.", "not-lifecycle"
+            reason = diagnosis.program_trouble(scene) or NOT_LIFECYCLE(
+                f"`{node}` is not a lifecycle node: it offers no `{node}/get_state`.",
             )
         else:
             reason = diagnosis.why_no_node(scene, node)
@@ -119,19 +125,19 @@ class LifecycleExpectations(Meeting):
         self._expect_that(
             seen == state,
             title,
-            lambda: Diagnosis(because, code or "state") if because else self._why_state(node, seen, state),
+            lambda: (kind_of_lab(code) if code else STATE)(because) if because else self._why_state(node, seen, state),
             expected=state,
             observed=seen,
             hint=hint,
         )
 
-    def _why_state(self, node: str, seen: str, wanted: str) -> Diagnosis:
-        return self._what_they_say() or Diagnosis(f"`{node}` is {seen}, not {wanted}.", "state")
+    def _why_state(self, node: str, seen: str, wanted: str) -> Reason:
+        return self._what_they_say() or STATE(f"`{node}` is {seen}, not {wanted}.")
 
-    def _what_they_say(self) -> Diagnosis | None:
+    def _what_they_say(self) -> Reason | None:
         """What the programs say of themselves: it takes another way than the node's answer, and may come later."""
 
-        def look() -> Diagnosis | None:
+        def look() -> Reason | None:
             return diagnosis.program_trouble(self._scene()) or diagnosis.inside_reason(self._scene())
 
         self._observer.wait(look, WORD_FROM_INSIDE)
@@ -192,9 +198,8 @@ class LifecycleExpectations(Meeting):
         if not done.offered:
             self._fail(
                 title,
-                Diagnosis(
+                STATE(
                     f"`{node}` is {done.before}; from there it offers {', '.join(done.available) or 'nothing'}.",
-                    "state",
                 ),
                 expected=label,
                 observed=done.before,
@@ -204,10 +209,9 @@ class LifecycleExpectations(Meeting):
             self._fail(
                 title,
                 self._what_they_say()
-                or Diagnosis(
+                or TRANSITION_FAILED(
                     f"The callback of {label} did not return SUCCESS; the node is {done.after} now."
                     + self._last_line(node),
-                    "transition-failed",
                 ),
                 expected="success",
                 observed=f"no success, {done.after}",
@@ -216,7 +220,7 @@ class LifecycleExpectations(Meeting):
         if expect == "failure" and done.success:
             self._fail(
                 title,
-                Diagnosis(f"It succeeded; the node is {done.after} now.", "transition-succeeded"),
+                TRANSITION_SUCCEEDED(f"It succeeded; the node is {done.after} now."),
                 expected="no success",
                 observed=f"success, {done.after}",
                 hint=hint,
@@ -258,7 +262,7 @@ class LifecycleExpectations(Meeting):
         self._expect_that(
             seen == list(steps),
             f"`{node}` goes " + ", ".join(f"{a} to {b}" for a, b in steps),
-            lambda: self._what_they_say() or Diagnosis(_other_way(seen, steps) or f"It went {told}.", "transitions"),
+            lambda: self._what_they_say() or TRANSITIONS(_other_way(seen, steps) or f"It went {told}."),
             expected=", ".join(f"{a} to {b}" for a, b in steps),
             observed=told,
             hint=hint,

@@ -13,10 +13,14 @@ from autograder.checks.expect.concurrency import ConcurrencyExpectations
 from autograder.checks.expect.expectations import WITHIN
 from autograder.checks.expect.offering import Offering
 from autograder.checks.expect.sources import SourceExpectations
-from autograder.diagnosis import Diagnosis
+from autograder.reasons import Group, Kind
 
 if TYPE_CHECKING:
     from autograder.graph.actions import Goal
+
+PAUSED = Kind(
+    "paused", "messages stopped while a callback ran; no other reason was established", Group.MESSAGES, "timeline"
+)
 
 
 class MeanwhileExpectations(ConcurrencyExpectations, SourceExpectations, Offering):
@@ -128,10 +132,9 @@ class MeanwhileExpectations(ConcurrencyExpectations, SourceExpectations, Offerin
         if spans and 0.0 < max(spans) < (at_least - 1) * gap:
             self._fail(
                 title,
-                Diagnosis(
+                PAUSED(
                     f"The longest run of `{callback}` took {max(spans):.2f} s, and a message comes on `{topic}` every "
                     f"{gap:.2f} s: too short for {at_least} of them.",
-                    "paused",
                 ),
                 expected=f"at least {at_least} messages in one run",
                 observed=f"runs of at most {max(spans):.2f} s",
@@ -151,7 +154,7 @@ class MeanwhileExpectations(ConcurrencyExpectations, SourceExpectations, Offerin
             or (diagnosis.why_waits_for_a_goal(scene, goal.name) if goal else None)
             or diagnosis.waits_for_its_group(scene)
             or diagnosis.why_not_together(scene, activity)
-            or Diagnosis(f"{most} {diagnosis.layout(scene, activity)}", "paused"),
+            or PAUSED(f"{most} {diagnosis.layout(scene, activity)}"),
             expected=f"at least {at_least} messages in one run",
             observed=", ".join(str(count) for count in seen) or "no complete run",
             hint=hint,

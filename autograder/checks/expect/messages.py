@@ -13,13 +13,24 @@ from autograder import diagnosis
 from autograder.checks import outcomes
 from autograder.checks.expect import rates
 from autograder.checks.expect.expectations import WITHIN, objection
+from autograder.checks.expect.facts import CONTENT
 from autograder.checks.expect.meeting import MATCHES_WITHIN
+from autograder.checks.expect.rates import RATE
 from autograder.checks.expect.sources import SourceExpectations
 from autograder.checks.message_text import in_words, int_in_float, shorten
 from autograder.checks.misuse import Misuse
-from autograder.diagnosis import Diagnosis
+from autograder.diagnosis.callbacks import MESSAGE_FIELD
 from autograder.graph.names import node_of
 from autograder.graph.recording import Received, Recording, quiet_profile
+from autograder.reasons import Group, Kind, Reason, kind_of_lab
+
+TOO_FEW = Kind(
+    "too-few",
+    "some messages came in the time, and fewer than asked for; no other reason was established",
+    Group.MESSAGES,
+)
+TOO_MANY = Kind("too-many", "more messages came than may", Group.MESSAGES)
+NOT_SILENT = Kind("not-silent", "a message came while there should be none", Group.MESSAGES)
 
 _RATE_DECIDED = 4
 """A rate is judged after so many times the messages that were asked for, if it is not right before."""
@@ -82,12 +93,12 @@ def _numbers(at_least: int, at_most: int | None, exactly: int | None, rate: floa
     return at_least or (0 if at_most == 0 else 10 if rate else 1), at_most
 
 
-def _an_int(message: Any) -> Diagnosis | None:
+def _an_int(message: Any) -> Reason | None:
     """Whether a message has an `int` in a field of floats."""
     field = int_in_float(message)
     because = f"Messages came, and `{field}` in them is what becomes of an `int` where a `float` belongs."
-    hint = "Write `5.0` for `5`. Lecture 7, section 'Python does not check what you assign'."
-    return Diagnosis(because, "content", hint) if field else None
+    hint = "Write `5.0` for `5`."
+    return MESSAGE_FIELD(because, hint) if field else None
 
 
 def _number(messages: int) -> str:
@@ -182,13 +193,13 @@ class MessageExpectations(SourceExpectations):
                 or diagnosis.inside_reason(scene)
                 or diagnosis.lifecycle_silence(scene)
                 or _an_int(recording.messages[-1].msg)
-                or Diagnosis(f"Messages came, but none {which}; the last of them is `{last}`.", "content")
+                or CONTENT(f"Messages came, but none {which}; the last of them is `{last}`.")
             )
         else:
             reason = diagnosis.why_silent(scene, recording.topic, recording.msg_type, qos)
-            if got and reason.code == diagnosis.SILENT:
+            if got and reason.kind is diagnosis.SILENT:
                 came = f"Only {got} of {wanted.need} messages came in {within:g} s."
-                reason = Diagnosis(f"{came} {reason.because}", "too-few")
+                reason = TOO_FEW(f"{came} {reason.because}")
         expected, observed = _number(wanted.need), _number(got)
         self._fail(wanted.title, reason, expected=expected, observed=observed, hint=wanted.hint)
 
@@ -202,7 +213,7 @@ class MessageExpectations(SourceExpectations):
             asked = f"at most {most}" if most else "none"
             self._fail(
                 wanted.title,
-                Diagnosis(f"{_number(came)} came where {asked} {'were' if most > 1 else 'was'} expected.", "too-many"),
+                TOO_MANY(f"{_number(came)} came where {asked} {'were' if most > 1 else 'was'} expected."),
                 expected=asked,
                 observed=f"{came}",
                 hint=wanted.hint,
@@ -233,10 +244,9 @@ class MessageExpectations(SourceExpectations):
             measured = rates.in_words(last, every)
             self._fail(
                 wanted.title,
-                Diagnosis(
+                RATE(
                     f"The messages come at {measured} instead of {rate:g} Hz. "
                     + diagnosis.paces(self._scene(), wanted.recording.topic),
-                    "rate",
                 ),
                 expected=f"{rate:g} Hz within {tolerance:.0%}",
                 observed=measured,
@@ -253,7 +263,7 @@ class MessageExpectations(SourceExpectations):
         shown = received if len(received) <= 4 else [*received[:2], *received[-2:]]
         said = [in_words(msg, values) for msg in shown]
         observed = shorten("; ".join(said if len(received) <= 4 else [*said[:2], "…", *said[2:]]))
-        self._fail(wanted.title, Diagnosis(wrong, "content"), observed=observed, hint=wanted.hint)
+        self._fail(wanted.title, CONTENT(wrong), observed=observed, hint=wanted.hint)
 
     def expect_silence(
         self, topic: str, msg_type: type, *, for_seconds: float = 1.0, because: str = "", code: str = "", hint: str = ""
@@ -290,7 +300,9 @@ class MessageExpectations(SourceExpectations):
         self._expect_that(
             not came,
             f"Nothing is published on `{topic}`",
-            lambda: Diagnosis(because or f"Messages came on `{topic}` that should not.", code or "not-silent"),
+            lambda: (kind_of_lab(code) if code else NOT_SILENT)(
+                because or f"Messages came on `{topic}` that should not."
+            ),
             expected="no message",
             observed=_number(published()),
             hint=hint,

@@ -7,13 +7,27 @@ from collections.abc import Callable, Collection, Iterator
 from typing import Any
 
 from autograder.arguments import params_file, remap_rules
+from autograder.arguments.remap_rules import PARAMETER_VALUE
 from autograder.checks import runtime
 from autograder.checks.program import Program
 from autograder.checks.running import Running
-from autograder.diagnosis import Diagnosis
 from autograder.graph import parameters
 from autograder.graph.names import nearest
 from autograder.graph.services import ServiceMissing
+from autograder.reasons import Group, Kind, Reason
+
+PARAMETER_UNDECLARED = Kind("parameter-undeclared", "the node has no parameter of this name", Group.STATES)
+LAUNCH_ARGUMENT = Kind(
+    "launch-argument", "the launch was given an argument that the launch file does not have", Group.STATES
+)
+PARAMS_FILE_MISSING = Kind(
+    "params-file-missing", "the launch file names a parameter file that is not there", Group.STATES
+)
+PARAMETER_AS_RULE = Kind(
+    "parameter-as-rule", "the value was given with `-r`, which renames topics and services only", Group.STATES
+)
+PARAMETER_FOR_OTHERS = Kind("parameter-for-others", "the value was given to a node of another name", Group.STATES)
+PARAMS_FILE_KEY = Kind("params-file-key", "no key of the parameter file is this node's name", Group.STATES)
 
 _EVERY_NODE = ("use_sim_time", "start_type_description_service")
 """Parameters that rclpy declares for every node."""
@@ -26,22 +40,21 @@ def own(declared: Collection[str]) -> list[str]:
     return [name for name in declared if name not in _EVERY_NODE and "qos_overrides" not in name]
 
 
-def undeclared(node: str, name: str, declared: Collection[str]) -> Diagnosis:
+def undeclared(node: str, name: str, declared: Collection[str]) -> Reason:
     """That a node has not declared a parameter, and what it has; or that it declared it without a value."""
     has = own(declared)
     if name in has:
         because = f"`{node}` has declared `{name}` without a default, and nothing gave it a value."
-        return Diagnosis(because, "parameter-value", "The second argument of `declare_parameter` is the default.")
-    return Diagnosis(
+        return PARAMETER_VALUE(because, "The second argument of `declare_parameter` is the default.")
+    return PARAMETER_UNDECLARED(
         f"`{node}` has not declared a parameter `{name}`" + (f"; it has {', '.join(has)}." if has else "."),
-        "parameter-undeclared",
         "A value given at the start reaches declared parameters only.",
     )
 
 
-def why_other(running: Running, node: str, name: str, found: Any, wanted: Any) -> Diagnosis:
+def why_other(running: Running, node: str, name: str, found: Any, wanted: Any) -> Reason:
     """Why the parameter `name` of `node` is `found` and not `wanted`: a reason that is established, or what it is."""
-    reasons: tuple[Callable[[], Diagnosis | None], ...] = (
+    reasons: tuple[Callable[[], Reason | None], ...] = (
         lambda: _file_for_others(running, node),
         lambda: _given_as_a_rule(running, name),
         lambda: _given_to_another(running, node, name),
@@ -52,18 +65,18 @@ def why_other(running: Running, node: str, name: str, found: Any, wanted: Any) -
     return next((reason for ask in reasons if (reason := ask())), None) or _other_value(found, wanted)
 
 
-def _given_as_a_rule(running: Running, name: str) -> Diagnosis | None:
+def _given_as_a_rule(running: Running, name: str) -> Reason | None:
     """Whether the parameter was given with `-r`, as if it were a name to be changed."""
     for launched, _ in running.programs:
         for text in launched.all_rules():
             rule = remap_rules.parse(text)
             if rule and rule.left == name:
                 because = f"`{text}` is given as a remap rule; such rules rename topics and services, not parameters."
-                return Diagnosis(because, "parameter-as-rule", f"Give it as a parameter: `-p {text}`.")
+                return PARAMETER_AS_RULE(because, f"Give it as a parameter: `-p {text}`.")
     return None
 
 
-def _given_to_another(running: Running, node: str, name: str) -> Diagnosis | None:
+def _given_to_another(running: Running, node: str, name: str) -> Reason | None:
     """Whether `-p NODE:name:=value` was meant for this node: a node's name there is one in the namespace `/`."""
     for launched, _ in running.programs:
         for text in launched.parameter_rules():
@@ -71,11 +84,11 @@ def _given_to_another(running: Running, node: str, name: str) -> Diagnosis | Non
             if parameter == name and meant and f"/{meant}" != node:
                 because = f"`-p {text}` is for the node `/{meant}`, and this one is `{node}`."
                 hint = "Leave the node out: the value is for every node of the process then."
-                return Diagnosis(because, "parameter-for-others", hint)
+                return PARAMETER_FOR_OTHERS(because, hint)
     return None
 
 
-def _given_by_another_name(running: Running, node: str, name: str, found: Any) -> Diagnosis | None:
+def _given_by_another_name(running: Running, node: str, name: str, found: Any) -> Reason | None:
     """Whether values were given under names that the node has not declared, and none under this one."""
     given = {one for launched, _ in running.programs for one in _given(launched, node)}
     if name in given or not given:
@@ -89,21 +102,20 @@ def _given_by_another_name(running: Running, node: str, name: str, found: Any) -
         return None
     short = [one for one in strange if name.endswith(one)]
     one = nearest(name, strange) or (short or strange)[0]
-    return Diagnosis(
+    return PARAMETER_UNDECLARED(
         f"It is {found!r}. A value was given for `{one}`, which `{node}` has not declared; it has "
         f"{', '.join(declared)}.",
-        "parameter-undeclared",
         "A value for a name that is not declared is passed over without a word.",
     )
 
 
-def _given_twice(running: Running, node: str, name: str, found: Any) -> Diagnosis | None:
+def _given_twice(running: Running, node: str, name: str, found: Any) -> Reason | None:
     """Whether `-p` gives the parameter more than one value: unlike with remap rules, the last one counts."""
     for launched, _ in running.programs:
         given = [text for text in launched.parameter_rules() if text.partition(":=")[0] == name]
         if len(given) > 1:
             because = f"It is {found!r}: `-p` gives `{name}` {len(given)} values, and the last one counts."
-            return Diagnosis(because, "parameter-value", "Give it once.")
+            return PARAMETER_VALUE(because, "Give it once.")
     return None
 
 
@@ -118,44 +130,42 @@ def _given(launched: Program, node: str) -> Iterator[str]:
             yield from params_file.names_for(params_file.text_of(runtime.current.folder, file), node)
 
 
-def _no_such_argument(running: Running, found: Any) -> Diagnosis | None:
+def _no_such_argument(running: Running, found: Any) -> Reason | None:
     """Whether the launch was given arguments that the launch file does not have."""
     unused = running.unused_arguments()
     if not unused:
         return None
     given = ", ".join(f"`{name}`" for name in unused)
-    return Diagnosis(
+    return LAUNCH_ARGUMENT(
         f"It is {found!r}. The launch was given {given}, and the launch file has no argument of that name.",
-        "launch-argument",
         "`- arg:` with a `name` declares one; `ros2 launch` passes over the others without a word.",
     )
 
 
-def _file_for_others(running: Running, node: str) -> Diagnosis | None:
+def _file_for_others(running: Running, node: str) -> Reason | None:
     """Whether the parameter files of the launch have nothing for this node."""
     for launched, _ in running.programs:
         if launched.warnings:
             hint = "Write `$(dirname)/NAME.yaml`; NAME is a cell's `%%file`."
             if "the build installs no" in launched.warnings[0]:
                 hint = "Compare the path with `data_files` in setup.py: only what stands there is installed."
-            return Diagnosis(f"{launched.warnings[0]} The node started without it.", "params-file-missing", hint)
+            return PARAMS_FILE_MISSING(f"{launched.warnings[0]} The node started without it.", hint)
         for option, file in itertools.pairwise(launched.arguments()):
             if option != "--params-file":
                 continue
             because = params_file.why_not_reached(params_file.text_of(runtime.current.folder, file), node)
             if because:
                 hint = "The key is the node's full name, namespace included; `/**/NAME` is a node in every namespace."
-                return Diagnosis(because, "params-file-key", hint)
+                return PARAMS_FILE_KEY(because, hint)
     return None
 
 
-def _other_value(found: Any, wanted: Any) -> Diagnosis:
+def _other_value(found: Any, wanted: Any) -> Reason:
     """What a parameter is instead; where its type differs, that is said."""
     kind, asked = _KINDS.get(type(found), "a list"), _KINDS.get(type(wanted), "a list")
     if kind == asked:
-        return Diagnosis(f"It is {found!r}.", "parameter-value")
-    return Diagnosis(
+        return PARAMETER_VALUE(f"It is {found!r}.")
+    return PARAMETER_VALUE(
         f"It is {found!r}, {kind}, and not {asked}.",
-        "parameter-value",
         "40 is an integer, 40.0 a double, '40' a text. Given another type than it declares, a node ends at its start.",
     )

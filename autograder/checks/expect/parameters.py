@@ -12,9 +12,14 @@ from autograder.checks.expect import parameter_reasons
 from autograder.checks.expect.expectations import WITHIN
 from autograder.checks.expect.meeting import Meeting
 from autograder.checks.parts import asked
-from autograder.diagnosis import Diagnosis
 from autograder.graph import parameters
 from autograder.graph.services import ServiceMissing
+from autograder.reasons import Group, Kind
+
+PARAMETER_ACCEPTED = Kind("parameter-accepted", "the node took a value that it should refuse", Group.STATES)
+PARAMETER_REFUSAL = Kind(
+    "parameter-refusal", "the node refused a value, but without a reason, or did not stay as it was", Group.STATES
+)
 
 _NO_RESULT = "Callback returned an invalid type"
 """What rclpy says in place of a reason."""
@@ -173,7 +178,7 @@ class ParameterExpectations(Meeting):
         self._expect_that(
             not reason,
             title,
-            lambda: Diagnosis(reason, "parameter-accepted" if reply.successful else "parameter-refusal"),
+            lambda: (PARAMETER_ACCEPTED if reply.successful else PARAMETER_REFUSAL)(reason),
             observed=reply.reason,
             hint=hint,
         )

@@ -9,7 +9,11 @@ from autograder import diagnosis
 from autograder.checks.expect.concurrency import ConcurrencyExpectations, refuse_names
 from autograder.checks.expect.expectations import WITHIN
 from autograder.checks.misuse import Misuse
-from autograder.diagnosis import Diagnosis
+from autograder.reasons import Group, Kind
+
+PERIOD = Kind(
+    "period", "the time from one begin of a callback to the next is not the asked one", Group.MESSAGES, "timeline"
+)
 
 
 class PeriodExpectations(ConcurrencyExpectations):
@@ -62,8 +66,8 @@ class PeriodExpectations(ConcurrencyExpectations):
         self._expect_that(
             not late,
             title,
-            lambda: Diagnosis(
-                f"From begin to begin it was: {told}. {diagnosis.paces(self._scene(), topic)}".rstrip(), "period"
+            lambda: PERIOD(
+                f"From begin to begin it was: {told}. {diagnosis.paces(self._scene(), topic)}".rstrip(),
             ),
             expected=f"{period:g} s within {tolerance:.0%}",
             observed=told,

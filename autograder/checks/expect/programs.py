@@ -15,10 +15,15 @@ from autograder.checks import outcomes
 from autograder.checks.expect.expectations import WITHIN, Expectations
 from autograder.checks.misuse import Misuse
 from autograder.checks.program import Program
-from autograder.diagnosis import Diagnosis
 from autograder.graph.clock import ClockDriver
 from autograder.graph.recording import Recording
+from autograder.reasons import Group, Kind, Reason
 from autograder.sandbox.running_program import RunningProgram
+
+ARGUMENT_NOT_NEEDED = Kind(
+    "argument-not-needed", "a launch file runs without an argument that it should demand", Group.FILES
+)
+NO_LOG = Kind("no-log", "no such line was logged, or not that often", Group.OUTPUT)
 
 _LOGGER = re.compile(r"\[\w+\] \[[\d.]+\] \[([^\]]*)\]: ")
 """What a line of a program's output begins with that a logger has written; the group is the logger's name."""
@@ -134,7 +139,7 @@ class ProgramExpectations(Expectations, ABC):
             return
         number = len(self._running.described)
         started = f"It starts {number} program{'' if number == 1 else 's'} without it."
-        reason = self._running.trouble[0] if self._running.trouble else Diagnosis(started, "argument-not-needed")
+        reason = self._running.trouble[0] if self._running.trouble else ARGUMENT_NOT_NEEDED(started)
         self._fail(title, reason, expected=f"the launch argument `{name}` is wanted", hint=hint)
 
     def expect_log(
@@ -195,14 +200,14 @@ class ProgramExpectations(Expectations, ABC):
         profile = QoSProfile(depth=1000, durability=QoSDurabilityPolicy.TRANSIENT_LOCAL)
         return self._observer.record("/rosout", Log, profile)
 
-    def _why_not_logged(self, times: int, text: str, level: str, node: str) -> Diagnosis:
+    def _why_not_logged(self, times: int, text: str, level: str, node: str) -> Reason:
         instead = "" if times else self._said_instead(text, level, node)
         scene = self._scene()
         found = diagnosis.program_trouble(scene) or diagnosis.inside_reason(scene)
         if not found and node and not times and not instead:
             found = diagnosis.nothing_due(scene, "/" + node.replace(".", "/"))
         came = {0: instead or "No such message was logged.", 1: "It came once."}.get(times, f"It came {times} times.")
-        return found or Diagnosis(came, "no-log")
+        return found or NO_LOG(came)
 
     def _said_instead(self, text: str, level: str, node: str) -> str:
         """The same words at another level, by another node or only printed, where a message did not come."""

@@ -10,9 +10,12 @@ from autograder import diagnosis
 from autograder.checks.expect.endpoints import End, EndExpectations
 from autograder.checks.expect.expectations import WITHIN
 from autograder.checks.misuse import Misuse
-from autograder.diagnosis import Diagnosis
+from autograder.diagnosis.matching import MISMATCH
 from autograder.graph import qos
 from autograder.graph.names import node_of
+from autograder.reasons import Group, Kind
+
+QOS_LIFESPAN = Kind("qos-lifespan", "the end has another lifespan than asked for", Group.ENDS)
 
 _WORDS = {
     "reliability": ("reliable", "best_effort"),
@@ -72,7 +75,7 @@ class QosExpectations(EndExpectations):
         self._expect_that(
             not wrong,
             title,
-            lambda: Diagnosis(" ".join(dict.fromkeys(said for _, said in wrong)), f"qos-{wrong[0][0]}"),
+            lambda: MISMATCH.get(wrong[0][0], QOS_LIFESPAN)(" ".join(dict.fromkeys(said for _, said in wrong))),
             expected=wanted,
             observed="; ".join(_in_words(policies, qos.describe(end.qos_profile)) for end in ends),
             hint=hint,

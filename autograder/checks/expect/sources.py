@@ -6,9 +6,9 @@ import itertools
 from collections import Counter
 from collections.abc import Sequence
 
-from autograder.checks.expect.endpoints import EndExpectations
+from autograder.checks.expect.endpoints import EXTRA_PUBLISHER, EndExpectations
 from autograder.checks.settling import shows_all
-from autograder.diagnosis import Diagnosis
+from autograder.diagnosis.names import WRONG_NODE
 from autograder.graph.names import UNKNOWN_NODE, node_of
 from autograder.graph.recording import Received
 from autograder.sandbox.inside.probe.events import Thing
@@ -38,9 +38,8 @@ class SourceExpectations(EndExpectations):
         ):
             self._fail(
                 title,
-                Diagnosis(
+                EXTRA_PUBLISHER(
                     f"`{topic}` has {len(owners)} publishers ({named}): it cannot be told whose messages these are.",
-                    "extra-publisher",
                     "Publish on this topic from one place only."
                     + " Make the publisher once, in the constructor, and send each message with it."
                     * (len(set(owners)) == 1),
@@ -50,11 +49,11 @@ class SourceExpectations(EndExpectations):
             )
         if publishers == 1 and _numbers_repeat(received):
             because = f"The messages on `{topic}` come from more than one publisher (their sequence numbers repeat)."
-            self._fail(title, Diagnosis(because, "extra-publisher"), expected="one publisher")
+            self._fail(title, EXTRA_PUBLISHER(because), expected="one publisher")
         if node and node not in owners:
             named = named or "nobody any more"
             because = f"The messages on `{topic}` come from {named}, not from `{node}`."
-            self._fail(title, Diagnosis(because, "wrong-node"), expected=node, observed=named)
+            self._fail(title, WRONG_NODE(because), expected=node, observed=named)
 
     def _nodes_publishing(self, topic: str, msg_type: type) -> list[str]:
         """The full name of each publisher's node."""

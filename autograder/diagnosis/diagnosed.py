@@ -1,21 +1,8 @@
-"""What a diagnosis is, and what a program tells that is diagnosed."""
+"""What a program tells of itself that is diagnosed."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any, Protocol
-
-
-@dataclass(frozen=True)
-class Diagnosis:
-    """Why something did not happen: established, or what was observed instead of a reason."""
-
-    because: str
-    """One or two sentences for the student."""
-    code: str
-    """A short stable word for the reason."""
-    hint: str = ""
-    """What to do or where to read on."""
 
 
 class DiagnosedProgram(Protocol):
