@@ -70,16 +70,7 @@ def check(
     while True:
         saved = signature(notebook)
         result = checked(notebook, found, settings, book, None if as_json else audience)
-        if junit is not None:
-            from autograder.core.files import write_beside
-            from autograder.report.export.junit import junit_xml
-
-            write_beside(junit, junit_xml([result], audience))
-        if gradescope is not None:
-            from autograder.core.files import write_beside
-            from autograder.report.export.gradescope import results_json
-
-            write_beside(gradescope, results_json(result))
+        _write_exports(result, audience, junit, gradescope)
         if as_json:
             from autograder.report.audience import result_for
 
@@ -129,6 +120,18 @@ def checked(
         result = run_submission(notebook, student, lab, settings, workers=WORKERS_FOR_ONE, follower=report)
         report.finish(result)
     return result
+
+
+def _write_exports(result: SubmissionResult, audience: Audience, junit: Path | None, gradescope: Path | None) -> None:
+    """Write the files that were asked for."""
+    from autograder.core.files import write_beside
+    from autograder.report.export.gradescope import results_json
+    from autograder.report.export.junit import junit_xml
+
+    if junit is not None:
+        write_beside(junit, junit_xml([result], audience))
+    if gradescope is not None:
+        write_beside(gradescope, results_json(result))
 
 
 def _tell_github(result: SubmissionResult, audience: Audience, notebook: Path) -> None:
