@@ -12,7 +12,7 @@ import typer
 
 from autograder.cli.app import JsonOption, SeedOption, app
 from autograder.core.errors import KitError
-from autograder.core.files import signature
+from autograder.core.files import signature, write_beside
 from autograder.core.results import Isolation  # its values stand in the command's help
 
 if TYPE_CHECKING:
@@ -71,12 +71,10 @@ def check(
         saved = signature(notebook)
         result = checked(notebook, found, settings, book, None if as_json else audience)
         if junit is not None:
-            from autograder.core.files import write_beside
             from autograder.report.export.junit import junit_xml
 
             write_beside(junit, junit_xml([result], audience))
         if gradescope is not None:
-            from autograder.core.files import write_beside
             from autograder.report.export.gradescope import results_json
 
             write_beside(gradescope, results_json(result))
