@@ -14,11 +14,11 @@ try:
     # nbgrader looks for modules in the working folder, which may be a student's.
     sys.path[:] = [str(_ROOT), *(folder for folder in sys.path if folder not in ("", str(Path.cwd()), str(_ROOT)))]
 
-    from autograder.gradebook.preparation import prepare_nbgrader
+    from autograder.gradebook.own_courses import prepare_nbgrader
 
     prepare_nbgrader()
 
-    from autograder.gradebook.entry import take_over
+    from autograder.gradebook.nbgrader_commands import take_over
 
     take_over(get_config(), _ROOT)  # noqa: F821  traitlets provides get_config
 except BaseException as error:

@@ -28,8 +28,9 @@ from rich.console import Console
 from rich.table import Table
 
 from autograder.core.results import Isolation, SubmissionResult
-from autograder.course.lab import grade_id_of, lab_names, load_lab
-from autograder.gradebook.preparation import prepare_nbgrader
+from autograder.course.cells import grade_id_of
+from autograder.course.lab import lab_names, load_lab
+from autograder.gradebook.own_courses import prepare_nbgrader
 from autograder.grading.store import ResultStore
 from autograder.sandbox.outer import run_in_sandbox
 

@@ -1,4 +1,7 @@
-"""Makes the pictures of README.md anew, each from a real run: `python tests/readme_pictures.py` (about two minutes)."""
+"""Makes the pictures of README.md and of the book's pages about labs and grading again, each from a real run.
+
+`python tests/readme_pictures.py` takes about two minutes.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +24,8 @@ from rich.terminal_theme import DEFAULT_TERMINAL_THEME
 from rich.text import Text
 from test_browser import jupyter_lab, run_all
 
-from autograder.course.lab import Lab, grade_id_of, load_lab
+from autograder.course.cells import grade_id_of
+from autograder.course.lab import Lab, load_lab
 
 ROOT = Path(__file__).resolve().parent.parent
 PICTURES = ROOT / "lectures" / "_static"

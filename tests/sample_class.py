@@ -19,7 +19,8 @@ import yaml
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
-from autograder.course.lab import Lab, grade_id_of, load_lab  # noqa: E402
+from autograder.course.cells import grade_id_of  # noqa: E402
+from autograder.course.lab import Lab, load_lab  # noqa: E402
 from autograder.course.paths import CoursePaths  # noqa: E402
 
 

@@ -20,7 +20,7 @@ from autograder.core.results import Isolation, SubmissionResult
 from autograder.course.lab import Lab, load_lab
 from autograder.course.paths import CoursePaths
 from autograder.gradebook.class_run import ClassRun, grade_class, try_class
-from autograder.gradebook.scores import read_grades
+from autograder.gradebook.grades import read_grades
 from autograder.grading import executors
 from autograder.grading.canaries import Canaries
 from autograder.grading.class_runner import run_class

@@ -737,6 +737,7 @@ def test_names_keep_their_capitals_and_an_end_that_is_not_there_has_its_nearest_
         ('ros.expect_messages("/chatter", String, exactly=3, at_most=4)', "exactly"),
         ('ros.expect_messages("/chatter", String, at_least=-1)', "not negative"),
         ('ros.expect_overlap("/activity", "tick", itself=True)', "no list"),
+        ('ros.expect_period("/activity", ["tick"], 0.5, runs=2)', "begins late"),
         ('ros.expect_log("x", level="WARNING")', "none of DEBUG"),
         ('with launch("talker") as second: pass', "inside another one"),
         ("with ros: pass", "inside another one"),
@@ -1295,3 +1296,63 @@ def test_a_parameter_reaches_the_program_as_what_it_is(grade: Grade) -> None:
         holder__py=HOLDER,
     )
     assert result.points == 2.0, result.outcomes
+
+
+LATE_FIRST = """
+import time
+import rclpy
+from std_msgs.msg import String
+
+rclpy.init()
+node = rclpy.create_node("worker")
+activity = node.create_publisher(String, "activity", 10)
+while not activity.get_subscription_count():
+    time.sleep(0.01)
+due = time.monotonic()
+time.sleep(0.16)  # the first call is late, and the later ones keep the beat of the timer
+while True:
+    activity.publish(String(data="tick begin"))
+    activity.publish(String(data="tick end"))
+    due += 0.4
+    time.sleep(max(0.0, due - time.monotonic()))
+"""
+
+
+def test_a_first_call_that_is_late_makes_no_other_period_right(grade: Grade) -> None:
+    result = grade(
+        """\
+        with launch("worker", listen=[("/activity", String)]) as ros:
+            ros.expect_period("/activity", ["tick"], 0.3, runs=3, within=5)
+        ros.score(2)
+        """,
+        worker__py=LATE_FIRST,
+    )
+    assert (result.points, failure(result).code) == (0, "period")
+
+
+CAMERA = """
+import rclpy
+from rclpy.lifecycle import LifecycleNode
+
+rclpy.init()
+rclpy.spin(LifecycleNode("camera"))
+"""
+
+
+def test_a_node_that_goes_on_after_the_expected_transitions_fails(grade: Grade) -> None:
+    result = grade(
+        """\
+        up = [("unconfigured", "configuring"), ("configuring", "inactive")]
+        on = [("inactive", "activating"), ("activating", "active")]
+        with launch("camera", lifecycle=["/camera"]) as ros:
+            ros.transition("/camera", "configure")
+            ros.transition("/camera", "activate")
+            ros.expect_transitions("/camera", up + on)
+            ros.expect_transitions("/camera", up)
+        ros.score(2)
+        """,
+        camera__py=CAMERA,
+    )
+    failed = failure(result)
+    assert (failed.code, failed.expected) == ("transitions", "unconfigured to configuring, configuring to inactive")
+    assert failed.observed.endswith("configuring to inactive, inactive to activating, activating to active")

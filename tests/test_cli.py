@@ -107,7 +107,7 @@ def test_what_lies_around_a_notebook_is_never_the_course(root: Path, tmp_path: P
         status, _, err = run(folder, "check", str(evil / "toy.ipynb"))
         assert status == 2 and "no notebook of a lab of this course" in err and f"Labs in {KIT}: lab" in err
     status, _, err = run(evil, "grade", "toy", ".")
-    assert status == 2 and "lies in the submissions" in err
+    assert status == 2 and "is inside the submissions" in err
 
 
 def test_check_follows_no_link_out_of_a_submission(root: Path, tmp_path: Path) -> None:
@@ -155,7 +155,7 @@ def test_usage_errors_are_sentences_with_status_2(root: Path, arguments: list[st
 
 def test_what_the_machine_refuses_is_named_with_a_way_out(root: Path, tmp_path: Path) -> None:
     status, _, err = run(root, "check", "--course", ".", "class/dan/toy.ipynb", "--junit", "/proc/nowhere/j.xml")
-    assert status == 2 and "/proc/nowhere/j.xml: No such file" in err and "disk has room" in err
+    assert status == 2 and "/proc/nowhere/j.xml: No such file" in err and "disk has space" in err
     course = toy.make_course(tmp_path / "course")
     (course / "build").touch()
     status, _, err = run(course, "grade", "toy", str(root / "class"))

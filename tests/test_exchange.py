@@ -10,7 +10,7 @@ from pathlib import Path
 
 import toy
 
-from autograder.course.lab import grade_id_of
+from autograder.course.cells import grade_id_of
 from autograder.gradebook.class_run import grade_class
 from autograder.gradebook.own_courses import TEMPLATE, trust
 from autograder.gradebook.settings import settings_of

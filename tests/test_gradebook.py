@@ -17,8 +17,8 @@ from autograder.core.errors import KitError
 from autograder.core.results import Isolation, SubmissionResult
 from autograder.course.paths import CoursePaths
 from autograder.gradebook.class_run import grade_class, try_class
+from autograder.gradebook.grades import read_grades
 from autograder.gradebook.release import register
-from autograder.gradebook.scores import read_grades
 from autograder.gradebook.settings import CONFIG_FILE
 from autograder.grading.job import Job
 from autograder.grading.runner import Settings

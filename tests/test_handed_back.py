@@ -25,10 +25,9 @@ from junitparser import JUnitXml
 from autograder.core.grades import CellGrade, Grade
 from autograder.core.results import CheckResult, Isolation, Outcome, Part, Status, SubmissionResult
 from autograder.course.lab import load_lab
-from autograder.gradebook.class_entries import class_entries
 from autograder.gradebook.class_run import ClassRun, Intake, grade_class
-from autograder.gradebook.preparation import prepare_nbgrader
-from autograder.gradebook.scores import read_grades
+from autograder.gradebook.grades import class_entries, read_grades
+from autograder.gradebook.own_courses import prepare_nbgrader
 from autograder.gradebook.settings import gradebook_address, gradebook_file
 from autograder.grading.executors import local
 from autograder.grading.runner import Settings

@@ -12,7 +12,7 @@ from rclpy.node import Node
 from sample_class import ROOT
 
 from autograder.core.student_yaml import FILE_BYTES
-from autograder.course.cell_file import parse
+from autograder.course.cells import parse
 from autograder.course.lab import load_lab
 from autograder.launch_files import (
     LaunchedNode,

@@ -20,14 +20,13 @@ import toy
 
 from autograder.authoring.release import release
 from autograder.core.results import Isolation
-from autograder.course.lab import Lab, grade_id_of, load_lab
+from autograder.course.cells import grade_id_of
+from autograder.course.lab import Lab, load_lab
 from autograder.gradebook.class_run import grade_class
-from autograder.gradebook.grades import write_grades
-from autograder.gradebook.own_courses import TEMPLATE, trust
-from autograder.gradebook.preparation import prepare_nbgrader
+from autograder.gradebook.grades import read_grades, write_grades
+from autograder.gradebook.own_courses import TEMPLATE, prepare_nbgrader, trust
 from autograder.gradebook.recorder import Recorder
 from autograder.gradebook.release import register
-from autograder.gradebook.scores import read_grades
 from autograder.gradebook.settings import settings_of
 from autograder.grading import runner
 from autograder.grading.executors import local
@@ -171,7 +170,7 @@ def test_the_hook_before_grading_leaves_a_foreign_working_folder_alone(
     course: Course, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     prepare_nbgrader()
-    from autograder.gradebook.entry import before_autograde
+    from autograder.gradebook.nbgrader_commands import before_autograde
 
     (tmp_path / "build").mkdir()
     monkeypatch.chdir(tmp_path)
@@ -526,7 +525,11 @@ def test_nbgrader_refuses_stock_execution(course: Course, tmp_path: Path) -> Non
     stages = '--Autograde.autograde_preprocessors=["nbgrader.preprocessors.Execute"]'
     done = nbgrader(root, "autograde", toy.LAB, stages)
     assert done.returncode != 0 and not (root / "build" / "autograded").exists()
-    broken = (root / "nbgrader_config.py").read_text().replace("autograder.gradebook.entry", "autograder.nowhere")
+    broken = (
+        (root / "nbgrader_config.py")
+        .read_text()
+        .replace("autograder.gradebook.nbgrader_commands", "autograder.nowhere")
+    )
     (root / "nbgrader_config.py").write_text(broken)
     done = nbgrader(root, "autograde", toy.LAB)
     assert done.returncode != 0 and "Nothing was executed" in done.stderr

@@ -18,8 +18,7 @@ import toy
 from served import address_of
 
 from autograder.course.lab import load_lab
-from autograder.gradebook.own_courses import TEMPLATE
-from autograder.gradebook.preparation import prepare_nbgrader
+from autograder.gradebook.own_courses import TEMPLATE, prepare_nbgrader
 from autograder.intake.collect import collect
 
 KIT = Path(__file__).resolve().parent.parent

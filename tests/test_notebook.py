@@ -21,8 +21,7 @@ from kernels import START, Notebook
 
 import autograder.checks
 from autograder.core import front_end, interrupts
-from autograder.course.cell_file import parse
-from autograder.course.lab import blank_mark
+from autograder.course.cells import blank_mark, parse
 from autograder.notebook import hints
 from autograder.notebook.kernel import NO_VERDICT, Kernel
 from autograder.notebook.program_folder import MANIFEST

@@ -12,7 +12,7 @@ from test_checks import TALKER, grade  # noqa: F401  a fixture
 
 from autograder.checks.forms import allowed, plain, same, seal
 from autograder.core.results import CheckResult, Status
-from autograder.course.markers import MORE_AT_GRADING, without_hidden_tests
+from autograder.course.cells import MORE_AT_GRADING, without_hidden_tests
 
 PARTS = """\
 with launch("talker") as ros:

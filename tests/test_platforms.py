@@ -203,6 +203,20 @@ def test_who_is_not_in_the_roster_is_left_out_and_named(tmp_path: Path) -> None:
     assert any("doejane" in sentence and "roster" in sentence for sentence in collected.refused)
 
 
+@pytest.mark.parametrize(
+    "uploads",
+    [("doe_1_9_toy.ipynb", "doe_1_10_toy.ipynb"), ("doe_1_900_toy.ipynb", "doe_1_1000_toy-1.ipynb")],
+    ids=["of one name", "of another name"],
+)
+def test_of_a_students_uploads_in_canvas_the_one_with_the_greatest_number_counts(
+    uploads: tuple[str, str], tmp_path: Path
+) -> None:
+    files = {uploads[0]: "first", uploads[1]: "second", "roe_2_11_toy.ipynb": "jr"}
+    collected = collect(lay_out(files, tmp_path, False), toy.LAB, tmp_path / "course")
+    assert texts(collected) == {"doe": "second", "roe": "jr"}
+    assert f"{uploads[0]!r} of 'doe' (a later file counts)" in collected.line
+
+
 def test_two_students_of_one_name_stay_two(tmp_path: Path) -> None:
     files = {"doejane_1_11_toy.ipynb": "one", "doejane_2_12_toy.ipynb": "other"}
     collected = collect(lay_out(files, tmp_path, True), toy.LAB, tmp_path / "course")

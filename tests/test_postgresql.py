@@ -25,7 +25,7 @@ from pathlib import Path
 import toy
 from autograder.core.results import Isolation
 from autograder.gradebook.class_run import grade_class
-from autograder.gradebook.scores import read_grades
+from autograder.gradebook.grades import read_grades
 from autograder.grading.executors import local
 from autograder.grading.runner import Settings
 from autograder.grading.validation import validated
@@ -37,7 +37,7 @@ print(run.unrecorded, run.told, [(one.student, one.score, len(one.stale)) for on
 """
 BY_HAND = """
 import sys
-from autograder.gradebook.preparation import prepare_nbgrader
+from autograder.gradebook.own_courses import prepare_nbgrader
 prepare_nbgrader()
 from nbgrader.api import Gradebook
 with Gradebook(sys.argv[1]) as gradebook:

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from autograder.gradebook.preparation import prepare_nbgrader
+from autograder.gradebook.own_courses import prepare_nbgrader
 
 prepare_nbgrader()
 

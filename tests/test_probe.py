@@ -1,22 +1,16 @@
-"""The probe and the rclpy that it watches: names that it relies on, and the forms in which it writes."""
+"""The probe and the rclpy that it watches: the names that it relies on, and what it writes."""
 
 from __future__ import annotations
 
 import json
 import subprocess
 import sys
-import typing
-from typing import Any
 
 import pytest
 from rcl_interfaces.msg import Parameter, ParameterEvent, ParameterValue
 
 from autograder.cli import doctor
-from autograder.diagnosis import events
-from autograder.sandbox.inside.probe import forms, watch_messages
-
-READ_ELSEWHERE = {"memory_error"}
-"""An event that the keeper of the program reads, and no diagnosis."""
+from autograder.sandbox.inside.probe import events, watch_messages
 
 # In a process of its own: to ask is to wrap.
 ATTACH = """
@@ -75,10 +69,10 @@ def test_what_cannot_be_sent_is_a_misfit_only_if_a_field_is(
     message: object, field: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # `publish` also raises when the node is just going down: then no field is to be blamed.
-    written: list[forms.BadMessage] = []
+    written: list[events.BadMessage] = []
     monkeypatch.setattr(watch_messages, "emit_once", written.append)
     watch_messages.note_misfit("message", "/events", message, type(message))
-    assert [event["field"] for event in written] == ([field] if field else [])
+    assert [event.field for event in written] == ([field] if field else [])
 
 
 def test_the_doctor_says_when_the_probe_cannot_attach(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -88,35 +82,3 @@ def test_the_doctor_says_when_the_probe_cannot_attach(monkeypatch: pytest.Monkey
     found = doctor.probe()
     assert not found.good
     assert "Executor._take_timer" in found.found and "locked rclpy" in found.do
-
-
-def fields_written(form: Any) -> dict[str, dict[str, Any]]:
-    """Event name -> field -> type, of a union of forms."""
-    found = {}
-    for one in typing.get_args(form):
-        fields = typing.get_type_hints(one)
-        (name,) = typing.get_args(fields.pop("e"))
-        found[name] = fields
-    return found
-
-
-def fields_read(union: Any) -> dict[str, dict[str, Any]]:
-    """The same of the classes of the diagnosis."""
-    found = {}
-    for one in typing.get_args(union):
-        fields = {name: field.annotation for name, field in one.model_fields.items()}
-        (name,) = typing.get_args(fields.pop("e"))
-        found[name] = fields
-    return found
-
-
-def test_the_probe_writes_the_events_and_fields_that_the_diagnosis_reads() -> None:
-    written = {**fields_written(forms.Event), **fields_written(forms.Record)}
-    read = fields_read(events.Event)
-    assert written.keys() - READ_ELSEWHERE == read.keys()
-    for name, fields in read.items():
-        awaits = written[name].pop("awaits", None), fields.pop("awaits", None)
-        assert written[name] == fields, name
-        if awaits != (None, None):
-            inner = {key: field.annotation for key, field in events.Awaits.model_fields.items()}
-            assert typing.get_type_hints(forms.Awaits) == inner

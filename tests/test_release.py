@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import functools
 import json
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
 
-from autograder.course.lab import CODE_STUB, load_lab
+from autograder.course.cells import CODE_STUB
+from autograder.course.lab import load_lab
 from autograder.gradebook import release
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -48,3 +50,17 @@ def test_no_cell_of_a_file_is_empty_which_ipython_refuses_to_run(lab: str) -> No
 def test_every_answer_that_names_a_file_still_does_when_blank(lab: str) -> None:
     for answer in load_lab(ROOT, lab).answers.values():
         assert answer.cell_type == "markdown" or answer.file is not None, answer.grade_id
+
+
+@pytest.mark.parametrize("lab", LABS)
+def test_a_check_is_folded_below_a_sentence_that_says_what_it_looks_at(lab: str) -> None:
+    cells = json.loads((ROOT / "labs" / lab / f"{lab}.ipynb").read_text(encoding="utf-8"))["cells"]
+    for above, cell in pairwise(cells):
+        marks = cell["metadata"].get("nbgrader", {})
+        if cell["cell_type"] == "code" and marks.get("grade"):
+            last = "".join(above["source"]).strip().splitlines()[-1]
+            assert above["cell_type"] == "markdown" and not last.startswith("#"), marks["grade_id"]
+            assert last not in ("**Check.**", "---"), marks["grade_id"]
+            assert cell["metadata"]["jupyter"] == {"source_hidden": True}, marks["grade_id"]
+        else:
+            assert "jupyter" not in cell["metadata"]

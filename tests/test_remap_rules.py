@@ -12,7 +12,7 @@ import rclpy
 from rclpy.node import Node
 from std_msgs.msg import String
 
-from autograder.arguments import params_file, remap_rules
+from autograder.arguments import params_file, remap_rules, rule_effect
 from autograder.arguments.rule_effect import RULE_WITHOUT_MATCH
 from autograder.checks import command_line, runtime
 from autograder.core.results import Isolation
@@ -100,7 +100,7 @@ def test_a_rule_that_rcl_takes_is_not_blamed(rule: str) -> None:
 def test_a_rule_without_effect_is_explained(rules: list[str], wanted: str, code: str) -> None:
     node, topics = names(rules)
     assert wanted not in topics
-    reason = remap_rules.without_effect(rules, wanted, [node], topics)
+    reason = rule_effect.without_effect(rules, wanted, [node], topics)
     assert reason is not None
     assert reason.code == code
 
@@ -109,7 +109,7 @@ def test_a_swapped_rule_is_told_from_one_that_is_misspelt() -> None:
     node, topics = names(["front/image:=camera/image_color"])
     in_code = {f"/{name}": [node] for name in ("camera/image_color", "camera_demo/status")}
     for rule, said in (("front/image:=camera/image_color", True), ("camera/image_colour:=front/image", False)):
-        reason = remap_rules.without_effect([rule], "/front/image", [node], topics, in_code)
+        reason = rule_effect.without_effect([rule], "/front/image", [node], topics, in_code)
         assert reason is not None and ("swapped" in reason.because) == said
 
 
@@ -120,7 +120,7 @@ def test_a_rule_that_worked_is_not_said_to_have_changed_nothing(space: str, want
     node, topics = names(rules)
     assert "/front/image" in topics and wanted not in topics
     in_code = {wanted: [node], f"{node}/status": [node]} if known else None
-    reason = remap_rules.without_effect(rules, wanted, [node], topics, in_code)
+    reason = rule_effect.without_effect(rules, wanted, [node], topics, in_code)
     assert reason is not None and reason.code == "rule-takes-name" and "leave the rule out" in reason.hint.lower()
     assert "changed nothing" not in reason.because and "swapped" not in reason.because
     assert ("swapped" in reason.hint) != known
@@ -128,12 +128,12 @@ def test_a_rule_that_worked_is_not_said_to_have_changed_nothing(space: str, want
 
 def test_what_renames_no_node_is_told() -> None:
     assert names(["camera_demo:=front"])[0] == "/camera_demo"
-    found = remap_rules.node_without_effect(["camera_demo:=front"], "/front", ["/camera_demo"])
+    found = rule_effect.node_without_effect(["camera_demo:=front"], "/front", ["/camera_demo"])
     assert found is not None and found.code == "rule-kind" and "-r __node:=front" in found.hint
-    assert remap_rules.node_without_effect(["camera_demo:=rear"], "/front", ["/camera_demo"]) is None
-    given = remap_rules.renames_nothing(["a:=1", "camera_name:=front"], "/front")
+    assert rule_effect.node_without_effect(["camera_demo:=rear"], "/front", ["/camera_demo"]) is None
+    given = rule_effect.renames_nothing(["a:=1", "camera_name:=front"], "/front")
     assert given is not None and given.because.startswith("`-p camera_name:=front` gives a parameter")
-    assert remap_rules.renames_nothing(["a:=1", "camera_name:=rear"], "/front") is None
+    assert rule_effect.renames_nothing(["a:=1", "camera_name:=rear"], "/front") is None
 
 
 def test_a_value_given_with_the_option_for_rules_leads_to_the_one_for_parameters() -> None:
@@ -168,14 +168,14 @@ def test_the_names_in_a_parameter_file_are_known_by_node() -> None:
 
 
 def test_an_absolute_name_in_the_code_is_told_from_a_wrong_rule() -> None:
-    reason = remap_rules.without_effect(["camera:=image"], "/x/image", ["/x/demo"], ["/camera"])
+    reason = rule_effect.without_effect(["camera:=image"], "/x/image", ["/x/demo"], ["/camera"])
     assert reason is not None
     assert reason.code == "absolute-name"
 
 
 def test_a_rule_of_another_node_is_not_blamed_for_the_order() -> None:
     rules = ["front:camera:=a", "rear:camera:=image"]
-    found = remap_rules.without_effect(rules, "/image", ["/rear"], {"/a": ["/front"], "/stop": ["/rear"]})
+    found = rule_effect.without_effect(rules, "/image", ["/rear"], {"/a": ["/front"], "/stop": ["/rear"]})
     assert found == RULE_WITHOUT_MATCH(
         "The rule `rear:camera:=image` changed nothing: nothing is called `/camera`, the name on its left side.",
         "Compare the left side with the name in the code, letter by letter. ROS 2 does not warn about such a rule.",
@@ -194,12 +194,12 @@ def test_a_private_name_or_an_idle_namespace_is_not_called_absolute(
     rules: list[str], nodes: list[str], used: list[str]
 ) -> None:
     wanted = "/x/image" if nodes == ["/x/demo"] else "/image"
-    reason = remap_rules.without_effect(rules, wanted, nodes, used)
+    reason = rule_effect.without_effect(rules, wanted, nodes, used)
     assert reason is None or reason.code == "rule-without-match"
 
 
 def test_rules_that_have_nothing_to_do_with_the_wanted_name_are_not_blamed() -> None:
-    assert remap_rules.without_effect(["a:=b"], "/image", ["/camera_demo"], ["/camera"]) is None
+    assert rule_effect.without_effect(["a:=b"], "/image", ["/camera_demo"], ["/camera"]) is None
 
 
 @pytest.mark.parametrize(
@@ -399,6 +399,6 @@ def test_a_parameter_file_that_rcl_reads_is_read_as_rcl_reads_it(tmp_path: Path,
     ],
 )
 def test_a_rule_for_one_node_that_matched_nothing_is_named(rule: str, wanted: str, nodes: list[str], says: str) -> None:
-    reason = remap_rules.node_without_effect([rule], wanted, nodes)
+    reason = rule_effect.node_without_effect([rule], wanted, nodes)
     assert bool(reason) == bool(says)
     assert reason is None or says in reason.because

@@ -18,6 +18,8 @@ from pathlib import Path
 import pytest
 from kernels import Notebook
 from rcl_interfaces.msg import ListParametersResult
+from rclpy.qos import QoSDurabilityPolicy, QoSProfile, QoSReliabilityPolicy
+from rclpy.topic_endpoint_info import TopicEndpointInfo
 from std_msgs.msg import String
 from test_msgs.msg import BoundedSequences, UnboundedSequences
 from test_notebook import SET_UP, TALKER
@@ -27,6 +29,7 @@ from autograder.graph.observer import Observer
 from autograder.ros2 import discovery
 from autograder.ros2.main import COMMANDS, TimeIsUp, run
 from autograder.ros2.messages import Shape, to_csv, to_yaml
+from autograder.ros2.options import to_match
 from autograder.sandbox.environment import profile_environment
 
 ROBOT = Path(__file__).parent / "ros2_robot"
@@ -476,6 +479,28 @@ def test_the_page_of_the_book_names_every_verb() -> None:
             assert run([command, "--help"]) == 0
         verbs = re.findall(r"^    (\w+)", helped.getvalue(), re.MULTILINE)
         assert set(verbs) == set(re.findall(r"`(\w+)`", row.partition(" | ")[2])), command
+
+
+@pytest.mark.parametrize(
+    ("offered", "matching"),
+    [
+        ([], "reliable volatile"),
+        (["reliable volatile", "reliable volatile"], "reliable volatile"),
+        (["reliable volatile", "best_effort volatile"], "best_effort volatile"),
+        (["best_effort volatile", "best_effort volatile"], "best_effort volatile"),
+        (["reliable transient_local", "reliable transient_local"], "reliable transient_local"),
+        (["reliable volatile", "reliable transient_local"], "reliable volatile"),
+    ],
+)
+def test_a_subscription_asks_for_what_every_publisher_offers(offered: list[str], matching: str) -> None:
+    def profile(words: str) -> QoSProfile:
+        reliability, durability = words.split()
+        made = QoSProfile(depth=10)
+        made.reliability = QoSReliabilityPolicy.get_from_short_key(reliability)
+        made.durability = QoSDurabilityPolicy.get_from_short_key(durability)
+        return made
+
+    assert to_match([TopicEndpointInfo(qos_profile=profile(words)) for words in offered]) == profile(matching)
 
 
 def test_a_node_that_nothing_spins_is_told(notebook: Notebook) -> None:

@@ -9,8 +9,8 @@ from hypothesis import HealthCheck, assume, example, given, settings
 from hypothesis import strategies as st
 from rclpy.node import Node
 
-from autograder.arguments.remap_rules import parse, refused, refused_parameter, without_effect
-from autograder.arguments.rule_effect import full_name
+from autograder.arguments.remap_rules import parse, refused, refused_parameter
+from autograder.arguments.rule_effect import full_name, without_effect
 from autograder.reasons import Reason
 
 QUICK = settings(max_examples=100, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.filter_too_much])

@@ -188,7 +188,7 @@ def test_an_interrupted_environment_is_made_anew(tmp_path: Path) -> None:
     (folder / ".venv" / "left-over").touch()
 
     done = make(folder, "setup")
-    assert "Making .venv anew" in done.stderr
+    assert "Creating .venv again" in done.stderr
     assert done.returncode == 0, done.stderr
     assert not (folder / ".venv" / "left-over").exists()
     assert make(folder, "setup").stderr == ""
@@ -287,7 +287,7 @@ def test_pip_helps_where_uv_does_not_manage(tmp_path: Path) -> None:
     folder = check_out(tmp_path / "course")
     write_lock(folder, "requirements.lock", "uv", "annotated-doc")
     done = make(folder, "setup", UV_DEFAULT_INDEX=UNREACHABLE, UV_NO_CACHE="1", UV_HTTP_RETRIES="0")
-    assert "uv does not manage" in done.stderr
+    assert "uv failed" in done.stderr
     assert done.returncode == 0, done.stderr
     assert imports(folder, "annotated_doc")
 

@@ -9,7 +9,7 @@ import pytest
 import toy
 
 from autograder.core.picture import Picture
-from autograder.core.results import Status, SubmissionResult
+from autograder.core.results import CheckResult, Status, SubmissionResult
 from autograder.course.lab import load_lab
 from autograder.grading import runner, supervisor
 from autograder.grading.class_runner import run_class
@@ -17,7 +17,7 @@ from autograder.grading.executors import local
 from autograder.grading.job import Job
 from autograder.grading.runner import Settings, run_submission
 from autograder.grading.store import ResultStore
-from autograder.grading.validation import validated
+from autograder.grading.validation import believed, validated
 
 
 @pytest.mark.skipif(len(os.sched_getaffinity(0)) < 2, reason="one core cannot become fewer")
@@ -62,6 +62,15 @@ def test_pictures_are_in_the_file_and_not_in_memory(tmp_path: Path, monkeypatch:
         assert held.checks[0].outcomes[0].title and "svg" not in held.model_dump_json()
     stored = ResultStore(root).last(toy.LAB, "ann")
     assert shown == [stored, stored] and stored is not None and "svg" in stored.model_dump_json()
+
+
+@pytest.mark.parametrize("points", [-1.0, -0.01, 2.01, float("nan"), float("inf")])
+def test_impossible_points_are_not_believed(tmp_path: Path, points: float) -> None:
+    cell = load_lab(toy.make_course(tmp_path / "course"), toy.LAB).checks[0]
+    told = CheckResult(grade_id=cell.grade_id, title=cell.title, max_points=2.0, points=points, outcomes=[])
+    assert believed(cell.model_copy(update={"points": 2.0}), told).status is Status.UNKNOWN
+    possible = believed(cell.model_copy(update={"points": 2.0}), told.model_copy(update={"points": 0.0}))
+    assert possible.points == 0.0 and not possible.outcomes
 
 
 @pytest.mark.parametrize(("gives_a_result", "runs"), [(True, [1, 1]), (False, [1, 2])])

@@ -271,7 +271,7 @@ def test_submit_says_what_is_unsaved_outdated_ignored_or_empty_and_intake_takes_
     from typer.testing import CliRunner
 
     from autograder.cli.main import app
-    from autograder.course.cell_file import parse
+    from autograder.course.cells import parse
     from autograder.intake.collect import collect
     from autograder.notebook.program_folder import ProgramFolder, Written
 

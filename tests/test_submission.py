@@ -19,9 +19,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from autograder.core.errors import KitError
-from autograder.course.cell_file import BadNameError, parse
-from autograder.course.lab import Lab, grade_id_of, load_lab
-from autograder.course.markers import hidden_lines, without_hidden_tests
+from autograder.course.cells import BadNameError, grade_id_of, hidden_lines, parse, without_hidden_tests
+from autograder.course.lab import Lab, load_lab
 from autograder.intake.collect import collect
 from autograder.submission.cell_files import OWN_FILES
 from autograder.submission.copies import told_of_copies
@@ -346,6 +345,16 @@ def test_a_link_or_a_fifo_is_not_read(lab: Lab, tmp_path: Path) -> None:
     os.mkfifo(fifo)
     for path in (link, fifo, tmp_path / "missing.ipynb", tmp_path):
         assert codes(read_submission(path, lab)) == ["no-notebook"]
+
+
+@pytest.mark.parametrize("level", ["student", "lab"])
+def test_a_link_in_place_of_a_folder_of_a_submission_is_not_followed(lab: Lab, tmp_path: Path, level: str) -> None:
+    other = toy.hand_in(tmp_path / "submitted" / "ann", toy.LAB, solved(lab))
+    links = {"student": tmp_path / "submitted" / "eve", "lab": tmp_path / "submitted" / "eve" / toy.LAB}
+    links[level].parent.mkdir(exist_ok=True)
+    links[level].symlink_to({"student": other.parent.parent, "lab": other.parent}[level])
+    assert codes(read_submission(tmp_path / "submitted" / "eve" / toy.LAB / other.name, lab)) == ["no-notebook"]
+    assert codes(read_submission(other, lab)) == []
 
 
 def test_half_characters_are_replaced(lab: Lab, tmp_path: Path) -> None:

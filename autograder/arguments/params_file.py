@@ -9,7 +9,7 @@ from pathlib import Path
 
 import yaml
 
-from autograder.arguments.rule_values import LIBYAML
+from autograder.arguments.remap_rules import LIBYAML
 from autograder.core.student_yaml import DEPTH, FILE_BYTES, NOT_YAML, RefusedHere, read
 from autograder.reasons import Group, Kind, Reason, Refused
 

@@ -1,27 +1,339 @@
-"""Remap rules as rcl (Jazzy) has them: read, refused with a reason, and asked why one did nothing."""
+"""Remap rules and parameter rules on a command line, as rcl (Jazzy) has them, and why one is refused.
+
+A text is cut into lexemes from left to right, and these must follow one another in a fixed order:
+
+    remap rule:     [token ":"]  ("__node" | "__name") ":=" token
+                    [token ":"]  "__ns" ":=" "/" [token {"/" token} ["/"]]
+                    [token ":"]  ["rostopic://" | "rosservice://"] name ":=" name
+    name:           ["~/" | "/"] token {"/" token}
+    parameter rule: [token ":"]  part {"." part} ":=" value, where a part has tokens and slashes in any order
+    token:          letters, digits and single underscores; it does not begin with a digit, nor with two underscores
+
+rcl reads the value of a parameter rule as YAML: one plain value, or a list of values of one type.
+"""
 
 from __future__ import annotations
 
 import itertools
+import re
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
-from autograder.arguments.rule_effect import full_name, without_effect
-from autograder.arguments.rule_grammar import Rule, parse, why_parameter_refused, why_remap_refused
-from autograder.arguments.rule_kind import node_without_effect, renames_nothing
-from autograder.reasons import Reason
+import yaml
 
-__all__ = [
-    "Rule",
-    "full_name",
-    "node_without_effect",
-    "parameter_rules_in",
-    "parse",
-    "refused",
-    "refused_parameter",
-    "renames_nothing",
-    "rules_in",
-    "without_effect",
-]
+from autograder.reasons import Group, Kind, Reason
+
+RULE_FORM = Kind("rule-form", "a rule has no `:=`, or two of them", Group.RULES)
+PARAMETER_VALUE = Kind(
+    "parameter-value",
+    "the parameter has another value or type, or a value on the command line cannot be read",
+    Group.STATES,
+)
+NAME_FORM = Kind("name-form", "`~` stands where it means nothing, or the whole is no name", Group.RULES)
+NAMESPACE_WITHOUT_SLASH = Kind("namespace-without-slash", "the new namespace does not begin with a slash", Group.RULES)
+NAMESPACE_END = Kind("namespace-end", "the new namespace ends with a slash", Group.RULES)
+RULE_SPECIAL = Kind(
+    "rule-special", "`__node` or `__ns` is misspelt, or something else stands where these do", Group.RULES
+)
+RULE_SCHEME = Kind("rule-scheme", "`rostopic://` or `rosservice://` stands on the right side", Group.RULES)
+RULE_COLON = Kind("rule-colon", "what stands before a single `:` is no name of a node", Group.RULES)
+BEGINS_WITH_DIGIT = Kind("begins-with-digit", "a part of a name begins with a digit", Group.RULES)
+NAME_EMPTY = Kind("name-empty", "a side of the rule is empty", Group.RULES)
+NAME_SPACE = Kind("name-space", "a name holds a space", Group.RULES)
+WILDCARD = Kind("wildcard", "a rule has a `*`, which ROS 2 does not implement", Group.RULES)
+NAME_SLASH = Kind("name-slash", "a slash or a dot stands where no part of a name follows", Group.RULES)
+NAME_CHARACTERS = Kind("name-characters", "a name holds a character that names do not have", Group.RULES)
+DOUBLE_UNDERSCORE = Kind("double-underscore", "two underscores follow one another in a name", Group.RULES)
+RULE_KIND = Kind("rule-kind", "the rule is for names of another kind, or gives a parameter its value", Group.EFFECT)
+SLASH_IN_NODE_NAME = Kind("slash-in-node-name", "the new name of a node has a slash", Group.RULES)
+
+_BOOLS = {
+    word for small in ("y", "yes", "true", "on", "n", "no", "false", "off")
+    for word in (small, small.capitalize(), small.upper())
+}  # fmt: skip
+_INTEGER = re.compile(r"\s*[+-]?(0[xX][0-9a-fA-F]+|0[0-7]*|[1-9][0-9]*)")
+_DOUBLE = re.compile(
+    r"\s*[+-]?(([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?|0[xX][0-9a-fA-F]+(\.[0-9a-fA-F]*)?([pP][+-]?[0-9]+)?"
+    r"|\.?inf|infinity|nan)|\.nan",
+    re.IGNORECASE,
+)
+
+_LONGEST_INTEGER = 1000
+"""Characters."""
+
+# A comma behind a tag belongs to the tag for rcl.
+_TAG = re.compile(r"(![\w-]*),")
+LIBYAML = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+"""The library that rcl reads YAML with; it differs from PyYAML's own reader in tabs and colons."""
+
+
+def why_value_refused(value: str) -> str | None:
+    """Why rcl does not take a text for a value, as a sentence; None if it does."""
+    shown = f"`{value[:60]}`"
+    if not value:
+        return "it has no value."
+    kinds: list[str] = []
+    depth = 0
+    try:
+        for event in yaml.parse(_TAG.sub(r"\1", value), Loader=LIBYAML):
+            match event:
+                case yaml.AliasEvent() | yaml.MappingStartEvent():
+                    what = "an alias" if isinstance(event, yaml.AliasEvent) else "`key: value`"
+                    return f"{shown} is {what} in YAML, and no value of a parameter."
+                case yaml.SequenceStartEvent():
+                    depth += 1
+                case yaml.SequenceEndEvent():
+                    depth -= 1
+                case yaml.ScalarEvent():
+                    bare = event.style not in ("'", '"')
+                    if depth and bare and ":" in event.value:
+                        return f"{shown} has a colon in a list, which stands in quotes."
+                    if not event.value and bare:
+                        return f"{shown} is empty in YAML."
+                    if depth:
+                        plain = event.style in (None, "") and event.tag != "tag:yaml.org,2002:str"
+                        kinds.append(_kind(event.value, plain=plain))
+    except (yaml.YAMLError, RecursionError):
+        return f"{shown} is not YAML."
+    if len(set(kinds)) > 1:
+        return f"in {shown}, the values are of several types: {', '.join(dict.fromkeys(kinds))}."
+    return None
+
+
+def _kind(value: str, *, plain: bool) -> str:
+    if not plain:
+        return "text"
+    if value in _BOOLS:
+        return "bool"
+    # Python reads no number of thousands of digits, and rcl takes none that long for an integer.
+    if len(value) < _LONGEST_INTEGER and _INTEGER.fullmatch(value) and -(2**63) <= _integer(value) < 2**63:
+        return "integer"
+    return "double" if _DOUBLE.fullmatch(value) else "text"
+
+
+def _integer(value: str) -> int:
+    return int(value, 16 if "x" in value.lower() else 10)
+
+
+_LEXEMES = re.compile(
+    r"(?P<scheme>rostopic://|rosservice://)|(?P<node>__node|__name)|(?P<ns>__ns)|(?P<private>~/)"
+    r"|(?P<token>(?!__)(?=[A-Za-z_])(?:_?[A-Za-z0-9]+)*_?)|(?P<separator>:=)|(?P<colon>:)|(?P<slash>/)|(?P<dot>\.)"
+    r"|(?P<wild>\*\*?)|(?P<back>\\[1-9])|(?P<other>.)",
+    re.DOTALL | re.ASCII,
+)
+
+
+@dataclass(frozen=True)
+class Rule:
+    """`PREFIX:LEFT:=RIGHT`, as it stands after `-r`."""
+
+    text: str
+    prefix: str
+    left: str
+    """Without `rostopic://` and `rosservice://`."""
+    right: str
+    kind: str = ""
+    """`topic` or `service` if the rule is for one of them only."""
+
+    @property
+    def renames_topics(self) -> bool:
+        """Whether it is about topics and services, and not about the node itself."""
+        return self.left not in ("__ns", "__node", "__name")
+
+
+def parse(text: str) -> Rule | None:
+    """Read a remap rule, also one that rcl refuses; None without a `:=`."""
+    left, separator, right = text.partition(":=")
+    if not separator:
+        return None
+    match = re.fullmatch(r"([A-Za-z_]\w*):(?!//)(.+)", left, re.ASCII)
+    prefix, name = (match[1], match[2]) if match else ("", left)
+    for scheme, kind in (("rostopic://", "topic"), ("rosservice://", "service")):
+        if name.startswith(scheme):
+            return Rule(text, prefix, name.removeprefix(scheme), right, kind)
+    return Rule(text, prefix, name, right)
+
+
+def _shape(text: str) -> str:
+    """The lexemes of a text as a word with one letter each."""
+    letters = {
+        "scheme": "u", "node": "N", "ns": "S", "private": "~", "token": "t", "separator": "=", "colon": ":",
+        "slash": "/", "dot": ".", "wild": "*", "back": "\\", "other": "?",
+    }  # fmt: skip
+    return "".join(letters[str(match.lastgroup)] for match in _LEXEMES.finditer(text))
+
+
+_REMAP = re.compile(r"(t:)?(N=t|S=/(t/)*t?|u?[~/]?t(/t)*=[~/]?t(/t)*)")
+_PARAMETER = re.compile(r"(t:)?[t/]+(\.[t/]+)*")
+
+
+def why_remap_refused(text: str) -> Reason | None:
+    """Why rcl does not take a remap rule: at `rclpy.init`, or for its namespace when the node is made."""
+    rule = parse(text)
+    if rule is None:
+        return RULE_FORM(f"`{text}` is not a remap rule: it has no `:=`.", "A rule is `old:=new`.")
+    ends_in_slash = rule.left == "__ns" and rule.right.endswith("/") and rule.right != "/"
+    if _REMAP.fullmatch(_shape(text)) and not ends_in_slash:
+        return None
+    found = _of_node(rule) or _of_names(rule) or _of_form(rule)
+    return replace(found, because=f"The rule `{text}` is refused, and the program ends at its start: {found.because}")
+
+
+def _of_node(rule: Rule) -> Reason | None:
+    """What is wrong with the new name or namespace of a node."""
+    right = rule.right
+    if rule.left in ("__node", "__name"):
+        if "/" in right:
+            return SLASH_IN_NODE_NAME(
+                "a node name has no slash.",
+                "The node's name and its namespace are two things: `__node:=name` and `__ns:=/namespace`.",
+            )
+        return _of_name(right, "the new name of the node")
+    if rule.left != "__ns":
+        return None
+    if right and not right.startswith("/"):
+        return NAMESPACE_WITHOUT_SLASH(
+            "a namespace on the command line begins with a slash.",
+            f"Write `__ns:=/{right.lstrip('~/')}`." if right.lstrip("~/") else "Write `__ns:=/name`.",
+        )
+    if right.endswith("/") and right.strip("/"):
+        return NAMESPACE_END("a namespace does not end with a slash.", "Leave the last slash out.")
+    return _of_name(right, "the namespace")
+
+
+def _of_names(rule: Rule) -> Reason | None:
+    """What is wrong with the names of a rule for topics and services."""
+    if not rule.renames_topics:
+        return None
+    if rule.left.lower() in ("__ns", "__node", "__name", "__namespace", "ns", "_ns", "_node") and "__" in rule.left:
+        return RULE_SPECIAL(
+            f"`{rule.left}` means nothing there: the node's name is given with `__node` and its namespace with `__ns`.",
+            "Write these words with two underscores and small letters.",
+        )
+    if rule.right.startswith(("rostopic://", "rosservice://")):
+        return RULE_SCHEME(
+            "`rostopic://` and `rosservice://` stand on the left side only.",
+            "Leave the word out on the right side.",
+        )
+    if ":" in rule.left:
+        before = rule.left.rsplit(":", 1)[0]
+        return RULE_COLON(
+            f"a single `:` ends the name of the node that the rule is for, and `{before}` is no node's name there.",
+            "Write one name of a node, without slash, then `:`, then the old name: `NODE:old:=new`.",
+        )
+    if re.fullmatch(r"[+-]?\d[\d.]*", rule.right):
+        return BEGINS_WITH_DIGIT(
+            "a number is no name, and `-r` gives a new name.",
+            f"A parameter gets its value with `-p`: `-p {rule.text}`.",
+        )
+    return _of_name(rule.left, "the left side", left=True) or _of_name(rule.right, "the right side")
+
+
+def _of_name(name: str, what: str, left: bool = False) -> Reason | None:
+    """What is wrong with one name; None if it can be a name."""
+    bare = name[2:] if name.startswith("~/") else name.removeprefix("/")
+    parts = bare.split("/")
+    if not name:
+        return NAME_EMPTY(f"{what} is empty.", "A rule is `old:=new`, without spaces around `:=`.")
+    if ":=" in name:
+        return RULE_FORM(
+            f"a second `:=` stands in {what}.",
+            "Every rule has its own `-r`: `-r old:=new -r old2:=new2`.",
+        )
+    if name.strip() != name or any(character.isspace() for character in name):
+        return NAME_SPACE(f"{what} holds a space.", "Write the rule as one word, without spaces around `:=`.")
+    if left and "*" in name:
+        return WILDCARD("`*` is not implemented in remap rules.", "Write one rule for each name.")
+    if re.search(r"\\[1-9]", name):
+        return WILDCARD(
+            "numbers with a backslash, which stand for what a `*` has matched, are not implemented.",
+            "Write one rule for each name.",
+        )
+    if name in ("~", "~/", "/"):
+        return NAME_FORM(f"{what} is `{name}`, which is no name of its own.", "Write a name after it: `~/name`.")
+    if "~" in bare or (name.startswith("~") and not name.startswith("~/")):
+        return NAME_FORM(
+            f"in {what}, `~` does not stand at the beginning with a slash behind it.",
+            "`~/name` is a name below the node's own; elsewhere `~` means nothing.",
+        )
+    if any(part == "" for part in parts):
+        where = "ends with a slash" if name.endswith("/") and "//" not in name else "has two slashes in a row"
+        return NAME_SLASH(f"{what} {where}.", "A slash stands between two parts of a name, and only there.")
+    return _of_parts(name, parts, what)
+
+
+def _of_parts(name: str, parts: list[str], what: str) -> Reason | None:
+    if any(part[0].isdigit() for part in parts):
+        return BEGINS_WITH_DIGIT(
+            "no part of a name may begin with a digit.",
+            "Put a word in front: `camera_2` instead of `2_camera`.",
+        )
+    strange = re.search(r"[^A-Za-z0-9_/~]", name)
+    if strange:
+        return NAME_CHARACTERS(
+            f"`{name}` is not a name: `{strange[0]}` cannot stand in it.",
+            "Names have letters from a to z, digits and underscores, with slashes between their parts.",
+        )
+    if "__" in name:
+        return DOUBLE_UNDERSCORE(
+            f"in {what}, `{name}`, two underscores follow one another.",
+            "Use single underscores. Two of them belong to `__node` and `__ns`.",
+        )
+    return None
+
+
+def _of_form(rule: Rule) -> Reason:
+    if not rule.renames_topics or rule.left.startswith("__"):
+        why = f"`{rule.left}` cannot stand before `:={rule.right}`."
+    else:
+        why = f"`{rule.left}` and `{rule.right}` do not make a rule."
+    return RULE_FORM(why, "A rule is `old:=new`, or `NODE:old:=new` for one node.")
+
+
+def why_parameter_refused(text: str) -> Reason | None:
+    """Why rcl does not take the name in a parameter rule, `NAME:=VALUE` after `-p`, or the value."""
+    name, separator, value = text.partition(":=")
+    said = f"The parameter rule `{text}` is refused, and the program ends at its start:"
+    if not separator:
+        return RULE_FORM(f"`{text}` is not a parameter rule: it has no `:=`.", "A parameter rule is `name:=value`.")
+    if not _PARAMETER.fullmatch(_shape(name)):
+        found = _of_parameter(name)
+        return replace(found, because=f"{said} {found.because}")
+    wrong = why_value_refused(value)
+    if wrong is None:
+        return None
+    return PARAMETER_VALUE(
+        f"{said} {wrong}",
+        "A value is a bool, a number, a text or a list such as `[1, 2]`, written as in YAML.",
+    )
+
+
+def _of_parameter(name: str) -> Reason:
+    if not name:
+        return NAME_EMPTY("it has no name.", "A parameter rule is `name:=value`.")
+    if ":" in name and (name.startswith("/") or name.count(":") > 1):
+        return RULE_COLON(
+            "before the `:` stands the name of a node, without slashes.",
+            "Leave the node out: the value is for every node of the process then. A parameter file can name one node.",
+        )
+    if "*" in name:
+        return WILDCARD("`*` is not implemented there.", "Write one rule for each parameter.")
+    bare = name.rsplit(":", 1)[-1]
+    if any(part == "" for part in bare.split(".")):
+        return NAME_SLASH("a part of the name is empty.", "A dot stands between two parts of a name.")
+    found = _of_parts(name, [part for part in re.split(r"[./]", bare) if part], "the name")
+    if found and found.kind is BEGINS_WITH_DIGIT:
+        return found
+    strange = re.search(r"[^A-Za-z0-9_./:]", name)
+    if strange:
+        what = "a space" if strange[0].isspace() else f"`{strange[0]}`"
+        return NAME_CHARACTERS(
+            f"{what} cannot stand in the name of a parameter on a command line.",
+            "Such names have letters from a to z, digits, underscores and dots.",
+        )
+    if name in ("__node", "__name", "__ns"):
+        return RULE_KIND(f"`{name}` is no parameter.", f"Names are changed with `-r`: `-r {name}:=NEW`.")
+    return NAME_FORM(f"`{name}` is not a name.", "A parameter rule is `name:=value`.")
 
 
 def rules_in(words: Sequence[str]) -> list[str]:

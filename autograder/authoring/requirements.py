@@ -14,7 +14,8 @@ from typing import Any
 import yaml
 
 from autograder.core.errors import KitError
-from autograder.course.lab import Lab, grade_id_of, source_of
+from autograder.course.cells import grade_id_of, source_of
+from autograder.course.lab import Lab
 
 _TASK = re.compile(
     r"\*\*(Write|Repair|Complete|Change|Describe|Fill|Now)\b|^Write\b|\bWrite (one|two|three|the|a)\b", re.MULTILINE

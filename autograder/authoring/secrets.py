@@ -13,7 +13,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from autograder.course.lab import nbgrader_of, source_of
+from autograder.course.cells import nbgrader_of, source_of
 from autograder.course.paths import CoursePaths
 
 _REGION = re.compile(r"BEGIN (HIDDEN TESTS|SOLUTION|MARK SCHEME)[^\n]*\n(.*?)^[^\n]*END \1", re.DOTALL | re.MULTILINE)

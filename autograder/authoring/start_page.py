@@ -6,7 +6,8 @@ import json
 import re
 from pathlib import Path
 
-from autograder.course.lab import lab_names, source_of
+from autograder.course.cells import source_of
+from autograder.course.lab import lab_names
 from autograder.course.settings import read_settings
 
 START_PAGE = "README.md"
@@ -14,24 +15,24 @@ START_PAGE = "README.md"
 _TOP = """\
 # {title}
 
-Open a lab with a click on its name, and work through it from the top: run each cell with Shift+Enter. A cell that
-begins with `%%node NAME` or `%%file NAME` writes your program or file. The check below it runs that and says at once
-what holds, and what does not and why.
+Click on the name of a lab to open it, and work through it from the top: run each cell with Shift+Enter. A cell that
+begins with `%%node NAME` or `%%file NAME` writes your program or file. The check below it runs the program and says
+at once what works, and what does not work and why.
 
-| lab | about |
+| Lab | About |
 |---|---|
 """
 
 _BOTTOM = """
-- After a change run the cell again, and then its check.
-- After a restart of the kernel run the first code cell again, and then the cells of your programs.
-- Your programs lie in the folder `nodes` of the lab, below the name of the notebook. What you write in cells is what is
-  graded; a file that you put into that folder yourself stays yours, but is not handed in.
-- `%%node?` and `%%file?` show an example. The tab key completes: after `launch("` the names of your programs, after
-  `%ros2` its commands and what is on the graph, after `ros.` what a launch can do.
-- `%lab` at a lab's end shows what is done and what is open.
-- Hand in the notebook, the file with the ending `.ipynb`, once you have saved it. In a terminal `autograder submit
-  NOTEBOOK` puts a copy with a receipt into the folder `handed_in`, and says what to know before.
+- After you have changed a cell, run the cell again, and then its check.
+- After a restart of the kernel, run the first code cell again, and then the cells of your programs.
+- Your programs are in the folder `nodes` of the lab, below the name of the notebook. Only what you write in cells is
+  graded; a file that you put into that folder yourself stays there, but is not handed in.
+- `%%node?` and `%%file?` show an example. The tab key completes the names of your programs after `launch("`, commands
+  and what is on the graph after `%ros2`, and what a launch can do after `ros.`.
+- `%lab` at the end of a lab shows what is done and what is open.
+- To hand in a lab, save the notebook and hand in this file, which has the ending `.ipynb`. In a terminal, `autograder
+  submit NOTEBOOK` puts a copy with a receipt into the folder `handed_in`, and says what you should know before.
 """
 
 

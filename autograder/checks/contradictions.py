@@ -10,8 +10,8 @@ from collections.abc import Sequence
 from hashlib import sha256
 
 from autograder.diagnosis import Scene
-from autograder.diagnosis.events import Thing
 from autograder.diagnosis.inside import Inside
+from autograder.sandbox.inside.probe.events import Thing
 
 ENOUGH = 4
 """Messages of a publisher from which on its threads say something: two begins and two ends."""

@@ -17,7 +17,7 @@ from autograder.checks.misuse import place_of
 from autograder.core.errors import KitError
 from autograder.core.picture import Picture
 from autograder.core.results import Outcome, Status
-from autograder.course.markers import MORE_AT_GRADING, hidden_lines
+from autograder.course.cells import MORE_AT_GRADING, hidden_lines
 from autograder.graph.observer import ForgedGraph
 from autograder.reasons import Group, Kind, Reason
 

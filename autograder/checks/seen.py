@@ -8,13 +8,13 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from autograder import pictures
-from autograder.diagnosis.events import Ran, Thing
 from autograder.diagnosis.inside import Inside
 from autograder.graph.names import node_of
 from autograder.graph.observer import Observer
 from autograder.graph.qos import describe, mismatch_between
 from autograder.pictures import Endpoint, Picture, Run, Runs, Traffic
 from autograder.reasons import Reason
+from autograder.sandbox.inside.probe.events import Ran, Thing
 
 _OF_EVERY_NODE = ("/rosout", "/parameter_events")
 _MOST = 60

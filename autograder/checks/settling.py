@@ -12,9 +12,10 @@ import time
 from collections import Counter
 from collections.abc import Sequence
 
-from autograder.diagnosis.events import Event, ExecutorSeen, NodeSeen, ProbeFailed, Thing, read
+from autograder.diagnosis.events import read
 from autograder.graph.names import node_of
 from autograder.graph.observer import Observer
+from autograder.sandbox.inside.probe.events import Event, ExecutorSeen, NodeSeen, ProbeFailed, Thing
 from autograder.sandbox.running_program import RunningProgram
 
 QUIET = 1.5

@@ -14,17 +14,17 @@ app = typer.Typer(
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
-    help="Grade ROS 2 labs: run students' nodes in a sandbox and watch the ROS graph.",
+    help="Grade ROS 2 labs: run students' nodes in a sandbox and observe the ROS graph.",
 )
 
 IsolationOption = Annotated[
-    Isolation, typer.Option(help="How programs are kept apart. Where `full` is missing, the command refuses.")
+    Isolation, typer.Option(help="How programs are isolated. If the machine does not offer it, the command refuses.")
 ]
 CourseOption = Annotated[
     Path | None,
-    typer.Option(help="The folder of the course; default: the one that you are in, or else the kit's own."),
+    typer.Option(help="The folder of the course; default: the course that you are in, otherwise the kit's own."),
 ]
 """Of who keeps a course. What a student handed in is checked by the kit's own course, wherever one is (`check`)."""
-ForceOption = Annotated[bool, typer.Option("--force", help="Run again even what did not change.")]
-SeedOption = Annotated[int | None, typer.Option(help="Repeat a run with the same varying values.")]
-JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON for a program to read.")]
+ForceOption = Annotated[bool, typer.Option("--force", help="Also run submissions that did not change.")]
+SeedOption = Annotated[int | None, typer.Option(help="Draw the same varying values as the run with this seed.")]
+JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON, for programs.")]

@@ -12,7 +12,7 @@ import typer
 
 from autograder.cli.app import JsonOption, SeedOption, app
 from autograder.core.errors import KitError
-from autograder.core.files import signature, write_beside
+from autograder.core.files import signature
 from autograder.core.results import Isolation  # its values stand in the command's help
 
 if TYPE_CHECKING:
@@ -31,27 +31,27 @@ _LOOK = 0.3
 @app.command()
 def check(
     notebook: Annotated[Path, typer.Argument(help="The notebook to check.")],
-    lab: Annotated[str | None, typer.Option(help="The lab it answers, where its name does not say.")] = None,
+    lab: Annotated[str | None, typer.Option(help="The lab it answers, if its name does not say so.")] = None,
     as_json: JsonOption = False,
     junit: Annotated[Path | None, typer.Option(help="Also write JUnit XML to this file.")] = None,
     gradescope: Annotated[Path | None, typer.Option(help="Also write Gradescope's results.json to this file.")] = None,
     instructor: Annotated[bool, typer.Option("--instructor", help="Show what the hidden checks look at.")] = False,
     isolation: Annotated[
         Isolation | None,
-        typer.Option(help="How programs are kept apart; default: full, in a student's kit the most there is."),
+        typer.Option(help="How programs are isolated; default: full, in a student's kit the best that there is."),
     ] = None,
     seed: SeedOption = None,
     github: Annotated[
-        bool, typer.Option("--github", help="Write annotations, and a summary, for GitHub Actions.")
+        bool, typer.Option("--github", help="Write annotations and a summary for GitHub Actions.")
     ] = False,
     watch: Annotated[bool, typer.Option("--watch", help="Check again whenever the notebook is saved.")] = False,
     course: Annotated[
         Path | None, typer.Option(help="The folder of the course whose checks are run; default: the kit's own.")
     ] = None,
 ) -> None:
-    """Check one notebook as grading would, and report what is wrong and why.
+    """Check one notebook in the same way as grading does, and report what is wrong and why.
 
-    Exit status: 0 all checks passed, 1 some failed, 2 usage or set-up, 3 none failed and of some nobody could find out.
+    Exit status: 0 all checks passed; 1 some failed; 2 wrong usage or set-up; 3 none failed, but some are undecided.
     """
     if not notebook.is_file():
         raise KitError(f"There is no notebook {notebook}.", "Name an .ipynb file.")
@@ -63,21 +63,14 @@ def check(
     root = trusted_course(course)
     found, book = lab_of(notebook, lab, root), read_book(root)
     if found.notebook.resolve() == notebook.resolve():
-        note = "This notebook is the course's own copy of the lab: its checks are run as they stand in it."
+        note = "This notebook is the course's own copy of the lab, so the checks in this notebook are run."
         print(f"note: {note}", file=sys.stderr)
     settings = Settings(isolation=isolation_for(isolation), seed=seed)
     audience: Audience = "instructor" if instructor else "student"
     while True:
         saved = signature(notebook)
         result = checked(notebook, found, settings, book, None if as_json else audience)
-        if junit is not None:
-            from autograder.report.export.junit import junit_xml
-
-            write_beside(junit, junit_xml([result], audience))
-        if gradescope is not None:
-            from autograder.report.export.gradescope import results_json
-
-            write_beside(gradescope, results_json(result))
+        _write_exports(result, audience, junit, gradescope)
         if as_json:
             from autograder.report.audience import result_for
 
@@ -103,7 +96,7 @@ def isolation_for(wanted: Isolation | None) -> Isolation:
         return choose(wanted or Isolation.FULL)
     found, why = most()
     if why:
-        print(f"note: programs run with isolation `{found.value}`, since {why}.", file=sys.stderr)
+        print(f"note: programs run with isolation `{found.value}` because {why}.", file=sys.stderr)
     return found
 
 
@@ -127,6 +120,18 @@ def checked(
         result = run_submission(notebook, student, lab, settings, workers=WORKERS_FOR_ONE, follower=report)
         report.finish(result)
     return result
+
+
+def _write_exports(result: SubmissionResult, audience: Audience, junit: Path | None, gradescope: Path | None) -> None:
+    """Write the files that were asked for."""
+    from autograder.core.files import write_beside
+    from autograder.report.export.gradescope import results_json
+    from autograder.report.export.junit import junit_xml
+
+    if junit is not None:
+        write_beside(junit, junit_xml([result], audience))
+    if gradescope is not None:
+        write_beside(gradescope, results_json(result))
 
 
 def _tell_github(result: SubmissionResult, audience: Audience, notebook: Path) -> None:

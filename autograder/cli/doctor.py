@@ -62,7 +62,7 @@ TRY_PROBE = "import json; from autograder.sandbox.inside.probe import attach; pr
 
 IN_CHECKOUT = (ROOT / "Makefile").is_file()
 """Or else the kit was installed from its wheel, and `make` has nothing to do with it."""
-ANEW = "make distclean setup" if IN_CHECKOUT else "install the kit again, into a new environment"
+ANEW = "make distclean setup" if IN_CHECKOUT else "install the kit again in a new environment"
 
 
 @dataclass(frozen=True)
@@ -114,7 +114,7 @@ def python() -> Finding:
     """Whether this Python is one that the ROS wheels exist for."""
     version = platform.python_version()
     good = OLDEST <= sys.version_info[:2] <= NEWEST
-    how = "make setup PYTHON=/path/to/python3.12" if IN_CHECKOUT else "install the kit into an environment of one"
+    how = "make setup PYTHON=/path/to/python3.12" if IN_CHECKOUT else "install the kit into an environment that has one"
     do = "" if good else f"Use Python 3.11 to 3.14: {how}"
     return Finding("Python", good, f"{version}  {sys.executable}", do)
 
@@ -158,7 +158,7 @@ def ros() -> Finding:
         )
     except subprocess.TimeoutExpired:
         return Finding(
-            name, False, f"no message arrived in {ROS_TIME_LIMIT:g} s", "See that no firewall blocks UDP on 127.0.0.1."
+            name, False, f"no message arrived in {ROS_TIME_LIMIT:g} s", "Let no firewall block UDP on 127.0.0.1."
         )
     if process.returncode:
         return Finding(name, False, (process.stderr.strip().splitlines() or ["rclpy does not start"])[-1], ANEW)
@@ -186,12 +186,12 @@ def probe() -> Finding:
     )
     if process.returncode:
         why = (process.stderr.strip().splitlines() or ["it does not start"])[-1]
-        return Finding(name, False, f"the probe cannot attach to rclpy: {why}", "Mend ROS 2 first.")
+        return Finding(name, False, f"the probe cannot attach to rclpy: {why}", "Repair ROS 2 first.")
     moved = json.loads(process.stdout.strip().splitlines()[-1])
     if moved:
         found = f"the probe cannot attach to this rclpy. {moved[0]}"
         found += f" ({len(moved)} such places)" if len(moved) > 1 else ""
-        repair = f"Use the locked rclpy ({ANEW}); until then failed checks are given fewer reasons."
+        repair = f"Use the locked rclpy ({ANEW}); until then, reports give fewer reasons for failed checks."
         return Finding(name, False, found, repair)
     return Finding(name, True, "the probe attaches to this rclpy")
 
@@ -210,7 +210,7 @@ def isolation() -> Finding:
 def cores() -> Finding:
     """How many cores this process may use; one is enough, but slow."""
     count = len(os.sched_getaffinity(0))
-    return Finding("cores", True, str(count), "" if count > 1 else "With two or more, grading is faster.")
+    return Finding("cores", True, str(count), "" if count > 1 else "With two or more cores, grading is faster.")
 
 
 def compiler() -> Finding:
@@ -220,7 +220,7 @@ def compiler() -> Finding:
     lacking = missing_tools()
     if not lacking:
         return Finding("compiler", True, "C, C++, CMake, make, and Python's headers")
-    do = f"Only labs in which interfaces are built need it. {INSTALL}"
+    do = f"Only labs in which interfaces are built need a compiler. {INSTALL}"
     return Finding("compiler", True, f"without {', '.join(lacking)}", do)
 
 
@@ -231,7 +231,7 @@ def space() -> Finding:
     except KitError:
         folder = Path.cwd()
     free = shutil.disk_usage(folder).free
-    do = "" if free >= NEEDED_SPACE else f"Free {NEEDED_SPACE // GIB} GiB; what was built lies in {folder / 'build'}."
+    do = "" if free >= NEEDED_SPACE else f"Free {NEEDED_SPACE // GIB} GiB; what was built is in {folder / 'build'}."
     if not os.access(folder, os.W_OK):
-        return Finding("free space", False, f"{folder} is not writable", "Work in a copy that is yours.")
+        return Finding("free space", False, f"{folder} is not writable", "Work in a copy that belongs to you.")
     return Finding("free space", free >= NEEDED_SPACE, f"{free / GIB:.1f} GiB in {folder}", do)

@@ -17,14 +17,14 @@ if TYPE_CHECKING:
 
 @app.command()
 def explain(
-    student: Annotated[str, typer.Argument(help="Who handed it in.")],
+    student: Annotated[str, typer.Argument(help="The student, by the name in the gradebook.")],
     check: Annotated[str, typer.Argument(help="The check: its number, its id, or a part of its title.")] = "",
     lab: Annotated[str, typer.Option(help="The lab, if the student handed in several.")] = "",
     course: CourseOption = None,
 ) -> None:
-    """Show all that grading found out: outcomes, evidence, output, flags; pictures, and messages as an MCAP file.
+    """Show all that grading found out: outcomes, evidence, output, flags, pictures, and messages as an MCAP file.
 
-    For the messages the check is run once more, with the same values.
+    To get the messages, the check is run once more, with the same values.
     """
     from autograder.course.book import read_book
     from autograder.course.folder import course_root
@@ -39,7 +39,7 @@ def explain(
         screen.print(submission_view(result, "instructor", book))
         for path in _pictures(result.checks, folder):
             print(path)
-        screen.print("Name a check for all of its evidence and its messages, such as: ", end="")
+        screen.print("To see all evidence and messages of a check, name the check, such as: ", end="")
         screen.print(f"autograder explain {student} 1 --lab {result.lab}", markup=False)
         return
     chosen = _chosen(result, check)
@@ -69,7 +69,7 @@ def _chosen(result: SubmissionResult, named: str) -> CheckResult:
     if len(found) != 1:
         listed = "".join(f"\n  {n}  {c.grade_id}  {c.title}" for n, c in enumerate(result.checks, start=1))
         several = f"{len(found)} checks" if found else "No check"
-        raise KitError(f"{several} of {result.lab} can be meant by {named!r}.", f"The checks are:{listed}")
+        raise KitError(f"{several} of {result.lab} match{'' if found else 'es'} {named!r}.", f"The checks are:{listed}")
     return found[0]
 
 
@@ -105,13 +105,13 @@ def _messages(root: Path, result: SubmissionResult, check: CheckResult, bag: Pat
     lab = load_lab(root, result.lab)
     notebook = CoursePaths(root).submitted_notebook(result.student, lab.name)
     if read_submission(notebook, lab).digest != result.digest:
-        screen.print("The submission or the lab has changed since; the messages are those of how it is now.")
+        screen.print("The submission or the lab has changed since; these are the messages of the current version.")
     settings = Settings(isolation=choose(result.isolation), seed=result.seed)
     with working(f"Running {check.grade_id} once more for its messages"):
         again, messages = received(notebook, result.student, lab, settings, [check.grade_id])
     if [one.points for one in again] != [check.points]:
         now = again[0].points if again else None
-        screen.print(f"Run once more, the check gives {'no verdict' if now is None else f'{now:g} points'} now.")
+        screen.print(f"In this second run, the check gives {'no verdict' if now is None else f'{now:g} points'}.")
     if not messages:
         screen.print("The check received no messages.")
         return
@@ -119,5 +119,5 @@ def _messages(root: Path, result: SubmissionResult, check: CheckResult, bag: Pat
     topics = sorted({message.topic for message in messages})
     screen.print(f"{len(messages)} messages on {', '.join(topics)}:", markup=False)
     for name in left_out:
-        screen.print(f"Those of the type {name} are left out, for its definition is not installed.", markup=False)
+        screen.print(f"Messages of the type {name} are left out because its definition is not installed.", markup=False)
     print(next(bag.glob("*.mcap")))

@@ -29,9 +29,9 @@ FormatOption = Annotated[
 AcceptOption = Annotated[
     list[Accepted] | None,
     typer.Option(
-        help="Go on although something stopped the run. smaller: students of the roster, or of the last time, are"
-        " missing. replaced: one submission would take the place of another one. roster: somebody is not in the roster."
-        " The option may be given several times."
+        help="Continue although something stopped the run. smaller: students of the roster, or of the last time, are"
+        " missing. replaced: one submission would replace another one. roster: somebody is not in the roster."
+        " You can give this option several times."
     ),
 ]
 LEFT_OUT = 3
@@ -44,7 +44,7 @@ def grade(
     submissions: Annotated[
         Path | None,
         typer.Argument(
-            help="Folder or zip, as your learning platform gives it out, or with a folder for each student;"
+            help="Folder or zip from your learning platform, or a folder or zip with a folder for each student;"
             " default: the sample class."
         ),
     ] = None,
@@ -57,24 +57,24 @@ def grade(
         str, typer.Option(metavar="ADDRESS", help="Send the jobs to the Dask cluster of this scheduler, tcp://…")
     ] = "",
     diff: Annotated[
-        bool, typer.Option("--diff", help="Only show what would change, such as after a change of a check.")
+        bool, typer.Option("--diff", help="Only show what would change, for example after you have changed a check.")
     ] = False,
     canaries: Annotated[
         bool,
-        typer.Option(help="Run known answers among the class, to notice a machine on which they get other points."),
+        typer.Option(help="Run known answers among the class, to detect a machine on which they get other points."),
     ] = True,
     despite_canaries: Annotated[
-        bool, typer.Option("--despite-canaries", help="Record the results although a known answer got other points.")
+        bool, typer.Option("--despite-canaries", help="Record the results even if a known answer got other points.")
     ] = False,
     format_name: FormatOption = None,
     accept: AcceptOption = None,
     course: CourseOption = None,
 ) -> None:
-    """Grade a class: gradebook, grades, feedback, and a table of who lost points why.
+    """Grade a class: write gradebook, grades and feedback, and print who lost points and why.
 
-    Exit status: 0, or 3 if something that was handed in was left out or could not be read, or 2 if nothing was graded
-    because a person has to say what is right, or if the gradebook lacks a result, as it lacks all of them if a known
-    answer among the class got other points than it must.
+    Exit status: 0; 2 if nothing was graded because a person has to decide something first, or if a result is missing in
+    the gradebook (all are missing if a known answer got other points than it must); 3 if something that was handed in
+    was left out or could not be read.
     """
     from autograder.gradebook.class_run import Intake, grade_class, try_class
     from autograder.grading.runner import Settings
@@ -122,7 +122,7 @@ def _places(course: Path | None, lab: str, submissions: Path | None) -> tuple[Pa
         root = sample_course(root)
     if root.is_relative_to(source.resolve()):
         raise KitError(
-            f"The working folder lies in the submissions, and {root} would be taken for the course.",
+            f"The working folder is inside the submissions, so {root} would be used as the course.",
             "Change to the folder of your course, and name the submissions from there.",
         )
     return root, source
@@ -203,10 +203,10 @@ def _run_again(results: Sequence[SubmissionResult]) -> str:
     checks = [check for result in results for check in result.checks]
     again = [check for check in checks if check.run_again]
     unknown = sum(check.points is None for check in again)
-    decided = f"{unknown} of them could not be decided then." if unknown else "all of them were decided then."
+    decided = f"{unknown} of them are still undecided." if unknown else "all of them are decided now."
     return (
-        f"{len(again)} of {len(checks)} checks ({len(again) / len(checks):.1%}) lost points while others kept their"
-        f" programs from the CPUs, and were run again alone; {decided}"
+        f"{len(again)} of {len(checks)} checks ({len(again) / len(checks):.1%}) lost points while other processes kept"
+        f" their programs from the CPUs, and were run again alone; {decided}"
     )
 
 

@@ -12,7 +12,7 @@ from autograder.cli.app import CourseOption, IsolationOption, app
 from autograder.core.results import Isolation
 
 new = typer.Typer(no_args_is_help=True)
-app.add_typer(new, name="new", help="Begin a course, or a lab of one.")
+app.add_typer(new, name="new", help="Begin a course, or a lab in a course.")
 
 
 @new.command("course")
@@ -30,29 +30,29 @@ def new_course(
         note(folder)
     except OSError as error:
         print(
-            f"\nThe folder could not be noted as a course of yours ({error.filename}: {error.strerror}), so nbgrader's"
-            f" own commands will pass over its settings. Once that can be written, say: autograder trust {folder}"
+            f"\nThe folder could not be registered as a course of yours ({error.filename}: {error.strerror}), so"
+            f" nbgrader's own commands will ignore its settings. Once it can be written, run: autograder trust {folder}"
         )
     print(f"\nNext:\n  cd {shlex.quote(str(folder))}\n  autograder lint {FIRST_LAB}\n  autograder release")
 
 
 @app.command()
 def trust(folder: Annotated[Path, typer.Argument(metavar="DIR", help="The folder of a course of yours.")]) -> None:
-    """Say that a folder is a course of yours: its nbgrader_config.py, which is a program, may run then."""
+    """Register a folder as a course of yours, so that its nbgrader_config.py, which is a program, may run."""
     from autograder.course.folder import course_root
     from autograder.gradebook.own_courses import trust as note
 
     root = course_root(folder)
     note(root)
-    print(f"{root} is noted as a course of yours.")
+    print(f"{root} is registered as a course of yours.")
 
 
 @new.command("lab")
 def new_lab(
-    name: Annotated[str, typer.Argument(help="Such as lab2_talkers: small letters, digits, underscores.")],
+    name: Annotated[str, typer.Argument(help="Lower-case letters, digits and underscores, such as lab2_talkers.")],
     course: CourseOption = None,
 ) -> None:
-    """Write a small lab into the course, complete with checks, to be changed into yours."""
+    """Write a small, complete lab with checks into the course, which you change into your own."""
     from autograder.authoring.new import new_lab as write
     from autograder.course.folder import course_root
 
@@ -63,12 +63,12 @@ def new_lab(
 @app.command()
 def lint(
     lab: Annotated[str | None, typer.Argument(help="The lab; default: all of them.")] = None,
-    static: Annotated[bool, typer.Option("--static", help="Only read it, and run nothing.")] = False,
+    static: Annotated[bool, typer.Option("--static", help="Only read the lab, and run nothing.")] = False,
     isolation: IsolationOption = Isolation.FULL,
-    jobs: Annotated[int, typer.Option(min=1, help="How many runs at once.")] = 4,
+    jobs: Annotated[int, typer.Option(min=1, help="How many runs go on at once.")] = 4,
     course: CourseOption = None,
 ) -> None:
-    """Say what is wrong with a lab: cells, checks, what students would receive, and what running it shows."""
+    """Say what is wrong with a lab: in its cells and checks, in what students would receive, and when it runs."""
     from autograder.authoring.lint.runs import run_findings
     from autograder.authoring.lint.static import course_findings, read_findings, release_findings
     from autograder.course.folder import course_root
@@ -106,7 +106,7 @@ def release(
     lab: Annotated[str | None, typer.Argument(help="The lab; default: all of them.")] = None,
     course: CourseOption = None,
 ) -> None:
-    """Generate what students receive: `labs/` from `solutions/`; refuses a lab in which `lint` reads an error."""
+    """Generate what students receive, `labs/`, from `solutions/`; refuse a lab in which `lint` finds an error."""
     from autograder.authoring.release import release as generate
     from autograder.authoring.start_page import START_PAGE, start_page
     from autograder.core.files import write_beside
@@ -127,7 +127,7 @@ def kit(
     ] = None,
     course: CourseOption = None,
 ) -> None:
-    """Write what students get into build/release, a folder and a zip: labs, this program without solutions, a lock."""
+    """Write what students get into build/release, as a folder and a zip: labs, a lock, the kit without solutions."""
     from autograder.authoring.student_kit import write_kit
     from autograder.course.folder import course_root
     from autograder.course.paths import CoursePaths
@@ -137,18 +137,16 @@ def kit(
     archive = write_kit(root, pages if pages.is_dir() else None, CoursePaths(root).release)
     print(archive)
     if not pages.is_dir():
-        print(
-            "It has no lectures, since they have not been built. Build them with `make lectures`, then run this again."
-        )
+        print("It contains no lectures because they have not been built. Run `make lectures`, then this command again.")
 
 
 @app.command()
 def gradescope(
     lab: Annotated[str, typer.Argument(help="The lab, such as lab2_executors.")],
-    file: Annotated[Path, typer.Argument(metavar="FILE.zip", help="Where to write it.")],
+    file: Annotated[Path, typer.Argument(metavar="FILE.zip", help="The zip file to write.")],
     course: CourseOption = None,
 ) -> None:
-    """Write a lab's autograder for Gradescope: a zip to upload, which checks each submission as it is handed in."""
+    """Write a lab's autograder for Gradescope: a zip to upload, which checks each submission when it is handed in."""
     from autograder.authoring.gradescope import write_gradescope
     from autograder.course.folder import course_root
 

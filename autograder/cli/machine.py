@@ -11,7 +11,7 @@ from autograder.cli.app import JsonOption, app
 
 @app.command()
 def doctor(as_json: JsonOption = False) -> None:
-    """Say what this machine offers for grading, and what to do about each lack."""
+    """Say what this machine offers for grading, and what to do if something is missing."""
     from autograder.cli.doctor import run
 
     raise typer.Exit(run(as_json))
@@ -19,7 +19,7 @@ def doctor(as_json: JsonOption = False) -> None:
 
 @app.command(add_help_option=False, context_settings={"ignore_unknown_options": True})
 def jupyter(
-    words: Annotated[list[str] | None, typer.Argument(metavar="...", help="As for `jupyter lab`.")] = None,
+    words: Annotated[list[str] | None, typer.Argument(metavar="...", help="Options of `jupyter lab`.")] = None,
 ) -> None:
     """Open the course's labs in JupyterLab, with the settings that students work with."""
     from autograder.cli.jupyter import open_labs
@@ -29,7 +29,7 @@ def jupyter(
 
 @app.command("ros2", add_help_option=False, context_settings={"ignore_unknown_options": True})
 def ros2_command(
-    words: Annotated[list[str] | None, typer.Argument(metavar="COMMAND VERB ...", help="As for `ros2`.")] = None,
+    words: Annotated[list[str] | None, typer.Argument(metavar="COMMAND VERB ...", help="The words of `ros2`.")] = None,
 ) -> None:
     """Look at a running system as `ros2 node|topic|service|param|action|lifecycle|interface` does."""
     from autograder.cli.ros2 import ros2

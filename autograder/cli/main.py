@@ -46,8 +46,8 @@ def main() -> None:
     except OSError as error:  # the machine refuses something, which is no defect of the kit
         print(f"error: {error.filename or 'a file'}: {error.strerror or error}", file=sys.stderr)
         print(
-            "  See that its folder exists, that you may write there, and that the disk has room.\n"
-            '  What another user left in the course\'s folder becomes yours by: sudo chown -R "$USER" build',
+            "  Make sure that its folder exists, that you may write there, and that the disk has space.\n"
+            '  To take over files that another user left in the course\'s folder, run: sudo chown -R "$USER" build',
             file=sys.stderr,
         )
         sys.exit(2)
@@ -58,7 +58,7 @@ def main() -> None:
             sys.exit(2)
         if type(error).__name__ == "DatabaseError":  # a sentence with the place was given where it is known
             print(f"error: The gradebook is damaged: {getattr(error, 'orig', error)}.", file=sys.stderr)
-            print("  Put a copy of it in its place: earlier ones are in gradebook/backups.", file=sys.stderr)
+            print("  Replace it with a copy: earlier copies are in gradebook/backups.", file=sys.stderr)
             sys.exit(2)
         import traceback
 

@@ -14,9 +14,9 @@ from autograder.core.errors import KitError
 @app.command()
 def package(
     lab: Annotated[str, typer.Argument(help="The lab, such as lab3_remapping.")],
-    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Where to write it, such as the src of a workspace.")],
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Where to write them, such as the src of a workspace.")],
     notebook: Annotated[
-        Path | None, typer.Option(help="The notebook whose programs are taken; default: the lab as it is handed out.")
+        Path | None, typer.Option(help="The notebook with the programs; default: the lab as students receive it.")
     ] = None,
     course: CourseOption = None,
 ) -> None:

@@ -21,12 +21,12 @@ LEFT_OUT = 3
 
 @app.command()
 def report(course: CourseOption = None) -> None:
-    """Write a page about the class for each lab, build/report/LAB.html: for instructors, not for students."""
+    """Write a page about the class for each lab, build/report/LAB.html, for instructors and not for students."""
     import datetime
 
     from autograder.course.folder import course_root
     from autograder.course.paths import CoursePaths
-    from autograder.gradebook.class_entries import class_entries
+    from autograder.gradebook.grades import class_entries
     from autograder.report.class_page import write_class_page
 
     root = course_root(course)
@@ -44,17 +44,17 @@ def export(
     lab: Annotated[str | None, typer.Option(help="Only this lab.")] = None,
     output: Annotated[Path | None, typer.Option("--output", "-o", help="File to write; default: print it.")] = None,
     column: Annotated[
-        str, typer.Option(help="Heading of the column, as the platform's own export names it; default: the lab's name.")
+        str, typer.Option(help="The heading of the column in the platform's own export; default: the lab's name.")
     ] = "",
     course: CourseOption = None,
 ) -> None:
-    """Export a graded class: for Canvas, Moodle, Blackboard, Gradescope, a CI server or a table program.
+    """Export a graded class for Canvas, Moodle, Blackboard, Gradescope, a CI server or a spreadsheet.
 
-    Exit status: 0, or 3 if somebody is not in it, which is said with the reason.
+    Exit status: 0, or 3 if somebody is not in the export; the command names them and says why.
     """
     from autograder.core.files import write_beside
     from autograder.course.folder import course_root
-    from autograder.gradebook.class_entries import class_entries
+    from autograder.gradebook.grades import class_entries
 
     if form not in FORMATS:
         raise KitError(f"There is no format `{form}`.", f"Name one of: {', '.join(FORMATS)}.")
@@ -63,7 +63,7 @@ def export(
         raise KitError("There are no results to export.", "Grade a class first: autograder grade LAB")
     labs = sorted({entry.lab for entry in entries})
     if len(labs) > 1 and form not in SEVERAL_LABS:
-        raise KitError(f"The format `{form}` holds one lab.", f"Name it: --lab LAB, one of {', '.join(labs)}.")
+        raise KitError(f"The format `{form}` holds only one lab.", f"Name it: --lab LAB, one of {', '.join(labs)}.")
     made = FORMATS[form](entries, column)
     if output is not None:
         write_beside(output, made.content)
@@ -85,7 +85,7 @@ def _say(left_out: list[str], entries: list[Entry]) -> None:
         print(f"{told}; those count 0 until then.", file=sys.stderr)
     stale = sum(1 for entry in entries if entry.grade is not None and entry.grade.stale)
     if stale:
-        print(f"{stale} have points by hand for something that has changed since.", file=sys.stderr)
+        print(f"{stale} have points that were given by hand for something that has changed since.", file=sys.stderr)
     for sentence in left_out:
         print(plain(sentence), file=sys.stderr)
 
@@ -93,12 +93,12 @@ def _say(left_out: list[str], entries: list[Entry]) -> None:
 @app.command()
 def similar(
     lab: Annotated[str, typer.Argument(help="The lab, such as lab2_executors.")],
-    at_least: Annotated[int, typer.Option(min=1, max=100, help="Likeness of a pair that is shown, in percent.")] = 60,
+    at_least: Annotated[int, typer.Option(min=1, max=100, help="Smallest similarity to show, in percent.")] = 60,
     most: Annotated[int, typer.Option(min=1, help="How many pairs are shown.")] = 20,
     as_json: JsonOption = False,
     course: CourseOption = None,
 ) -> None:
-    """List pairs of submissions that are alike beyond what the lab hands out: for a person to read, never a verdict."""
+    """List pairs of submissions that are similar in more than what the lab hands out; a person has to judge them."""
     import json
     from dataclasses import asdict
 

@@ -19,23 +19,23 @@ FOLDER = "handed_in"
 @app.command()
 def submit(
     notebook: Annotated[Path, typer.Argument(help="The saved notebook to hand in.")],
-    lab: Annotated[str | None, typer.Option(help="The lab it answers, where its name does not say.")] = None,
+    lab: Annotated[str | None, typer.Option(help="The lab it answers, if its name does not say so.")] = None,
     output: Annotated[
-        Path | None, typer.Option("--output", "-o", metavar="DIR", help=f"Where to put it; default: {FOLDER}.")
+        Path | None, typer.Option("--output", "-o", metavar="DIR", help=f"Where to put the copy; default: {FOLDER}.")
     ] = None,
     without_checks: Annotated[bool, typer.Option("--without-checks", help="Do not run the checks.")] = False,
     isolation: Annotated[
         Isolation | None,
-        typer.Option(help="How programs are kept apart; default: full, in a student's kit the most there is."),
+        typer.Option(help="How programs are isolated; default: full, in a student's kit the best that there is."),
     ] = None,
     course: Annotated[
         Path | None, typer.Option(help="The folder of the course whose checks are run; default: the kit's own.")
     ] = None,
 ) -> None:
-    """Copy the saved notebook to what you hand in, say what to know before, and print a receipt.
+    """Copy the saved notebook to the folder that you hand in, warn about what is missing, and print a receipt.
 
-    The copy has the name that grading looks for, and is the notebook byte by byte. Exit status: 0, whatever the checks
-    say; 2 usage or set-up.
+    The copy has the name that grading looks for, and is identical to the notebook. Exit status: 0, whatever the checks
+    say; 2 wrong usage or set-up.
     """
     if not notebook.is_file():
         raise KitError(f"There is no notebook {notebook}.", "Name an .ipynb file.")
@@ -49,7 +49,7 @@ def submit(
     found = lab_of(notebook, lab, trusted_course(course))
     content = notebook.read_bytes()
     if len(content) > NOTEBOOK_BYTES:
-        size = f"{notebook} is larger than {NOTEBOOK_BYTES // 1024**2} MiB, and would not be taken."
+        size = f"{notebook} is larger than {NOTEBOOK_BYTES // 1024**2} MiB, and would not be accepted."
         raise KitError(
             size, "Clear all outputs (in JupyterLab: Edit, Clear Outputs of All Cells), save, and submit again."
         )
@@ -91,4 +91,4 @@ def _checks(packed: Path, lab: str, isolation: Isolation | None, course: Path | 
         console().print()
     console().print(summary_view(result))
     read = sum(answer.points or 0.0 for answer in found.answers.values())
-    return total(result) + (f" by checks; {read:g} more are for answers that a person reads" if read else "")
+    return total(result) + (f" from checks; {read:g} more are for answers that a person grades" if read else "")

@@ -44,14 +44,17 @@ class Grade:
         return [cell for cell in self.cells if cell.stale]
 
     @property
+    def earned(self) -> float:
+        """Points that are left after the penalty, where a cell that a person has yet to grade counts 0."""
+        return max(0.0, sum(cell.points or 0.0 for cell in self.cells) - self.penalty)
+
+    @property
     def score(self) -> float | None:
-        """Points that are left after the penalty; None as long as a check waits for an instructor's verdict.
+        """What was earned; None as long as a check waits for an instructor's verdict.
 
         An explanation that nobody has graded yet counts 0 here, and `waiting` names it.
         """
-        if any(cell.is_check for cell in self.waiting):
-            return None
-        return max(0.0, sum(cell.points or 0.0 for cell in self.cells) - self.penalty)
+        return None if any(cell.is_check for cell in self.waiting) else self.earned
 
     @property
     def max_score(self) -> float:

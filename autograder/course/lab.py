@@ -20,18 +20,21 @@ from pydantic import BaseModel, ConfigDict
 
 from autograder.core.errors import KitError
 from autograder.core.files import signature
-from autograder.core.results import encodable
-from autograder.course.cell_file import BadNameError, CellFile, parse
-from autograder.course.markers import without_hidden_tests, without_region
+from autograder.course.cells import (
+    CODE_STUB,
+    TEXT_STUB,
+    BadNameError,
+    CellFile,
+    blank_mark,
+    grade_id_of,
+    headings,
+    nbgrader_of,
+    parse,
+    source_of,
+    without_hidden_tests,
+    without_region,
+)
 from autograder.course.settings import read_settings
-
-CODE_STUB = "# YOUR CODE HERE"
-"""What students find in place of a solution: a comment in Python and in YAML."""
-TEXT_STUB = "YOUR ANSWER HERE"
-
-_HEADING = re.compile(r"^(#{1,6})\s+(.*?)\s*#*\s*$", re.MULTILINE)
-_FENCED = re.compile(r"^(```|~~~).*?^\1[`~]*$", re.MULTILINE | re.DOTALL)
-"""Code, in which such a line is a comment."""
 
 
 @cache
@@ -138,56 +141,6 @@ class Lab:
             "nbformat": self.raw.get("nbformat", 4),
             "nbformat_minor": self.raw.get("nbformat_minor", 5),
         }
-
-
-def nbgrader_of(cell: dict[str, Any]) -> dict[str, Any]:
-    """Return a cell's nbgrader metadata; empty if it has none, or something else in its place."""
-    metadata = cell.get("metadata")
-    nbgrader = metadata.get("nbgrader") if isinstance(metadata, dict) else None
-    return nbgrader if isinstance(nbgrader, dict) else {}
-
-
-def grade_id_of(cell: dict[str, Any]) -> str:
-    """Return a cell's grade_id; empty if it has none."""
-    grade_id = nbgrader_of(cell).get("grade_id")
-    return encodable(grade_id) if isinstance(grade_id, str) else ""
-
-
-def cell_digest(source: str) -> str:
-    """Return what tells one text of a cell from another; blanks at the ends of lines and of the cell do not count."""
-    lines = [line.rstrip() for line in source.replace("\r\n", "\n").strip().split("\n")]
-    return hashlib.sha256("\n".join(lines).encode("utf-8", "replace")).hexdigest()[:16]
-
-
-def blank_mark(source: str) -> dict[str, str]:
-    """Return metadata for an answer cell, below `autograder`, by which a notebook knows that it is still untouched."""
-    return {"blank": cell_digest(source)}
-
-
-def blank_mark_of(cell: dict[str, Any]) -> str:
-    """Return the digest in a cell's `blank_mark`; empty if it has none."""
-    metadata = cell.get("metadata")
-    mark = metadata.get("autograder") if isinstance(metadata, dict) else None
-    return str(mark.get("blank", "")) if isinstance(mark, dict) else ""
-
-
-def source_of(cell: dict[str, Any]) -> str:
-    """Return a cell's source as one string that can be encoded; notebooks hold it as a string or as lines.
-
-    Raises:
-        ValueError: it is neither.
-    """
-    source = cell.get("source", "")
-    if isinstance(source, list) and all(isinstance(line, str) for line in source):
-        source = "".join(source)
-    if not isinstance(source, str):
-        raise ValueError("a cell's source is neither text nor lines of text")
-    return encodable(source).replace("\r\n", "\n").replace("\r", "\n")
-
-
-def headings(markdown: str) -> list[tuple[int, str]]:
-    """Return the headings in a cell's text, each with its level, from 1."""
-    return [(len(marks), text) for marks, text in _HEADING.findall(_FENCED.sub("", markdown))]
 
 
 def lab_names(root: Path) -> list[str]:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from autograder.diagnosis.events import Call, Thing
 from autograder.diagnosis.inside import Inside, called
 from autograder.diagnosis.sources import Place
 from autograder.graph.names import nearest
 from autograder.reasons import Group, Kind, Reason
+from autograder.sandbox.inside.probe.events import Call, Thing
 
 WAITS_FOR_SERVICE = Kind(
     "waits-for-service",

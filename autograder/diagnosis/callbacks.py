@@ -5,11 +5,12 @@ from __future__ import annotations
 import re
 
 from autograder.diagnosis.diagnosed import DiagnosedProgram
-from autograder.diagnosis.events import BadMessage, BadReturn, CallbackError, Event, ThreadError, read
+from autograder.diagnosis.events import read
 from autograder.diagnosis.inside import Inside
 from autograder.diagnosis.scene import Scene
 from autograder.diagnosis.traces import CRASHED, KNOWN_ERRORS, PARAMETER_NOT_DECLARED, PARAMETER_TYPE, quoted
 from autograder.reasons import Group, Kind, Reason
+from autograder.sandbox.inside.probe.events import BadMessage, BadReturn, CallbackError, Event, ThreadError
 
 NEVER_AWAITED = Kind(
     "never-awaited", "Python warned of a coroutine that was never awaited, and nothing came", Group.CALLBACKS

@@ -10,12 +10,12 @@ from collections.abc import Iterator
 from autograder.diagnosis.blocked import WRONG_TYPE
 from autograder.diagnosis.callbacks import of_event
 from autograder.diagnosis.chain import inside_reason
-from autograder.diagnosis.events import BadMessage, BadReturn, CallbackError, Event, GoalLeft, Thing
 from autograder.diagnosis.inside import Inside, called
 from autograder.diagnosis.programs import program_trouble
 from autograder.diagnosis.scene import Scene
 from autograder.graph.names import nearest, type_name
 from autograder.reasons import Group, Kind, Reason
+from autograder.sandbox.inside.probe.events import BadMessage, BadReturn, CallbackError, Event, GoalLeft, Thing
 
 NO_CANCEL_CALLBACK = Kind("no-cancel-callback", "the action server has no cancel callback of its own", Group.GOALS)
 ACTION_NAME = Kind("action-name", "an action with a similar name is offered", Group.GOALS)

@@ -9,11 +9,21 @@ from functools import cached_property
 from pathlib import Path
 from typing import TypeVar
 
-from autograder.arguments.remap_rules import full_name
-from autograder.diagnosis import events, sources
+from autograder.arguments.rule_effect import full_name
+from autograder.diagnosis import sources
 from autograder.diagnosis.diagnosed import DiagnosedProgram
-from autograder.diagnosis.events import Call, Event, ExecutorSeen, NodeSeen, ParameterSeen, Thing
+from autograder.diagnosis.events import read
 from autograder.graph.observer import Observer
+from autograder.sandbox.inside.probe.events import (
+    Attached,
+    Call,
+    Event,
+    ExecutorSeen,
+    NodeSeen,
+    ParameterSeen,
+    ProbeFailed,
+    Thing,
+)
 
 _T = TypeVar("_T")
 
@@ -27,8 +37,8 @@ class Inside:
         self.program = program
         self.name = program.name
         self.now = time.monotonic()
-        self.events: list[Event] = events.read(program.events())
-        self.attached = bool(self.all(events.Attached)) and not self.all(events.ProbeFailed)
+        self.events: list[Event] = read(program.events())
+        self.attached = bool(self.all(Attached)) and not self.all(ProbeFailed)
         self.things: dict[int, Thing] = {thing.id: thing for thing in self.all(Thing)}
         self.executors: list[ExecutorSeen] = self.all(ExecutorSeen)
         self.nodes: dict[str, NodeSeen] = {node.name: node for node in self.all(NodeSeen)}

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from autograder.diagnosis.events import Thing
 from autograder.diagnosis.inside import Inside
 from autograder.diagnosis.scene import Scene, first
 from autograder.reasons import Group, Kind, Reason
+from autograder.sandbox.inside.probe.events import Thing
 
 LATE_BINDING = Kind(
     "late-binding", "callbacks of one lambda, which reads the name of the loop that it is in", Group.CALLBACKS

@@ -5,16 +5,16 @@ from __future__ import annotations
 import ast
 from collections.abc import Sequence
 
-from autograder.arguments import remap_rules
+from autograder.arguments import remap_rules, rule_effect
 from autograder.arguments.rule_effect import ABSOLUTE_NAME, TOPIC_NAME
 from autograder.diagnosis.blocked import WRONG_TYPE
 from autograder.diagnosis.chain import inside_reason, reason_inside
-from autograder.diagnosis.events import Thing
 from autograder.diagnosis.inside import Inside
 from autograder.diagnosis.programs import program_trouble
 from autograder.diagnosis.scene import Scene
 from autograder.graph.names import nearest, node_of, type_name
 from autograder.reasons import Group, Kind, Reason
+from autograder.sandbox.inside.probe.events import Thing
 
 NOT_MADE_YET = Kind(
     "not-made-yet", "a method of the source makes the end in a line where the probe has seen none made", Group.NAMES
@@ -83,7 +83,7 @@ def _given_as_a_parameter(scene: Scene, insides: Sequence[Inside], wanted: str) 
     """Why a name given with `-p` to one of these programs is not there."""
     pairs = zip(scene.insides, scene.parameter_rules, strict=False)
     return next(
-        (why for it, given in pairs if it in insides and (why := remap_rules.renames_nothing(given, wanted))), None
+        (why for it, given in pairs if it in insides and (why := rule_effect.renames_nothing(given, wanted))), None
     )
 
 
@@ -119,7 +119,7 @@ def why_no_node(scene: Scene, wanted: str) -> Reason:
     if silent or not own:
         return _nothing_of(silent or around)
     for inside, rules in zip(scene.insides, scene.rules, strict=False):
-        idle = remap_rules.node_without_effect(rules, wanted, own) if inside in around else None
+        idle = rule_effect.node_without_effect(rules, wanted, own) if inside in around else None
         if idle:
             return idle
     idle = _given_as_a_parameter(scene, around, wanted)
@@ -259,7 +259,7 @@ def _idle_rule(scene: Scene, topic: str, node: str) -> Reason | None:
     for inside, rules in zip(scene.insides, scene.rules, strict=False):
         own = [name for name in observer.nodes() if name in inside.nodes] or observer.nodes()
         nodes = [name for name in own if name == node] if node else own
-        found = remap_rules.without_effect(rules, topic, nodes, users, inside.names_in_code)
+        found = rule_effect.without_effect(rules, topic, nodes, users, inside.names_in_code)
         named = [name for name in users if found and name in found.because]
         absolute = any(absolute_name(scene, kind, name) for name in named for kind in ("publisher", "subscription"))
         if found and (found.kind is not ABSOLUTE_NAME or absolute):

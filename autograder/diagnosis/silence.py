@@ -8,7 +8,6 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 
 from autograder.diagnosis import callbacks, spinning
 from autograder.diagnosis.chain import inside_reason
-from autograder.diagnosis.events import LifecyclePublishOff, Thing
 from autograder.diagnosis.inside import Inside, called, listed
 from autograder.diagnosis.matching import why_not_matched
 from autograder.diagnosis.names import why_no_endpoint
@@ -18,6 +17,7 @@ from autograder.diagnosis.together import why_starved
 from autograder.graph import qos
 from autograder.graph.names import node_of, type_name
 from autograder.reasons import Group, Kind, Reason
+from autograder.sandbox.inside.probe.events import LifecyclePublishOff, Thing
 
 NO_ANSWER = Kind("no-answer", "no reason was established: what was seen is said", Group.SILENCE)
 TIMER_PERIOD = Kind(

@@ -6,10 +6,10 @@ import itertools
 from collections.abc import Sequence
 
 from autograder.diagnosis.blocked import ONE_LOCK, WAITS_FOR_LOCK
-from autograder.diagnosis.events import ExecutorSeen, Thing
 from autograder.diagnosis.inside import Inside, called, listed
 from autograder.diagnosis.scene import Scene
 from autograder.reasons import Group, Kind, Reason
+from autograder.sandbox.inside.probe.events import ExecutorSeen, Thing
 
 ONE_GROUP = Kind(
     "one-group", "all timers and all callbacks that ran are in one exclusive group", Group.TOGETHER, "timeline"

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from autograder.course.paths import CoursePaths
-from autograder.gradebook.preparation import prepare_nbgrader
+from autograder.gradebook.own_courses import prepare_nbgrader
 
 
 def open_api(root: Path, gradebook: bool = True, **directories: Any) -> Any:

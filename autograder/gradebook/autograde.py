@@ -8,6 +8,7 @@ without a result gets no automatic score.
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -29,15 +30,62 @@ from nbgrader.preprocessors import (
 from autograder.core.errors import KitError
 from autograder.core.results import CheckResult, Isolation
 from autograder.course.lab import Lab, load_lab
-from autograder.gradebook import notes
+from autograder.gradebook import own_tables
 from autograder.gradebook.exchange_files import carry, only_notebooks
-from autograder.gradebook.inert import UNDECIDED, InertAnswers, inert_text
 from autograder.gradebook.private_nbgrader import SaveScores, in_first_pass
 from autograder.grading.runner import Settings, run_submission
 from autograder.grading.store import ResultStore
 from autograder.report.html import check_html, render
 from autograder.sandbox.isolation import choose
 from autograder.submission.reader import read_submission
+
+UNDECIDED = "The grader could not find out. No points are taken: an instructor decides."
+"""What stands in the output of a check without a verdict."""
+
+
+class HarmlessAnswers(NbGraderPreprocessor):  # type: ignore[misc]
+    """Takes the life out of HTML in students' Markdown, which feedback and formgrader would put into their pages.
+
+    A word joiner, which is invisible, parts every `<` from what would make it a tag. Unlike escaping it reads the same
+    in text and in code.
+    """
+
+    def preprocess_cell(self, cell: Any, resources: dict[str, Any], index: int) -> tuple[Any, dict[str, Any]]:
+        """Part the tags in an answer cell; the lab's own text stays as it is."""
+        if cell.cell_type != "code" and utils.is_solution(cell):
+            cell.source = harmless(cell.source)
+        return cell, resources
+
+
+_BLANKS = 200
+"""Longer rows of blanks in an answer are shortened to this many."""
+_FORMULAS = 100
+"""Formulas of LaTeX's longer spellings that are shown as such in an answer."""
+_FORMULA = re.compile(r"(\\begin(?=\{)|\\\\(?=[\[(]))")
+_FENCE = re.compile(r"^([ \t>*+\d.)-]*+)(`{3,}+|~{3,}+)[^`\n]*+$", re.MULTILINE)  # what was taken is never given back
+
+
+def harmless(markdown: str) -> str:
+    """Return Markdown in which nothing can become a tag, a script link or a picture from elsewhere."""
+    return harmless_text(re.sub(r"<(?=[A-Za-z/!?])", "<\u2060", markdown))
+
+
+def harmless_text(markdown: str) -> str:
+    """Return Markdown in which nothing but tags can become a script link, a drawing or a picture from elsewhere."""
+    # nbconvert hands such a block to a drawing program in the browser, as it stands: it fetches pictures, too.
+    markdown = markdown.replace("mermaid", "m\u2060ermaid")
+    # For each of many blanks the Markdown reader looks at all that follow: 60000 take it a quarter of a minute.
+    markdown = re.sub(f" {{{_BLANKS},}}", " " * _BLANKS, markdown)
+    # So it does for the beginning of a formula that does not end: 20000 take it a quarter of a minute.
+    *first, rest = _FORMULA.split(markdown, _FORMULAS)
+    markdown = "".join(first) + _FORMULA.sub("\\1\u2060", rest)
+    # Without the name of a language code is not coloured, which takes half a minute for 20000 lines of a blank.
+    markdown = _FENCE.sub(r"\1\2", markdown)
+    # What a browser fetches by itself would tell its owner who reads the page.
+    parted = markdown.replace("![", "!\u2060[")
+    # Only links that plainly begin with http stay links: there are too many ways to spell the other schemes.
+    return re.sub(r"\](?=(\(|:)(?!\s*https?://))", "]\u2060", parted)
+
 
 _POINTS = "autograder_points"
 """Key under which a notebook's resources hold the points by grade_id."""
@@ -107,7 +155,7 @@ class AttachResults(NbGraderPreprocessor):  # type: ignore[misc]
         nb.cells = [shown for cell in nb.cells for shown in (cell, *_mark_scheme(cell, lab))]
         if result.problems:
             # It quotes the student: no line of it may be the blank one that ends the HTML, and no word a link.
-            note = inert_text(" ".join(render("problems.html", problems=result.problems).split()))
+            note = harmless_text(" ".join(render("problems.html", problems=result.problems).split()))
             nb.cells.insert(0, nbformat.v4.new_markdown_cell(note, id="problems"))
         resources[_POINTS] = points
         return nb, resources
@@ -150,12 +198,12 @@ class SaveCheckedGrades(SaveScores):
         """Record all grades of a submission, and that they are recorded."""
         root, student, lab, _ = _submitted(self.parent.parent, resources)
         self._programs = [cell.source for cell in nb.cells if cell.cell_type == "code" and utils.is_solution(cell)]
-        digest = notes.recordable(root, lab, student)
+        digest = own_tables.recordable(root, lab, student)
         with Gradebook(resources["nbgrader"]["db_url"]) as gradebook:
-            notes.make_tables(gradebook.engine)
+            own_tables.make_tables(gradebook.engine)
         made: tuple[Any, dict[str, Any]] = super().preprocess(nb, resources)
         with Gradebook(resources["nbgrader"]["db_url"]) as gradebook:
-            notes.note_recorded(gradebook.db, lab.name, student, digest)
+            own_tables.note_recorded(gradebook.db, lab.name, student, digest)
             gradebook.db.commit()
         return made
 
@@ -166,9 +214,9 @@ class SaveCheckedGrades(SaveScores):
     def needs_person(self, grade: Any, cell: Any, asked: bool) -> bool:
         """Ask where there are no points yet, and where points were given by hand for something else."""
         programs = [] if utils.is_solution(cell) else self._programs
-        about = notes.digest_of(cell.source, programs, grade.auto_score, grade.max_score)
-        before = notes.judged(self.gradebook.db, grade.id)
-        notes.note_judged(self.gradebook.db, grade.id, about)
+        about = own_tables.digest_of(cell.source, programs, grade.auto_score, grade.max_score)
+        before = own_tables.judged(self.gradebook.db, grade.id)
+        own_tables.note_judged(self.gradebook.db, grade.id, about)
         if grade.manual_score is None and grade.extra_credit is None:
             return grade.auto_score is None
         return asked or about != before
@@ -176,5 +224,5 @@ class SaveCheckedGrades(SaveScores):
 
 SANITIZE = [ClearOutput, DeduplicateIds, OverwriteKernelspec, OverwriteCells, CheckCellMetadata]
 """What nbgrader does to the rebuilt notebook; among others it puts the check cells' full source back."""
-AUTOGRADE = [AttachResults, SaveCheckedGrades, AssignLatePenalties, InertAnswers]
+AUTOGRADE = [AttachResults, SaveCheckedGrades, AssignLatePenalties, HarmlessAnswers]
 """In place of nbgrader's execution."""

@@ -1,18 +1,53 @@
-"""The configuration that puts the course's layout and stages into nbgrader."""
+"""The configuration that puts the course's layout and stages into nbgrader, and what `nbgrader export` writes."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from autograder.course.lab import CODE_STUB, TEXT_STUB
+from nbgrader.plugins import CsvExportPlugin
+
+from autograder.course.cells import CODE_STUB, TEXT_STUB
 from autograder.course.paths import CoursePaths
 from autograder.gradebook.autograde import AUTOGRADE, SANITIZE, SubmissionExporter
 from autograder.gradebook.exchange_files import CollectNotebooks
-from autograder.gradebook.export_plugin import ExportOfClass
 from autograder.gradebook.feedback import FeedbackExporter
 from autograder.gradebook.released_notebook import RELEASE, WITHOUT_GRADEBOOK
 from autograder.grading.validate import HEADING
+from autograder.intake.record import left_class
+
+
+class ExportOfClass(CsvExportPlugin):  # type: ignore[misc]
+    """Writes for each assignment a row for every student, except for who has left its class.
+
+    nbgrader takes every student of the gradebook, which also keeps the grades of those who have left.
+    """
+
+    def export(self, gradebook: Any) -> None:
+        """Write the table."""
+        super().export(_Classes(gradebook, Path(self.parent.coursedir.root)))
+
+
+class _Classes:
+    """A gradebook that is read assignment by assignment, with the students of the one that is being read."""
+
+    def __init__(self, gradebook: Any, root: Path) -> None:
+        self._gradebook, self._root, self._left = gradebook, root, set[str]()
+
+    @property
+    def assignments(self) -> Iterator[Any]:
+        for assignment in self._gradebook.assignments:
+            self._left = left_class(self._root, assignment.name)
+            yield assignment
+
+    @property
+    def students(self) -> list[Any]:
+        return [student for student in self._gradebook.students if student.id not in self._left]
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._gradebook, name)
+
 
 NOT_RELEASED = [".ipynb_checkpoints", "*.pyc", "__pycache__", ".*", "nodes"]
 """Files beside a lab's source, and beside what a student hands in, that are not part of it."""

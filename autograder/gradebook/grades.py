@@ -1,14 +1,56 @@
-"""The table of grades."""
+"""The grades of a class, as the gradebook has them: to be asked for, as a table, and with all that goes out."""
 
 from __future__ import annotations
 
 import csv
 import io
+from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING, TypeVar
 
 from autograder.core.files import write_beside
+from autograder.core.grades import Grade
 from autograder.course.paths import CoursePaths
-from autograder.gradebook.scores import read_grades
+from autograder.gradebook.database import damage_told
+from autograder.gradebook.queries import grades_in
+from autograder.gradebook.settings import gradebook_address, gradebook_file
+from autograder.grading.store import ResultStore
+from autograder.intake.record import Taken, left_class, read_class
+from autograder.intake.roster import FILE_NAME, read_roster
+from autograder.report.export.entry import Entry
+
+if TYPE_CHECKING:
+    from sqlalchemy.engine import Connection
+
+Answer = TypeVar("Answer")
+
+
+def ask(root: Path, question: Callable[[Connection], Answer], nothing: Answer) -> Answer:
+    """Return what a question finds in the gradebook; `nothing` where nbgrader has written none yet."""
+    file = gradebook_file(root)
+    if file is not None and not file.is_file():
+        return nothing
+    from sqlalchemy import create_engine, inspect
+
+    engine = create_engine(gradebook_address(root))
+    try:
+        with damage_told(root), engine.connect() as connection:
+            return question(connection) if inspect(connection).has_table("grade") else nothing
+    finally:
+        engine.dispose()
+
+
+def read_grades(root: Path, lab: str = "") -> list[Grade]:
+    """Return the grade of each student of the class, sorted by student and lab; who has left the class is not in it.
+
+    Args:
+        root: of the course.
+        lab: whose grades; empty: of all labs.
+    """
+    nobody: list[Grade] = []
+    grades = ask(root, lambda connection: grades_in(connection, lab), nobody)
+    left = {name: left_class(root, name) for name in {grade.lab for grade in grades}}
+    return [grade for grade in grades if grade.student not in left[grade.lab]]
 
 
 def write_grades(root: Path) -> Path:
@@ -29,3 +71,37 @@ def write_grades(root: Path) -> Path:
     path = CoursePaths(root).grades
     write_beside(path, text.getvalue())
     return path
+
+
+def class_entries(root: Path, lab: str | None = None) -> list[Entry]:
+    """Return the submissions of a class, sorted by lab and student.
+
+    Args:
+        root: of the course.
+        lab: whose; None: of all labs.
+
+    Raises:
+        KitError: the roster cannot be used.
+    """
+    paths = CoursePaths(root)
+    roster = read_roster(root / FILE_NAME).students if (root / FILE_NAME).is_file() else {}
+    grades = {(grade.lab, grade.student): grade for grade in read_grades(root, lab or "")}
+    results = ResultStore(root).all(lab)
+    classes = {name: read_class(root, name) for name in {result.lab for result in results}}
+    entries = []
+    for result in results:
+        taken = classes[result.lab].get(result.student, Taken(source=""))
+        page = paths.feedback_page(result.student, result.lab)
+        entries.append(
+            Entry(
+                student=result.student,
+                lab=result.lab,
+                result=result,
+                grade=grades.get((result.lab, result.student)),
+                known=taken.owner | {key: value for key, value in roster.get(result.student, {}).items() if value},
+                file=taken.file,
+                late=taken.late,
+                feedback=page if page.is_file() else None,
+            )
+        )
+    return entries

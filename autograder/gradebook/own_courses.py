@@ -1,4 +1,4 @@
-"""Whose `nbgrader_config.py` is run: that of a course of yours, never one that lies in an unpacked submission.
+"""Makes nbgrader ready in this process: it runs the `nbgrader_config.py` of courses of yours, and no other.
 
 nbgrader reads the configuration of the folder that it is started in, and that is a program. A folder cannot say of
 itself that it is a course, because a student could have written that, too. So a list outside of it does, in the user's
@@ -97,3 +97,17 @@ def _refuse(loader: Any, refusal: type[Exception]) -> None:
         told = f"{file} is passed over: it is not known to be yours. If this folder is your course, say:"
         print(f"{told} autograder trust {file.parent}", file=sys.stderr)
     raise refusal(f"{file} is passed over")
+
+
+def prepare_nbgrader() -> None:
+    """Make nbgrader importable at a bearable price, and able to find its database tool."""
+    # Without this module jsonschema does not check one format of strings; with it, building its grammar takes 3 s.
+    sys.modules.setdefault("rfc3987_syntax", None)  # type: ignore[arg-type]
+    os.environ["TRAITLETS_APPLICATION_RAISE_CONFIG_FILE_ERROR"] = "1"
+    from autograder.gradebook.own_courses import guard_configuration
+
+    guard_configuration()
+    # nbgrader runs `alembic` by name.
+    tools = str(Path(sys.executable).parent)
+    if tools not in os.environ.get("PATH", "").split(os.pathsep):
+        os.environ["PATH"] = tools + os.pathsep + os.environ.get("PATH", "")

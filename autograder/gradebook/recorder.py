@@ -1,8 +1,15 @@
-"""Records results in nbgrader's gradebook and writes feedback, one student after another."""
+"""Records results in nbgrader's gradebook and writes feedback, one student after another.
+
+nbgrader is slow, so `Recording` does it in a thread of its own while the rest of the class is running.
+"""
 
 from __future__ import annotations
 
+import queue
 import re
+import threading
+import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -10,12 +17,12 @@ from autograder.core.errors import GRADEBOOK_REFUSED, KitError
 from autograder.core.files import write_beside
 from autograder.course.lab import Lab
 from autograder.course.paths import CoursePaths
-from autograder.gradebook import notes
+from autograder.gradebook import own_tables
 from autograder.gradebook.api import answered, last_error, open_api
-from autograder.gradebook.keeping import make_room
-from autograder.gradebook.reading import digests
+from autograder.gradebook.database import make_folder
+from autograder.gradebook.grades import ask
+from autograder.gradebook.queries import digests
 from autograder.gradebook.release import register
-from autograder.gradebook.scores import ask
 from autograder.gradebook.settings import gradebook_place
 from autograder.submission import exchange_secret
 
@@ -95,11 +102,11 @@ class Recorder:
         The gradebook itself says what was recorded in it, so that one that was put back gets what it lacks.
         """
         if self._known is None:
-            make_room(self._root)
+            make_folder(self._root)
             self._known = self._recorded(), self._shown()
         recorded, shown = self._known
         there = self._paths.autograded_notebook(student, self._lab.name).is_file()
-        if self._force or not there or recorded.get(student) != notes.recordable(self._root, self._lab, student):
+        if self._force or not there or recorded.get(student) != own_tables.recordable(self._root, self._lab, student):
             return ["autograde", "generate_feedback"]
         page = self._paths.feedback_page(student, self._lab.name)
         mark = page.with_name(MARK)
@@ -109,7 +116,7 @@ class Recorder:
         return [] if fresh and wanted in ("", _secret_in(page.parent)) else ["generate_feedback"]
 
     def _recorded(self) -> dict[str, str]:
-        return ask(self._root, lambda connection: notes.recorded(connection, self._lab.name), {})
+        return ask(self._root, lambda connection: own_tables.recorded(connection, self._lab.name), {})
 
     def _shown(self, student: str = "") -> dict[str, str]:
         return ask(self._root, lambda connection: digests(connection, self._lab.name, student), {})
@@ -120,3 +127,60 @@ def _secret_in(folder: Path) -> str:
         return exchange_secret.secret((folder / exchange_secret.FILE_NAME).read_bytes()[: exchange_secret.MOST_BYTES])
     except OSError:
         return ""
+
+
+class Recording:
+    """Records students in the order in which they are given.
+
+    Args:
+        recorder: that does it.
+        on_recorded: called in this thread after each student.
+    """
+
+    def __init__(self, recorder: Recorder, on_recorded: Callable[[str], None]) -> None:
+        """Begin to wait for students."""
+        self._recorder, self._on_recorded = recorder, on_recorded
+        self._students: queue.SimpleQueue[str | None] = queue.SimpleQueue()
+        self._given_up = threading.Event()
+        self._error: BaseException | None = None
+        self._thread = threading.Thread(target=self._work, name="recording", daemon=True)
+        self._thread.start()
+        self.seconds = 0.0
+        """How long it worked."""
+
+    def put(self, student: str) -> None:
+        """Have a student recorded.
+
+        Raises:
+            KitError: nothing can be recorded at all, which an earlier student has shown.
+        """
+        if self._error is not None:
+            raise self._error
+        self._students.put(student)
+
+    def finish(self) -> None:
+        """Wait until everyone is recorded.
+
+        Raises:
+            KitError: nothing can be recorded at all.
+        """
+        self._students.put(None)
+        self._thread.join()
+        if self._error is not None:
+            raise self._error
+
+    def give_up(self) -> None:
+        """Wait until the student is recorded who is being recorded, and leave out the others."""
+        self._given_up.set()
+        self._students.put(None)
+        self._thread.join()
+
+    def _work(self) -> None:
+        try:
+            while (student := self._students.get()) is not None and not self._given_up.is_set():
+                began = time.monotonic()
+                self._recorder.record(student)
+                self.seconds += time.monotonic() - began
+                self._on_recorded(student)
+        except BaseException as error:  # it is raised again where somebody waits
+            self._error = error

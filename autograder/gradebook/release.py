@@ -8,7 +8,7 @@ from pathlib import Path
 from autograder.core.errors import GRADEBOOK_REFUSED, KitError
 from autograder.course.lab import load_lab
 from autograder.gradebook.api import answered, last_error, open_api
-from autograder.gradebook.keeping import make_usable
+from autograder.gradebook.database import make_usable
 from autograder.gradebook.settings import gradebook_address
 
 
@@ -49,7 +49,7 @@ def knows(root: Path, lab: str) -> bool:
     """Whether the gradebook has the cells of a lab as they are now."""
     from sqlalchemy import create_engine
 
-    from autograder.gradebook.notes import THE_LAB, recorded
+    from autograder.gradebook.own_tables import THE_LAB, recorded
 
     engine = create_engine(gradebook_address(root))
     try:
@@ -73,7 +73,7 @@ def register(root: Path, lab: str) -> list[str]:
         return []
     with tempfile.TemporaryDirectory() as folder:
         generate(root, lab, Path(folder), gradebook=True)
-    from autograder.gradebook.migration import FitCells
+    from autograder.gradebook.released_notebook import FitCells
 
     told, FitCells.told[:] = list(FitCells.told), []
     return told

@@ -23,7 +23,7 @@ def settings_of(root: Path) -> Any:
     Raises:
         KitError: the course's `nbgrader_config.py` cannot be used.
     """
-    from autograder.gradebook.preparation import prepare_nbgrader
+    from autograder.gradebook.own_courses import prepare_nbgrader
 
     prepare_nbgrader()
     from traitlets.config import Config

@@ -256,7 +256,7 @@ def _write(paths: CoursePaths, student: str, lab: str, chosen: Chosen, notebook:
     path = paths.submitted_notebook(student, lab)
     # An unchanged file keeps its time: nbgrader and people can see that nothing new was handed in.
     if _read(paths.submitted, [student, lab, path.name]) != notebook:
-        _make_room(paths.submitted, student, lab)
+        _remove_links(paths.submitted, student, lab)
         write_beside(path, notebook)
     stamp = chosen.claim.handed_in.encode() or beside(chosen, timestamp.FILE_NAME, timestamp.MOST_BYTES)
     said = timestamp.moment(stamp) if stamp else ""
@@ -298,7 +298,7 @@ def _read(folder: Path, parts: Sequence[str]) -> bytes | None:
     return None
 
 
-def _make_room(submitted: Path, student: str, lab: str) -> None:
+def _remove_links(submitted: Path, student: str, lab: str) -> None:
     """Remove links that lie where a notebook is to be written: writing would follow them."""
     for path in (submitted / student, submitted / student / lab):
         if path.is_symlink():

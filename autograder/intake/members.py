@@ -91,20 +91,25 @@ def in_zip(archive: zipfile.ZipFile, bad: list[str], above: tuple[str, ...] = ()
         above: the folders that the zip counts as being in.
     """
     for info in archive.infolist():
-        path = PurePosixPath(_name(info).replace("\\", "/"))
-        if not path.parts or path.is_absolute() or ".." in path.parts or "\0" in info.orig_filename:
+        path = _path(info)
+        if not path:
             bad.append(info.orig_filename)
-        elif not info.is_dir() and not any(is_unseen(part) for part in path.parts):
-            yield Member((*above, *path.parts), partial(_read, archive, info))
+        elif not info.is_dir() and not any(is_unseen(part) for part in path):
+            yield Member((*above, *path), partial(_read, archive, info))
 
 
 def empty_folders(archive: zipfile.ZipFile) -> Iterator[tuple[str, ...]]:
     """Give the paths of the folders that a zip names as such."""
     for info in archive.infolist():
-        path = PurePosixPath(_name(info).replace("\\", "/"))
-        proper = path.parts and not path.is_absolute() and ".." not in path.parts and "\0" not in info.orig_filename
-        if proper and info.is_dir():
-            yield path.parts
+        if (path := _path(info)) and info.is_dir():  # Python cannot say it of a name without characters
+            yield path
+
+
+def _path(info: zipfile.ZipInfo) -> tuple[str, ...]:
+    """Where in a zip a member lies; empty if its name leads nowhere in it, or out of it."""
+    path = PurePosixPath(_name(info).replace("\\", "/"))
+    leads_out = path.is_absolute() or ".." in path.parts or "\0" in info.orig_filename
+    return () if leads_out else path.parts
 
 
 def _read(archive: zipfile.ZipFile, info: zipfile.ZipInfo, most: int) -> bytes:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from autograder.core import front_end
 from autograder.core.errors import KitError
 from autograder.course.book import NO_BOOK, Book, read_book
-from autograder.course.cell_file import CELL_BYTES, BadNameError, CellFile, check_free, check_name, parse
+from autograder.course.cells import CELL_BYTES, BadNameError, CellFile, check_free, check_name, parse
 from autograder.course.folder import book_of_kit, course_root, is_students_kit, trusted_course
 from autograder.notebook import completion, lab_magic, ros2_magic
 from autograder.notebook.kernel import Kernel, now

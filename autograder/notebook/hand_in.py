@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from autograder.course.cell_file import BadNameError, CellFile, parse
-from autograder.course.lab import Answer, Lab, blank_mark, cell_digest, grade_id_of
+from autograder.course.cells import BadNameError, CellFile, blank_mark, cell_digest, grade_id_of, parse
+from autograder.course.lab import Answer, Lab
 from autograder.notebook.program_folder import NODES, Ran, read_runs
 from autograder.submission.copies import copies_of
 from autograder.submission.notebook_file import UnreadableError, cells_of

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 from autograder.core import interrupts
 from autograder.core.results import CellResult, Status
-from autograder.course.lab import cell_digest
+from autograder.course.cells import cell_digest
 from autograder.notebook.lab_state import Report
 from autograder.notebook.program_folder import ProgramFolder, Written, notebook_of, shown
 

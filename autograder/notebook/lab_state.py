@@ -10,7 +10,7 @@ from typing import Any
 
 from autograder.core import student_yaml
 from autograder.core.results import CellResult
-from autograder.course.lab import TEXT_STUB, cell_digest, grade_id_of, headings, nbgrader_of, source_of
+from autograder.course.cells import TEXT_STUB, cell_digest, grade_id_of, headings, nbgrader_of, source_of
 from autograder.reasons import Refused
 from autograder.report import words
 from autograder.report.words import Verdict

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from autograder.core.files import write_beside
-from autograder.course.cell_file import BadNameError, CellFile, check_name
+from autograder.course.cells import BadNameError, CellFile, check_name
 
 NODES = "nodes"
 MANIFEST = ".autograder.json"

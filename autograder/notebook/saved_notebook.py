@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from autograder.course.lab import blank_mark_of, cell_digest, grade_id_of, nbgrader_of, source_of
+from autograder.course.cells import blank_mark_of, cell_digest, grade_id_of, nbgrader_of, source_of
 from autograder.notebook.program_folder import Written
 from autograder.submission.copies import DELETE_COPIES, AnswerCells, answers_in, named_file, told_of_given_copies
 from autograder.submission.notebook_file import UnreadableError, cells_of, released_files

@@ -5,12 +5,9 @@ shows. A check cell, a lecture and the report under a failed check draw the same
 """
 
 from autograder.core.picture import Picture
-from autograder.pictures.arrivals import Traffic, arrivals
-from autograder.pictures.graph import Endpoint, graph
+from autograder.pictures.graph import Endpoint, graph, qos
 from autograder.pictures.lifecycle import lifecycle, steps
-from autograder.pictures.qos import qos
-from autograder.pictures.runs import Run, Runs
-from autograder.pictures.timeline import timeline
+from autograder.pictures.timeline import Run, Runs, Traffic, arrivals, timeline
 
 __all__ = [
     "Endpoint",

@@ -1,13 +1,97 @@
-"""Timelines: which callback ran when, on which thread, in which group."""
+"""Pictures along time: which callback ran when on which thread, and when messages arrived."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import itertools
+import statistics
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from autograder.core.picture import Picture
-from autograder.pictures.runs import Run, Runs
 from autograder.pictures.svg import SMALL, TEXT, WIDTH, Canvas, seconds_axis, shortened, width_of
+
+
+@dataclass(frozen=True)
+class Run:
+    """One run of a callback. Times are seconds, from any common beginning."""
+
+    callback: str
+    begin: float
+    end: float
+    thread: int = 1
+    """The threads of a program are numbered in the order in which they first ran a callback."""
+    group: str = ""
+    """The callback group in words, such as `default group, exclusive`."""
+    node: str = ""
+    ended: bool = True
+    """False: it was still under way when it was last seen."""
+
+
+class Runs(Sequence[Run]):
+    """Runs of the callbacks of one launch, in the order in which they began.
+
+    Args:
+        runs: in any order.
+    """
+
+    def __init__(self, runs: Iterable[Run]) -> None:
+        """Put them in order."""
+        self._runs = tuple(sorted(runs, key=lambda run: (run.begin, run.end, run.callback)))
+
+    def __len__(self) -> int:
+        return len(self._runs)
+
+    def __getitem__(self, index: int) -> Run:  # type: ignore[override]
+        return self._runs[index]
+
+    def __iter__(self) -> Iterator[Run]:
+        return iter(self._runs)
+
+    def __repr__(self) -> str:
+        counts = ", ".join(f"{name}: {self.count(name)}" for name in self.callbacks())
+        return f"runs of callbacks: {counts or 'none'}"
+
+    def callbacks(self) -> list[str]:
+        """Names of the callbacks, in the order in which they first ran."""
+        return list(dict.fromkeys(run.callback for run in self._runs))
+
+    def of(self, *callbacks: str) -> Runs:
+        """Return the runs of these callbacks; of all of them if none is named."""
+        return self._chosen(lambda run: not callbacks or run.callback in callbacks)
+
+    def of_node(self, node: str) -> Runs:
+        """Return the runs of the callbacks of one node, by its full name."""
+        return self._chosen(lambda run: run.node == node)
+
+    def between(self, begin: float, end: float) -> Runs:
+        """Return the runs that were under way at some time from `begin` to `end`."""
+        return self._chosen(lambda run: run.begin < end and run.end >= begin)
+
+    def _chosen(self, wanted: Callable[[Run], bool]) -> Runs:
+        return Runs(run for run in self._runs if wanted(run))
+
+    def count(self, *callbacks: str) -> int:
+        """How many runs of these callbacks began."""
+        return len(self.of(*callbacks))
+
+    def threads(self, *callbacks: str) -> set[int]:
+        """The threads on which these callbacks ran."""
+        return {run.thread for run in self.of(*callbacks)}
+
+    def overlap(self, *callbacks: str) -> int:
+        """How many runs of these callbacks were under way at once, at the most."""
+        changes = sorted(change for run in self.of(*callbacks) for change in ((run.begin, 1), (run.end, -1)))
+        return max(itertools.accumulate(change for _, change in changes), default=0)
+
+    def longest_pause(self, callback: str) -> float:
+        """The longest time from one begin of a callback to its next, in seconds; infinite if there is no next one."""
+        begins = [run.begin for run in self.of(callback)]
+        return max((later - earlier for earlier, later in itertools.pairwise(begins)), default=float("inf"))
+
+    def longest(self, callback: str) -> float:
+        """The longest time that one run of a callback took, in seconds."""
+        return max((run.end - run.begin for run in self.of(callback)), default=0.0)
+
 
 _LANE = 30.0
 """Height of one row of bars."""
@@ -218,3 +302,62 @@ def _alt(shown: Mapping[str, Sequence[Run]], length: float) -> str:
             + (f"; at most {most} at once." if rows else ".")
         )
     return f"Timeline of {length:.1f} seconds. " + " ".join(told)
+
+
+_TOPIC_ROW = 58.0
+
+
+@dataclass(frozen=True)
+class Traffic:
+    """The messages of one end of a topic. Times are seconds, from any common beginning."""
+
+    who: str
+    """`/camera publishes`, `/viewer takes`."""
+    times: Sequence[float]
+    since: float | None = None
+    """When its node was made; None: nobody knows."""
+
+
+def arrivals(topic: str, traffic: Sequence[Traffic], *, seconds: float | None = None) -> Picture:
+    """Draw a row for each end of a topic, and a stroke for each message.
+
+    Args:
+        topic: full name.
+        traffic: of the publishers first, then of those who take the messages.
+        seconds: how much to draw from the first event on; by default all of it.
+    """
+    every = [time for row in traffic for time in (*row.times, *([row.since] if row.since is not None else []))]
+    zero = min(every, default=0.0)
+    length = seconds or max(max(every, default=0.0) - zero, 0.1) * 1.02
+    left = 24 + min(280.0, max((width_of(row.who) for row in traffic), default=80.0) + 8)
+    bottom = 42 + _TOPIC_ROW * max(1, len(traffic))
+    canvas = Canvas(bottom + 2 * TEXT + 14, WIDTH)
+    canvas.words(8, 26, topic, bold=True)
+    per_second = seconds_axis(canvas, left, 40, bottom, length)
+    for number, row in enumerate(traffic):
+        y = 42 + number * _TOPIC_ROW
+        canvas.words(left - 10, y + 26, shortened(row.who, left - 22), anchor="end")
+        canvas.words(left - 10, y + 26 + SMALL + 3, _said(row), size=SMALL, anchor="end", fill="#444444")
+        canvas.line([(left, y + 48), (WIDTH - 24, y + 48)], line=1)
+        if row.since is not None and 0 <= row.since - zero <= length:
+            x = left + (row.since - zero) * per_second
+            canvas.line([(x, y + 6), (x, y + 52)], dashed=True)
+            canvas.words(x + 5, y + 18, "starts", size=SMALL - 1)
+        for time in row.times:
+            if 0 <= time - zero <= length:
+                x = left + (time - zero) * per_second
+                canvas.line([(x, y + 22), (x, y + 48)], line=2.6)
+    return canvas.picture(_arrivals_in_words(topic, traffic))
+
+
+def _said(row: Traffic) -> str:
+    return f"{len(row.times)} message{'s' * (len(row.times) != 1)}"
+
+
+def _arrivals_in_words(topic: str, traffic: Sequence[Traffic]) -> str:
+    told = [f"Messages of {topic}, a stroke for each."]
+    for row in traffic:
+        gaps = [later - earlier for earlier, later in zip(row.times, row.times[1:], strict=False)]
+        rhythm = f", usually every {statistics.median(gaps):.2f} s, at most {max(gaps):.2f} s apart" if gaps else ""
+        told.append(f"{row.who}: {_said(row)}{rhythm}.")
+    return " ".join(told)

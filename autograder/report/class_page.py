@@ -88,9 +88,7 @@ def write_class_page(path: Path, entries: Sequence[Entry], written: datetime.dat
 
 
 def _earned(entry: Entry) -> float:
-    if entry.grade is None:
-        return entry.result.points
-    return max(0.0, sum(cell.points or 0.0 for cell in entry.grade.cells) - entry.grade.penalty)
+    return entry.result.points if entry.grade is None else entry.grade.earned
 
 
 def _top(entry: Entry) -> float:

@@ -12,7 +12,7 @@ from markupsafe import Markup
 from autograder.core.grades import CellGrade, Grade
 from autograder.core.results import CheckResult, SubmissionResult
 from autograder.core.version import VERSION
-from autograder.course.lab import TEXT_STUB
+from autograder.course.cells import TEXT_STUB
 from autograder.report import words
 from autograder.report.audience import reason, result_for
 from autograder.report.html import check_html, render
@@ -152,9 +152,8 @@ def _number(points: float) -> str:
 
 
 def _total(grade: Grade) -> str:
-    earned = max(0.0, sum(cell.points or 0.0 for cell in grade.cells) - grade.penalty)
     so_far = " so far" if grade.waiting else ""
-    return f"{_number(earned)} of {_number(grade.max_score)} points{so_far}"
+    return f"{_number(grade.earned)} of {_number(grade.max_score)} points{so_far}"
 
 
 def _waiting(grade: Grade) -> str:

@@ -55,7 +55,7 @@ def make_ready(dev: bool, wanted: str) -> None:
     else:
         base = base or find_python("")
         version = base.version
-        say("Making .venv%s (once, about a minute)" % (" anew" if VENV.exists() else ""))
+        say("Creating .venv%s (once, about a minute)" % (" again" if VENV.exists() else ""))
         say("  Python %d.%d.%d: %s" % (version[0], version[1], version[2], base.program))
         discard()
         pip = create(base)
@@ -68,11 +68,11 @@ def make_ready(dev: bool, wanted: str) -> None:
 
 def main() -> int:
     """Run the command; return its exit status."""
-    parser = argparse.ArgumentParser(prog="make setup", description="Make .venv from the hashed lock.")
-    parser.add_argument("--dev", action="store_true", help="with what tests and lectures need")
+    parser = argparse.ArgumentParser(prog="make setup", description="Create .venv from the hashed lock.")
+    parser.add_argument("--dev", action="store_true", help="also install what tests and lectures need")
     parser.add_argument("--python", default="", help="the Python to build on, instead of the first good one on PATH")
     options = parser.parse_args()
-    failed = ".venv could not be made"
+    failed = ".venv could not be created"
     try:
         # Two commands in two terminals must not make one environment at once. The checkout itself is the lock.
         fcntl.flock(os.open(str(ROOT), os.O_RDONLY), fcntl.LOCK_EX)
@@ -83,7 +83,7 @@ def main() -> int:
     except SetUpError as error:
         say("\n%s\n\nWhat to do: %s" % (error.what, error.do))
     except OSError as error:
-        say("\n%s: %s\n\nWhat to do: see that the folder is yours and the disk has room." % (failed, error))
+        say("\n%s: %s\n\nWhat to do: make sure that the folder is yours and that the disk has space." % (failed, error))
     except KeyboardInterrupt:
         say("\nInterrupted. The next run starts over.")
     else:

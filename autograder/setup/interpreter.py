@@ -75,7 +75,7 @@ def probe(program: str) -> "Tuple[str, Optional[Interpreter]]":
     if not OLDEST <= version[:2] <= NEWEST:
         return "is Python %d.%d.%d" % version, None
     if answer["build"] != "CPython64":
-        return "is a build of the kind %s, not CPython64" % answer["build"], None
+        return "is a %s build, not CPython64" % answer["build"], None
     if not answer["venv"]:
         return "has no module venv", None
     return "", Interpreter(answer["program"], version, answer["ensurepip"], answer["pip"])
@@ -106,7 +106,7 @@ def find_python(wanted: str) -> Interpreter:
     if without_ensurepip:
         return without_ensurepip
     raise SetUpError(
-        "The kit needs Python %d.%d to %d.%d, and found none:\n  " % (OLDEST + NEWEST)
+        "The kit needs Python %d.%d to %d.%d, but found none:\n  " % (OLDEST + NEWEST)
         + ("\n  ".join(refused) or "no python3 on PATH"),
         "Install one (Debian, Ubuntu: sudo apt-get install python3 python3-venv), or name one:\n"
         "  make grade PYTHON=/path/to/python3.12",

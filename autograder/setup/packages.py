@@ -24,7 +24,7 @@ def pin(lock: str, package: str) -> str:
     text = (ROOT / lock).read_text(encoding="utf-8")
     found = re.search(r"^%s==.*(\n[ \t].*)*" % re.escape(package), text, re.MULTILINE)
     if found is None:
-        raise SetUpError("%s does not pin %s." % (lock, package), "Make the locks anew: make lock")
+        raise SetUpError("%s does not pin %s." % (lock, package), "Make the locks again: make lock")
     return found.group(0) + "\n"
 
 
@@ -66,7 +66,7 @@ def fill(pip: "List[str]", lock: str) -> None:
             "This Python has neither ensurepip nor pip, so packages cannot be installed.",
             "Debian, Ubuntu: sudo apt-get install python3-venv",
         )
-    say("  uv does not manage:\n%s\n  pip does the same in a minute or two" % tail(trouble))
+    say("  uv failed:\n%s\n  pip now does the same, which takes a minute or two" % tail(trouble))
     status, text = output_of(*pip, *PIP_INSTALL, "-r", str(ROOT / lock))
     if status:
         refuse_full_disk(text)
@@ -74,7 +74,7 @@ def fill(pip: "List[str]", lock: str) -> None:
             raise no_network(text)
         raise SetUpError(
             "The packages could not be installed:\n%s" % tail(text),
-            "Look for the reason in these lines, then run it again.",
+            "Look for the reason in these lines, then run the command again.",
         )
 
 
@@ -92,7 +92,7 @@ def install_wheel(pip: "List[str]") -> None:
     if status:
         refuse_full_disk(text)
         raise SetUpError(
-            "The kit itself could not be installed:\n%s" % tail(text), "Unpack the kit anew, and try again."
+            "The kit itself could not be installed:\n%s" % tail(text), "Unpack the kit again, and try again."
         )
 
 

@@ -51,7 +51,7 @@ def refuse_foreign_ros(environ: Mapping[str, str]) -> None:
         unset = " ".join("-u " + name for name in (*ROS_PATHS, "ROS_DISTRO") if name in environ)
         raise SetUpError(
             "Another ROS distribution is sourced in this shell: %s. This course runs on ROS 2 Jazzy." % where,
-            "Open a terminal that does not source it (look for /opt/ros in ~/.bashrc), or run once with\n"
+            "Open a terminal that does not source it (look for /opt/ros in ~/.bashrc), or run the command once with\n"
             "  env %s make ..." % unset,
         )
 
@@ -62,9 +62,9 @@ def refuse_other_machines() -> None:
     if not sys.platform.startswith("linux") or platform.machine() not in ("x86_64", "AMD64"):
         found = "this is %s on %s" % (platform.system(), platform.machine())
     elif library != "glibc":
-        found = "the C library here is not glibc"
+        found = "the C library of this machine is not glibc"
     elif tuple(int(part) for part in version.split(".")[:2]) < (2, 28):
-        found = "here is glibc %s" % version
+        found = "this machine has glibc %s" % version
     else:
         return
     raise SetUpError(
@@ -78,7 +78,7 @@ def refuse_closed_folder(folder: Path) -> None:
     if not os.access(str(folder), os.W_OK):
         raise SetUpError(
             "This user may not write to %s." % folder,
-            "Work in a copy that is yours, or make it yours: sudo chown -R \"$USER\" '%s'" % ROOT,
+            "Work in a copy that belongs to you, or take the folder over: sudo chown -R \"$USER\" '%s'" % ROOT,
         )
 
 
@@ -87,7 +87,7 @@ def refuse_full_disk(text: str) -> None:
     if NO_SPACE.search(text) or shutil.disk_usage(str(ROOT)).free < FULL_DISK:  # venv keeps what ensurepip said
         raise SetUpError(
             "There is no space left:\n%s" % tail(text),
-            "Free 1.5 GB (df -h says where space is lacking), then run it again.",
+            "Free 1.5 GB (df -h shows which disk is full), then run the command again.",
         )
 
 
@@ -95,7 +95,7 @@ def no_network(text: str) -> SetUpError:
     """Return the error for a package index that cannot be reached."""
     return SetUpError(
         "The packages cannot be downloaded: the Python package index does not answer.\n%s" % tail(text),
-        "Connect to the network and run it again. Behind a proxy set HTTPS_PROXY; for a mirror set PIP_INDEX_URL.",
+        "Connect to the network and try again. Behind a proxy, set HTTPS_PROXY; for a mirror, set PIP_INDEX_URL.",
     )
 
 

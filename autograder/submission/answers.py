@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from autograder.course.cell_file import CELL_BYTES
-from autograder.course.lab import Lab, grade_id_of, nbgrader_of, source_of
+from autograder.course.cells import CELL_BYTES, grade_id_of, nbgrader_of, source_of
+from autograder.course.lab import Lab
 from autograder.reasons import Group, Kind
 from autograder.submission.copies import (
     DELETE_COPIES,

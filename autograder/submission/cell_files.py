@@ -6,8 +6,8 @@ from collections.abc import Iterable
 from typing import Any
 
 from autograder.core.results import Outcome
-from autograder.course.cell_file import BadNameError, CellFile, check_free, parse
-from autograder.course.lab import Lab, grade_id_of
+from autograder.course.cells import BadNameError, CellFile, check_free, grade_id_of, parse
+from autograder.course.lab import Lab
 from autograder.reasons import Group, Kind
 from autograder.submission.copies import by_mark, copies_of, named_file
 from autograder.submission.notebook_file import problem

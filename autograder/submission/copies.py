@@ -9,8 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from autograder.course.cell_file import CELL_BYTES, CellFile, parse
-from autograder.course.lab import grade_id_of, nbgrader_of, source_of
+from autograder.course.cells import CELL_BYTES, CellFile, grade_id_of, nbgrader_of, parse, source_of
 
 
 def named_file(cell: dict[str, Any]) -> CellFile | None:

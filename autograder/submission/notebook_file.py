@@ -8,7 +8,7 @@ from typing import Any
 
 from autograder.core.files import read_plain
 from autograder.core.results import Outcome, Status
-from autograder.course.lab import grade_id_of
+from autograder.course.cells import grade_id_of
 from autograder.reasons import Group, Kind, Reason
 
 NO_NOTEBOOK = Kind("no-notebook", "there is no file of the lab's name, or it is empty", Group.NOTEBOOK)

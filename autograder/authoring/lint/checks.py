@@ -12,7 +12,7 @@ from autograder.authoring.lint.finding import Finding
 from autograder.checks.answers import Answers
 from autograder.checks.building import Package
 from autograder.checks.launch import Launch
-from autograder.course.cell_file import parse
+from autograder.course.cells import parse
 from autograder.course.lab import Cell, Lab
 
 _BLOCKS = {"launch": Launch, "launch_file": Launch, "answers": Answers, "build": Package}

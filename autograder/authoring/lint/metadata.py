@@ -8,9 +8,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from autograder.authoring.lint.finding import Finding
-from autograder.course.cell_file import BadNameError, parse
-from autograder.course.lab import grade_id_of, nbgrader_of, source_of
-from autograder.course.markers import MARK
+from autograder.course.cells import MARK, BadNameError, grade_id_of, nbgrader_of, parse, source_of
 
 
 def metadata_findings(cells: list[dict[str, Any]]) -> Iterator[Finding]:

@@ -13,8 +13,8 @@ from autograder.authoring.lint.finding import Finding
 from autograder.authoring.lint.metadata import metadata_findings
 from autograder.core.errors import KitError
 from autograder.course.book import read_book
+from autograder.course.cells import MARK
 from autograder.course.lab import Lab, lab_names, load_lab
-from autograder.course.markers import MARK
 from autograder.course.paths import CoursePaths
 from autograder.course.settings import SETTINGS_FILE, read_settings
 from autograder.grading.known_answers import known_answers, wrong_answers

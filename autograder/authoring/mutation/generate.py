@@ -8,7 +8,8 @@ from collections.abc import Iterator
 from autograder.authoring.mutation.python_rules import changes, swaps
 from autograder.authoring.mutation.source import Mutant, Source
 from autograder.authoring.mutation.text_rules import text_changes, without_a_line
-from autograder.course.lab import Answer, Lab, grade_id_of, source_of
+from autograder.course.cells import grade_id_of, source_of
+from autograder.course.lab import Answer, Lab
 
 
 def mutants(lab: Lab) -> list[Mutant]:

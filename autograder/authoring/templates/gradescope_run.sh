@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Gradescope runs this for each submission, in /autograder.
-# Programs run in the strongest isolation that the container allows. With neither of these there is no result, and
-# Gradescope shows the reason to the instructor; whoever adds `none` lets submissions read and write everything here.
+# Programs run in the strongest isolation that the container allows. If it allows neither of these, there is no result,
+# and Gradescope shows the reason to the instructor. If you add `none`, submissions can read and write everything here.
 ISOLATIONS="full reduced"
 LAB="@LAB@"
 HERE=${AUTOGRADER_FOLDER:-/autograder}
@@ -13,7 +13,7 @@ notebook="$HERE/submission/$LAB.ipynb"
 if [ ! -f "$notebook" ]; then
     mapfile -d '' found < <(find "$HERE/submission" -type f -name '*.ipynb' -not -path '*/.*' -print0)
     if [ "${#found[@]}" -ne 1 ]; then
-        say "Nothing was checked: hand in one notebook, $LAB.ipynb. There are ${#found[@]} notebooks in what you handed in."
+        say "Nothing was checked: hand in one notebook, $LAB.ipynb. Your submission contains ${#found[@]} notebooks."
         exit 0
     fi
     notebook=${found[0]}

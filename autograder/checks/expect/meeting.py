@@ -10,8 +10,9 @@ from rcl_interfaces.srv import ListParameters
 
 from autograder.checks.expect.expectations import Expectations
 from autograder.checks.settling import shows_all
-from autograder.diagnosis.events import Event, NodeSeen, ProbeFailed, read
+from autograder.diagnosis.events import read
 from autograder.graph.services import ServiceMissing, call_all
+from autograder.sandbox.inside.probe.events import Event, NodeSeen, ProbeFailed
 
 _ANSWERS_WITHIN = 3.0
 """Seconds in which a node answers that spins: callbacks of a second may run before it gets to the question."""

@@ -7,7 +7,7 @@ from collections.abc import Callable, Collection, Iterator
 from typing import Any
 
 from autograder.arguments import params_file, remap_rules
-from autograder.arguments.rule_grammar import PARAMETER_VALUE
+from autograder.arguments.remap_rules import PARAMETER_VALUE
 from autograder.checks import runtime
 from autograder.checks.program import Program
 from autograder.checks.running import Running

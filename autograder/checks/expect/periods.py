@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from autograder import diagnosis
 from autograder.checks.expect.concurrency import ConcurrencyExpectations, refuse_names
 from autograder.checks.expect.expectations import WITHIN
+from autograder.checks.misuse import Misuse
 from autograder.reasons import Group, Kind
 
 PERIOD = Kind(
@@ -36,7 +37,7 @@ class PeriodExpectations(ConcurrencyExpectations):
             names: the callbacks.
             period: seconds.
             tolerance: allowed deviation, as a share.
-            runs: gaps between two begins of each; three times as many decide against it.
+            runs: gaps between two begins of each, 3 at least; three times as many decide against it.
             within: seconds until these must have come.
             hint: a pointer for the student.
 
@@ -47,27 +48,21 @@ class PeriodExpectations(ConcurrencyExpectations):
             `period`, and those of `expect_runs`.
         """
         refuse_names(names)
+        if runs < 3:
+            raise Misuse(f"runs={runs}: one callback that begins late would decide about the median of so few gaps.")
         title = f"{', '.join(names)} run{'s' if len(names) == 1 else ', each'} every {period:g} s"
 
-        def wrong(least: int) -> dict[str, list[float]]:
-            gaps = {name: self.concurrency(topic).gaps(name) for name in names}
-            return {
-                name: found
-                for name, found in gaps.items()
-                if len(found) < least or abs(statistics.median(found) - period) > tolerance * period
-            }
-
         def decided() -> bool:
-            off = wrong(runs)
+            off = self._off_period(topic, names, period, tolerance, runs)
             long_off = any(len(gaps) >= 3 * runs for gaps in off.values())
             return not off or long_off or self._starves(topic, names, runs)
 
         self.wait(decided, within)
-        late = wrong(runs)
-        if late and all(len(found) < runs for found in late.values()):
+        late = self._off_period(topic, names, period, tolerance, runs)
+        if late and all(len(gaps) < runs for gaps in late.values()):
             self._wait_for_runs(topic, names, runs + 1, title, 0.0, hint)  # so many gaps lie between one run more
-        told = ", ".join(f"{name} every {statistics.median(found):.2f} s" for name, found in late.items() if found)
-        self._sure_if(all(found and statistics.median(found) < period for found in late.values()))
+        told = ", ".join(f"{name} every {statistics.median(gaps):.2f} s" for name, gaps in late.items() if gaps)
+        self._sure_if(all(gaps and statistics.median(gaps) < period for gaps in late.values()))
         self._expect_that(
             not late,
             title,
@@ -78,3 +73,14 @@ class PeriodExpectations(ConcurrencyExpectations):
             observed=told,
             hint=hint,
         )
+
+    def _off_period(
+        self, topic: str, names: Sequence[str], period: float, tolerance: float, least: int
+    ) -> dict[str, list[float]]:
+        """The gaps between the begins of each callback that has fewer than `least`, or another median."""
+        gaps = {name: self.concurrency(topic).gaps(name) for name in names}
+        return {
+            name: found
+            for name, found in gaps.items()
+            if len(found) < least or abs(statistics.median(found) - period) > tolerance * period
+        }

@@ -8,10 +8,10 @@ from collections.abc import Sequence
 
 from autograder.checks.expect.endpoints import EXTRA_PUBLISHER, EndExpectations
 from autograder.checks.settling import shows_all
-from autograder.diagnosis.events import Thing
 from autograder.diagnosis.names import WRONG_NODE
 from autograder.graph.names import UNKNOWN_NODE, node_of
 from autograder.graph.recording import Received
+from autograder.sandbox.inside.probe.events import Thing
 
 _MADE_WITHIN = 2.0
 """Seconds in which what the programs say they made comes to be on the graph."""

@@ -12,11 +12,11 @@ try:
     # nbgrader looks for modules in the working folder, which may be a student's.
     sys.path[:] = [folder for folder in sys.path if folder not in ("", str(Path.cwd()))]
 
-    from autograder.gradebook.preparation import prepare_nbgrader
+    from autograder.gradebook.own_courses import prepare_nbgrader
 
     prepare_nbgrader()
 
-    from autograder.gradebook.validate import close
+    from autograder.gradebook.nbgrader_commands import close
 
     close()
 except BaseException as error:

@@ -45,7 +45,7 @@ def results_json(full: SubmissionResult, grade: Grade | None = None) -> str:
     if grade is not None and grade.penalty:
         tests.append({"name": "Late submission", "score": round(-grade.penalty, 2), "max_score": 0, "output": ""})
     # A total of its own: of an undecided check Gradescope must not make up a score.
-    total = result.points if grade is None else max(0.0, sum(c.points or 0.0 for c in grade.cells) - grade.penalty)
+    total = result.points if grade is None else grade.earned
     said = [f"{problem.title}: {reason(problem)}" for problem in result.problems]
     undecided = sum("score" not in test for test in tests)
     if undecided:

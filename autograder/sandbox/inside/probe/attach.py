@@ -4,7 +4,7 @@ import atexit
 import importlib
 from typing import Any
 
-from . import own_lines, rclpy_names
+from . import events, own_lines, rclpy_names
 from .watch_actions import watch_actions
 from .watch_calls import watch_blocking, watch_callbacks, watch_threads
 from .watch_executors import watch_executors
@@ -51,8 +51,8 @@ def begin(descriptor: int, folder: str) -> None:
     open_channel(descriptor)
     own_lines.own_files_are_in(folder)
     for what in _failed:
-        emit({"e": "probe_failed", "what": what})
-    emit({"e": "attached"})
+        emit(events.ProbeFailed(what=what))
+    emit(events.Attached())
     with quiet():
         watch_threads()
         atexit.register(ledger.write)
@@ -60,4 +60,4 @@ def begin(descriptor: int, folder: str) -> None:
 
 def note_memory_error() -> None:
     """Say that the program ends for want of memory."""
-    emit({"e": "memory_error"})
+    emit(events.MemoryFailed())

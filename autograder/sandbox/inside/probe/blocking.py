@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-from . import forms
+from . import events
 from .executor import Executor, executor_of
 from .own_lines import own_line
 from .thing import Thing, thing_of
@@ -19,7 +19,7 @@ class Call:
 
     dirty = False
 
-    def __init__(self, what: str, target: int, where: forms.Where, callback: Thing | None) -> None:
+    def __init__(self, what: str, target: int, where: events.Where, callback: Thing | None) -> None:
         """Begin with none; `target` is the number of the thing that is called."""
         self.key = f"call{next(ledger.numbers)}"
         self.what, self.target, self.where, self.callback = what, target, where, callback
@@ -27,21 +27,20 @@ class Call:
         self.since = 0.0
         self.thread = 0
 
-    def event(self) -> forms.Call:
+    def event(self) -> events.Call:
         """Return its line as it is now."""
-        return {
-            "e": "call",
-            "what": self.what,
-            "in_callback": self.callback is not None,
-            "callback": self.callback.number if self.callback else 0,
-            "target": self.target,
-            "begun": self.begun,
-            "ended": self.ended,
-            "vain": self.vain,
-            "since": self.since,
-            "thread": self.thread,
-            **self.where,
-        }
+        return events.Call(
+            what=self.what,
+            in_callback=self.callback is not None,
+            callback=self.callback.number if self.callback else 0,
+            target=self.target,
+            begun=self.begun,
+            ended=self.ended,
+            vain=self.vain,
+            since=self.since,
+            thread=self.thread,
+            **vars(self.where),
+        )
 
     def begin(self) -> None:
         """Note that it begins once more."""
@@ -67,7 +66,7 @@ def _call(what: str, target: Any) -> Call:
     with quiet():
         thing = thing_of(target)
     number = thing.number if thing is not None else 0
-    key = (what, number, where["line"], here.callback.number if here.callback else 0)
+    key = (what, number, where.line, here.callback.number if here.callback else 0)
     if key not in _calls:
         _calls[key] = Call(what, number, where, here.callback)
         ledger.add(_calls[key])

@@ -7,7 +7,7 @@ import weakref
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from . import forms
+from . import events
 from .executor import Executor
 from .own_lines import awaited_line, callback_line, error_line
 from .thing import Thing
@@ -55,15 +55,14 @@ class _OnThread:
             return
         with quiet():
             if type(error).__name__ != "ExternalShutdownException":
-                event: forms.CallbackError = {
-                    "e": "callback_error",
-                    "kind": self.thing.about.get("kind", ""),
-                    "name": self.thing.about.get("name", ""),
-                    "when": time.monotonic(),
-                    "type": type(error).__name__,
-                    "text": str(error),
-                    **error_line(error),
-                }
+                event = events.CallbackError(
+                    kind=self.thing.about.kind,
+                    name=self.thing.about.name,
+                    when=time.monotonic(),
+                    type=type(error).__name__,
+                    text=str(error),
+                    **vars(error_line(error)),
+                )
                 emit(event)
 
 
@@ -93,9 +92,9 @@ class _Steps:
         thing = self.thing
         where, target = awaited_line(self.coroutine)
         client = asked_by.get(target, 0) if target is not None else 0
-        if where["line"] != thing.awaits.get("line"):
-            thing.awaits = {"line": where["line"], "code": where["code"], "client": client, "since": now}
-            thing.awaited = where["line"]
+        if where.line != thing.awaits.line:
+            thing.awaits = events.Awaits(client=client, since=now, **vars(where))
+            thing.awaited = where.line
             ledger.touch(thing)
 
 
@@ -114,10 +113,10 @@ async def await_or_execute(callback: Any, *args: Any) -> Any:
         raised = False
     finally:
         with quiet():
-            thing.awaits = {}
+            thing.awaits = events.Awaits()
             thing.end(run, raised)
     with quiet():
-        _check_return(callback, thing.about.get("kind", ""), args, result)
+        _check_return(callback, thing.about.kind, args, result)
     return result
 
 
@@ -129,7 +128,7 @@ def _of_an_action(callback: Any) -> tuple[Thing, Executor | None]:
     with quiet():
         known = action_callbacks[callback]
         return known.thing, ledger.known.get(getattr(known.node(), "executor", None))
-    return Thing({"kind": ""}), None
+    return Thing(events.ThingMade(kind="")), None
 
 
 def _check_return(callback: Any, kind: str, args: tuple[Any, ...], result: Any) -> None:
@@ -140,26 +139,24 @@ def _check_return(callback: Any, kind: str, args: tuple[Any, ...], result: Any) 
     if isinstance(expected, type) and not isinstance(result, expected):
         _bad_return(kind, callback, result, expected)
     if kind == "execute" and len(args) == 1:
-        name = action_callbacks[callback].thing.about["name"]
+        name = action_callbacks[callback].thing.about.name
         if isinstance(expected, type) and isinstance(result, expected):
             note_misfit("result", name, result, expected)
         if args[0].is_active:
-            left: forms.GoalLeft = {"e": "goal_left", "name": name, **callback_line(callback)}
-            emit_once(left)
+            emit_once(events.GoalLeft(name=name, **vars(callback_line(callback))))
 
 
 def _bad_return(kind: str, callback: Any, result: Any, expected: type) -> None:
     text = f"{type(result).__name__} instead of {expected.__name__}".replace("NoneType", "None")
-    event: forms.BadReturn = {"e": "bad_return", "kind": kind, "text": text, **callback_line(callback)}
-    emit_once(event)
+    emit_once(events.BadReturn(kind=kind, text=text, **vars(callback_line(callback))))
 
 
 def noted(kind: str, callback: Callable[..., Any], node: str, expected: type | None) -> Callable[..., Any]:
     """The callback with notes; `expected` is the type that it must return."""
     where = callback_line(callback)
-    key = (kind, node, where["line"])
+    key = (kind, node, where.line)
     if key not in _by_line:
-        _by_line[key] = Thing({"kind": kind, "node": node, "line": where["line"], "code": where["code"]})
+        _by_line[key] = Thing(events.ThingMade(kind=kind, node=node, **vars(where)))
         ledger.add(_by_line[key])
     thing = _by_line[key]
 

@@ -5,7 +5,7 @@ import time
 import weakref
 from typing import Any
 
-from . import forms, rclpy_names
+from . import events, rclpy_names
 from .writing import ledger
 
 _MOST = 8
@@ -25,22 +25,21 @@ class Executor:
         self.threads_given: bool | None = None
         self.spins = self.spinning = self.main = self.busy = self.most = 0
 
-    def event(self) -> forms.Executor:
+    def event(self) -> events.ExecutorSeen:
         """Return its line as it is now."""
         executor = self.executor()
-        return {
-            "e": "executor",
-            "id": self.number,
-            "type": type(executor).__name__ if executor is not None else "",
-            "threads": rclpy_names.thread_count(executor),
-            "threads_given": self.threads_given,
-            "nodes": sorted(ledger.known[node].name for node in self._nodes() if node in ledger.known),
-            "spins": self.spins,
-            "spinning": self.spinning > 0,
-            "main": self.main > 0,
-            "busy": self.busy,
-            "most": self.most,
-        }
+        return events.ExecutorSeen(
+            id=self.number,
+            type=type(executor).__name__ if executor is not None else "",
+            threads=rclpy_names.thread_count(executor),
+            threads_given=self.threads_given,
+            nodes=sorted(ledger.known[node].name for node in self._nodes() if node in ledger.known),
+            spins=self.spins,
+            spinning=self.spinning > 0,
+            main=self.main > 0,
+            busy=self.busy,
+            most=self.most,
+        )
 
     def step(self, change: int) -> None:
         """Note that a callback came onto a thread of it (1), or left it (-1)."""

@@ -6,7 +6,7 @@ import os
 import sys
 from typing import Any
 
-from .forms import Where
+from .events import Where
 
 
 class _Own:
@@ -40,10 +40,8 @@ def error_line(error: BaseException) -> Where:
     if not passed:
         return nowhere()
     found = _line(*passed[-1])
-    callers = [_line(*one)["line"] for one in passed if one[0] != passed[-1][0]]
-    if callers:
-        found["line"] += f", called in {callers[-1]}"
-    return found
+    callers = [_line(*one).line for one in passed if one[0] != passed[-1][0]]
+    return Where(line=f"{found.line}, called in {callers[-1]}", code=found.code) if callers else found
 
 
 def callback_line(callback: Any) -> Where:
@@ -72,8 +70,8 @@ def awaited_line(coroutine: Any) -> tuple[Where, Any]:
 
 def nowhere() -> Where:
     """No line of the student's."""
-    return {"line": "", "code": ""}
+    return Where()
 
 
 def _line(path: str, number: int) -> Where:
-    return {"line": f"{os.path.basename(path)}:{number}", "code": linecache.getline(path, number).strip()}
+    return Where(line=f"{os.path.basename(path)}:{number}", code=linecache.getline(path, number).strip())

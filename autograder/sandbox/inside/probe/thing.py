@@ -1,10 +1,11 @@
 """The record of a thing whose callback an executor runs, or from which messages or requests are sent."""
 
 import _thread
+import dataclasses
 import time
 from typing import Any
 
-from . import forms
+from . import events
 from .writing import ledger, quiet
 
 
@@ -13,7 +14,7 @@ class Thing:
 
     dirty = False
 
-    def __init__(self, about: forms.ThingMade) -> None:
+    def __init__(self, about: events.ThingMade) -> None:
         """Begin with no run; `about` may change."""
         self.number = next(ledger.numbers)
         self.key = f"thing{self.number}"
@@ -23,27 +24,26 @@ class Thing:
         self.running: dict[int, tuple[float, int]] = {}
         """Run -> since when, and on which thread it began."""
         self.threads: set[int] = set()
-        self.awaits: forms.Awaits = {}
+        self.awaits = events.Awaits()
         self.awaited = ""
         self.spent = 0.0
 
-    def event(self) -> forms.Thing:
+    def event(self) -> events.Thing:
         """Return its line as it is now."""
-        return {
-            "e": "thing",
-            "id": self.number,
-            **self.about,
-            "runs": self.runs,
-            "done": self.done,
-            "raised": self.raised,
-            "most": self.most,
-            "last": self.last,
-            "running": list(self.running.values())[:16],
-            "threads": len(self.threads),
-            "awaits": self.awaits,
-            "awaited": self.awaited,
-            "spent": self.spent,
-        }
+        return events.Thing(
+            id=self.number,
+            **vars(self.about),
+            runs=self.runs,
+            done=self.done,
+            raised=self.raised,
+            most=self.most,
+            last=self.last,
+            running=list(self.running.values())[:16],
+            threads=len(self.threads),
+            awaits=self.awaits,
+            awaited=self.awaited,
+            spent=self.spent,
+        )
 
     def begin(self) -> int:
         """Note that a run of it begins; return its number."""
@@ -79,7 +79,7 @@ class Thing:
 
     def note(self, **changes: Any) -> None:
         """Change what is known about it."""
-        self.about |= changes  # type: ignore[typeddict-item]
+        self.about = dataclasses.replace(self.about, **changes)
         ledger.touch(self)
 
 
@@ -87,6 +87,17 @@ def thing_of(entity: Any) -> Thing | None:
     """Return the record of an object of rclpy, if it is a thing and is known."""
     found = ledger.known.get(entity)
     return found if isinstance(found, Thing) else None
+
+
+def group_of(group: Any, node: Any) -> dict[str, Any]:
+    """Return what a thing's record says of its callback group, as fields of `ThingMade`."""
+    if group is None:
+        return {}
+    return {
+        "group": type(group).__name__,
+        "group_id": id(group),
+        "default_group": group is node.default_callback_group,
+    }
 
 
 def node_name(node: Any) -> str:

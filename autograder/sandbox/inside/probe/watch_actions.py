@@ -4,10 +4,10 @@ import functools
 import weakref
 from typing import Any
 
-from . import forms, rclpy_names
+from . import events, rclpy_names
 from .callbacks import ActionCallback, action_callbacks
 from .own_lines import callback_line, own_line
-from .thing import Thing, node_name, thing_of
+from .thing import Thing, group_of, node_name, thing_of
 from .watch_messages import note_misfit
 from .wrapping import wrap
 from .writing import ledger, quiet
@@ -25,13 +25,13 @@ def watch_actions(rclpy: Any) -> None:
 
     def made(_: None, server: Any, node: Any, action_type: Any, *args: Any, **kwargs: Any) -> None:
         given = kwargs.get("action_name", args[0] if args else "")
-        about: forms.ThingMade = {
-            "kind": "action_server",
-            "name": _full_name(node, given),
-            "given": given if isinstance(given, str) else "",
-            "node": node_name(node),
-            "made": own_line()["line"],
-        }
+        about = events.ThingMade(
+            kind="action_server",
+            name=_full_name(node, given),
+            given=given if isinstance(given, str) else "",
+            node=node_name(node),
+            made=own_line().line,
+        )
         ledger.add(Thing(about), server)
         returned = (action_type.Result, rclpy.action.GoalResponse, rclpy.action.CancelResponse, None)
         callbacks = rclpy_names.action_callbacks(server)
@@ -57,14 +57,14 @@ def watch_actions(rclpy: Any) -> None:
             publish(self, feedback)
         except Exception:
             with quiet():
-                name = thing.about["name"] if thing is not None else ""
+                name = thing.about.name if thing is not None else ""
                 note_misfit("feedback", name, feedback, server.action_type.Feedback)
             raise
         if thing is not None:
             thing.count()
             if thing.runs <= _LOOKED_AT:  # a number of the wrong type is sent as another one, without an error
                 with quiet():
-                    note_misfit("feedback", thing.about["name"], feedback, server.action_type.Feedback)
+                    note_misfit("feedback", thing.about.name, feedback, server.action_type.Feedback)
 
     goal_class.publish_feedback = publish_noted
 
@@ -77,18 +77,15 @@ def _full_name(node: Any, given: Any) -> str:
 
 
 def _add(kind: str, callback: Any, expected: type | None, server: Any, node: Any) -> None:
-    where, group = callback_line(callback), server.callback_group
     server_thing = thing_of(server)
-    about: forms.ThingMade = {
-        "kind": kind,
-        "name": server_thing.about["name"] if server_thing is not None else "",
-        "node": node_name(node),
-        "line": where["line"],
-        "code": where["code"],
-    }
-    if kind != "execute":  # rclpy runs that as a task, outside of any group
-        about |= {"group": type(group).__name__, "group_id": id(group)}
-        about["default_group"] = group is node.default_callback_group
+    about = events.ThingMade(
+        **vars(callback_line(callback)),
+        kind=kind,
+        name=server_thing.about.name if server_thing is not None else "",
+        node=node_name(node),
+        # rclpy runs `execute` as a task, outside of any group.
+        **(group_of(server.callback_group, node) if kind != "execute" else {}),
+    )
     thing = Thing(about)
     ledger.add(thing)
     action_callbacks[callback] = ActionCallback(thing, expected, weakref.ref(node))

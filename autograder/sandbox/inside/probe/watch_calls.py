@@ -5,7 +5,7 @@ import inspect
 import threading
 from typing import Any
 
-from . import forms, rclpy_names
+from . import events, rclpy_names
 from .blocking import wrap_blocking
 from .callbacks import asked_by, await_or_execute, noted
 from .own_lines import callback_line, error_line
@@ -45,7 +45,7 @@ def watch_callbacks(rclpy: Any) -> None:
     @functools.wraps(create_task)
     def create_noted(self: Any, callback: Any, *args: Any, **kwargs: Any) -> Any:
         with quiet():
-            if callback_line(callback)["line"] and not inspect.iscoroutinefunction(callback):
+            if callback_line(callback).line and not inspect.iscoroutinefunction(callback):
                 callback = noted("task", callback, "", None)
         return create_task(self, callback, *args, **kwargs)
 
@@ -60,12 +60,11 @@ def watch_threads() -> None:
         with quiet():
             if args.exc_value is not None and type(args.exc_value).__name__ != "ExternalShutdownException":
                 error = args.exc_value
-                event: forms.ThreadError = {
-                    "e": "thread_error",
-                    "type": type(error).__name__,
-                    "text": str(error),
-                    **error_line(error),
-                }
+                event = events.ThreadError(
+                    type=type(error).__name__,
+                    text=str(error),
+                    **vars(error_line(error)),
+                )
                 emit(event)
         before(args)
 

@@ -4,7 +4,7 @@ import functools
 import weakref
 from typing import Any
 
-from . import forms, rclpy_names
+from . import events, rclpy_names
 from .callbacks import noted
 from .own_lines import own_line
 from .thing import node_name
@@ -32,12 +32,11 @@ def watch_lifecycle(rclpy: Any) -> None:
     def note_off(publisher: Any, *_args: Any, **_kwargs: Any) -> None:
         if not publisher.is_activated:
             node = owners.get(publisher)
-            event: forms.LifecyclePublishOff = {
-                "e": "lifecycle_publish_off",
-                "name": publisher.topic_name,
-                "state": rclpy_names.lifecycle_state(node) if node is not None else "",
-                **own_line(),
-            }
+            event = events.LifecyclePublishOff(
+                name=publisher.topic_name,
+                state=rclpy_names.lifecycle_state(node) if node is not None else "",
+                **vars(own_line()),
+            )
             emit_once(event)
 
     wrap(mixin, "create_lifecycle_publisher", after=made)

@@ -3,7 +3,7 @@
 import functools
 from typing import Any
 
-from . import forms
+from . import events
 from .own_lines import own_line
 from .thing import thing_of
 from .writing import emit_once, quiet
@@ -63,16 +63,15 @@ def note_misfit(kind: str, name: str, message: Any, expected: type) -> None:
         found = ("", f"{expected.__module__.split('.')[0]} {expected.__name__}", message)
     if found is not None:
         field, wanted, value = found
-        event: forms.BadMessage = {
-            "e": "bad_message",
-            "kind": kind,
-            "name": name,
-            "field": field,
-            "expected": wanted,
-            "given": type(value).__name__,
-            "value": repr(value)[:80],
-            **own_line(),
-        }
+        event = events.BadMessage(
+            kind=kind,
+            name=name,
+            field=field,
+            expected=wanted,
+            given=type(value).__name__,
+            value=repr(value)[:80],
+            **vars(own_line()),
+        )
         emit_once(event)
 
 

@@ -6,9 +6,9 @@ import weakref
 from collections.abc import Callable
 from typing import Any
 
-from . import forms, rclpy_names
+from . import events, rclpy_names
 from .own_lines import callback_line, own_line
-from .thing import Thing, node_name, thing_of
+from .thing import Thing, group_of, node_name, thing_of
 from .thread_state import here
 from .wrapping import wrap
 from .writing import ledger, quiet
@@ -28,17 +28,16 @@ class Node:
         self.spun = 0.0
         self.destroyed = False
 
-    def event(self) -> forms.Node:
+    def event(self) -> events.NodeSeen:
         """Return its line as it is now."""
         executor = getattr(self.node(), "executor", None)
-        return {
-            "e": "node",
-            "name": self.name,
-            "made": self.made,
-            "spun": self.spun,
-            "destroyed": self.destroyed,
-            "foreign": executor is not None and executor not in ledger.known,
-        }
+        return events.NodeSeen(
+            name=self.name,
+            made=self.made,
+            spun=self.spun,
+            destroyed=self.destroyed,
+            foreign=executor is not None and executor not in ledger.known,
+        )
 
 
 def watch_nodes(rclpy: Any) -> None:
@@ -109,27 +108,19 @@ def _thing_made(kind: str, name_of: Callable[[Any, Any], str]) -> Callable[..., 
         group = getattr(entity, "callback_group", None)
         if here.building or rclpy_names.is_of_a_rate(group, node):
             return
-        where = callback_line(getattr(entity, "callback", None))
-        about: forms.ThingMade = {
-            "kind": kind,
-            "name": "",
-            "given": "",
-            "node": node_name(node),
-            "made": own_line()["line"],
-            "line": where["line"],
-            "code": where["code"],
-        }
+        name, given = "", kwargs.get(given_as, args[1] if len(args) > 1 else "")
         with quiet():
-            about["name"] = name_of(entity, node)
-        if kind != "timer":
-            given = kwargs.get(given_as, args[1] if len(args) > 1 else "")
-            about["given"] = given if isinstance(given, str) else ""
-        if group is not None and kind != "publisher":
-            about["group"] = type(group).__name__
-            about["group_id"] = id(group)
-            about["default_group"] = group is node.default_callback_group
-        if kind == "timer":
-            about["period"] = entity.timer_period_ns / 1e9
+            name = name_of(entity, node)
+        about = events.ThingMade(
+            **vars(callback_line(getattr(entity, "callback", None))),
+            kind=kind,
+            name=name,
+            given=given if isinstance(given, str) and kind != "timer" else "",
+            node=node_name(node),
+            made=own_line().line,
+            period=entity.timer_period_ns / 1e9 if kind == "timer" else 0.0,
+            **(group_of(group, node) if kind != "publisher" else {}),
+        )
         ledger.add(Thing(about), entity)
 
     return note

@@ -4,7 +4,7 @@ import functools
 import time
 from typing import Any
 
-from . import forms, rclpy_names
+from . import events, rclpy_names
 from .callbacks import noted
 from .thing import node_name
 from .thread_state import here
@@ -25,18 +25,17 @@ class Parameter:
         self.gets = self.sets = 0
         self.last_get = self.last_set = 0.0
 
-    def event(self) -> forms.Parameter:
+    def event(self) -> events.ParameterSeen:
         """Return its line as it is now."""
-        return {
-            "e": "parameter",
-            "node": self.node,
-            "name": self.name,
-            "declared": self.declared,
-            "gets": self.gets,
-            "sets": self.sets,
-            "last_get": self.last_get,
-            "last_set": self.last_set,
-        }
+        return events.ParameterSeen(
+            node=self.node,
+            name=self.name,
+            declared=self.declared,
+            gets=self.gets,
+            sets=self.sets,
+            last_get=self.last_get,
+            last_set=self.last_set,
+        )
 
 
 _known: dict[tuple[int, str], Parameter] = {}

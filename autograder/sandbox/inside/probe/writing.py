@@ -9,10 +9,9 @@ import os
 import threading
 import time
 import weakref
-from collections.abc import Mapping
 from typing import Any, Protocol
 
-from . import forms
+from . import events
 
 _MOST = 500
 """Events of one program; what it repeats is noted once. Records of things: no more either."""
@@ -45,9 +44,13 @@ class _Channel:
 _channel = _Channel()
 
 
-def _line_of(note: Mapping[str, Any]) -> bytes:
+_encoder = json.JSONEncoder(default=vars)
+
+
+def _line_of(event: events.Event, **more: str) -> bytes:
+    note = {**more, **vars(event)}
     short = {key: value[:500] if isinstance(value, str) else value for key, value in note.items()}
-    return json.dumps(short).encode()[: _WHOLE - 1] + b"\n"
+    return _encoder.encode(short).encode()[: _WHOLE - 1] + b"\n"
 
 
 def open_channel(descriptor: int) -> None:
@@ -55,7 +58,7 @@ def open_channel(descriptor: int) -> None:
     _channel.descriptor = descriptor
 
 
-def emit(event: forms.Event) -> None:
+def emit(event: events.Event) -> None:
     """Write one event, or drop it: a full pipe must not hold up the program."""
     if _channel.descriptor < 0 or _channel.left <= 0:
         return
@@ -64,9 +67,9 @@ def emit(event: forms.Event) -> None:
         os.write(_channel.descriptor, _line_of(event))
 
 
-def emit_once(event: forms.Event) -> None:
+def emit_once(event: events.Event) -> None:
     """Write an event unless the same was written before."""
-    key = tuple(str(value) for value in event.values())
+    key = tuple(str(value) for value in vars(event).values())
     if key not in _channel.once:
         _channel.once.add(key)
         emit(event)
@@ -78,7 +81,7 @@ class Record(Protocol):
     key: str
     dirty: bool
 
-    def event(self) -> forms.Record:
+    def event(self) -> events.Record:
         """Return its line as it is now."""
 
 
@@ -112,7 +115,7 @@ class Ledger:
                 self.known[of] = record
             # At once: what the graph shows of a thing must find it known here.
             try:
-                os.write(_channel.descriptor, _line_of({"key": record.key, **record.event()}))
+                os.write(_channel.descriptor, _line_of(record.event(), key=record.key))
             except OSError:
                 self.touch(record)
 
@@ -152,7 +155,7 @@ class Ledger:
         for record in changed.values():
             with quiet():
                 record.dirty = False  # before it is read: what changes from here on is written the next time
-                line = _line_of({"key": record.key, **record.event()})
+                line = _line_of(record.event(), key=record.key)
                 if len(piece) + len(line) > _WHOLE:
                     os.write(_channel.descriptor, piece)
                     piece = b""
@@ -161,7 +164,7 @@ class Ledger:
             with quiet():
                 os.write(_channel.descriptor, piece)
         for first in range(0, len(ran), _RUNS_OF_A_LINE):
-            event: forms.Ran = {"e": "ran", "runs": ran[first : first + _RUNS_OF_A_LINE]}
+            event = events.Ran(runs=ran[first : first + _RUNS_OF_A_LINE])
             with quiet():
                 os.write(_channel.descriptor, _line_of(event))
 

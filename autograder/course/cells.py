@@ -1,13 +1,38 @@
-"""The first line of an answer cell says which file the rest of the cell is: `%%node talker`, `%%file camera.yaml`."""
+"""What one cell of a lab says: its source, its grade_id, the file it names, and what students do not see of it.
+
+The first line of an answer cell may say which file the rest of the cell is: `%%node talker`, `%%file camera.yaml`. What
+students do not receive stands between `BEGIN …` and `END …`, as in nbgrader.
+"""
 
 from __future__ import annotations
 
+import hashlib
 import re
 import sys
 import sysconfig
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib.machinery import PathFinder
+from typing import Any
+
+from autograder.core.results import encodable
+
+CODE_STUB = "# YOUR CODE HERE"
+"""What students find in place of a solution: a comment in Python and in YAML."""
+TEXT_STUB = "YOUR ANSWER HERE"
+
+_HEADING = re.compile(r"^(#{1,6})\s+(.*?)\s*#*\s*$", re.MULTILINE)
+_FENCED = re.compile(r"^(```|~~~).*?^\1[`~]*$", re.MULTILINE | re.DOTALL)
+"""Code, in which such a line is a comment."""
+
+MORE_AT_GRADING = "# More is checked here when the lab is graded."
+"""The line that stands in a released check cell where hidden tests were taken out."""
+
+MARK = re.compile(r"\b(BEGIN|END) (SOLUTION|HIDDEN TESTS|MARK SCHEME)\b")
+"""Each of the marks: which end of a region, and of which."""
+
+_HIDDEN = "HIDDEN TESTS"
 
 CELL_BYTES = 64 * 1024
 """The largest answer cell that is read, in bytes of UTF-8."""
@@ -19,6 +44,56 @@ _NODE_NAME = re.compile(r"[a-z][a-z0-9_]{0,63}")
 _FILE_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}(\.[A-Za-z0-9_-]{1,32})*\.(yaml|yml|json|csv)")
 _PACKAGE_FILE = re.compile(r"src(/[A-Za-z0-9_][A-Za-z0-9_.-]{0,63}){2,5}")
 """A file of a ROS package, in the place that it has in a colcon workspace."""
+
+
+def nbgrader_of(cell: dict[str, Any]) -> dict[str, Any]:
+    """Return a cell's nbgrader metadata; empty if it has none, or something else in its place."""
+    metadata = cell.get("metadata")
+    nbgrader = metadata.get("nbgrader") if isinstance(metadata, dict) else None
+    return nbgrader if isinstance(nbgrader, dict) else {}
+
+
+def grade_id_of(cell: dict[str, Any]) -> str:
+    """Return a cell's grade_id; empty if it has none."""
+    grade_id = nbgrader_of(cell).get("grade_id")
+    return encodable(grade_id) if isinstance(grade_id, str) else ""
+
+
+def cell_digest(source: str) -> str:
+    """Return what tells one text of a cell from another; blanks at the ends of lines and of the cell do not count."""
+    lines = [line.rstrip() for line in source.replace("\r\n", "\n").strip().split("\n")]
+    return hashlib.sha256("\n".join(lines).encode("utf-8", "replace")).hexdigest()[:16]
+
+
+def blank_mark(source: str) -> dict[str, str]:
+    """Return metadata for an answer cell, below `autograder`, by which a notebook knows that it is still untouched."""
+    return {"blank": cell_digest(source)}
+
+
+def blank_mark_of(cell: dict[str, Any]) -> str:
+    """Return the digest in a cell's `blank_mark`; empty if it has none."""
+    metadata = cell.get("metadata")
+    mark = metadata.get("autograder") if isinstance(metadata, dict) else None
+    return str(mark.get("blank", "")) if isinstance(mark, dict) else ""
+
+
+def source_of(cell: dict[str, Any]) -> str:
+    """Return a cell's source as one string that can be encoded; notebooks hold it as a string or as lines.
+
+    Raises:
+        ValueError: it is neither.
+    """
+    source = cell.get("source", "")
+    if isinstance(source, list) and all(isinstance(line, str) for line in source):
+        source = "".join(source)
+    if not isinstance(source, str):
+        raise ValueError("a cell's source is neither text nor lines of text")
+    return encodable(source).replace("\r\n", "\n").replace("\r", "\n")
+
+
+def headings(markdown: str) -> list[tuple[int, str]]:
+    """Return the headings in a cell's text, each with its level, from 1."""
+    return [(len(marks), text) for marks, text in _HEADING.findall(_FENCED.sub("", markdown))]
 
 
 class BadNameError(ValueError):
@@ -107,3 +182,34 @@ def parse(source: str) -> CellFile | None:
     first = [f"# %%{magic} {name}"] if magic == "node" or name.endswith(".py") else []
     text = "\n".join([""] * above + first + lines[above + 1 :])
     return CellFile(magic, name, text if text.endswith("\n") or not text else text + "\n")
+
+
+def without_region(source: str, mark: str, stub: str | None = None) -> str:
+    """Drop the lines between `BEGIN mark` and `END mark`, or put a stub in their place, as nbgrader does."""
+    lines: list[str] = []
+    inside = False
+    for line in source.split("\n"):
+        if f"BEGIN {mark}" in line:
+            inside = True
+            if stub is not None:
+                lines.append(re.match(r"\s*", line).group() + stub)  # type: ignore[union-attr]
+        elif f"END {mark}" in line:
+            inside = False
+        elif not inside:
+            lines.append(line)
+    return "\n".join(lines)
+
+
+def without_hidden_tests(source: str) -> str:
+    """Return a check cell as students receive it: a line says where more is checked at grading."""
+    return without_region(source, _HIDDEN, MORE_AT_GRADING)
+
+
+def hidden_lines(lines: Sequence[str]) -> set[int]:
+    """Return the numbers of the lines that are hidden from students, counted from 1."""
+    hidden, inside = set(), False
+    for number, line in enumerate(lines, start=1):
+        inside = (inside or f"BEGIN {_HIDDEN}" in line) and f"END {_HIDDEN}" not in line
+        if inside:
+            hidden.add(number)
+    return hidden

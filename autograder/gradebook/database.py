@@ -1,4 +1,4 @@
-"""Has a gradebook that can be written and has the form of this nbgrader's, whether it is new or an older one's."""
+"""The gradebook's database: it can be written, and has the form of this nbgrader, whether it is new or an older one."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from pathlib import Path
 from autograder.core.errors import KitError
 from autograder.course.paths import CoursePaths
 from autograder.gradebook.backup import BACKUPS, back_up
-from autograder.gradebook.preparation import prepare_nbgrader
+from autograder.gradebook.own_courses import prepare_nbgrader
 from autograder.gradebook.settings import gradebook_address, gradebook_file, gradebook_place
 
 
-def make_room(root: Path) -> None:
+def make_folder(root: Path) -> None:
     """Make the folder of a course's gradebook; one from where earlier versions kept it moves there.
 
     Raises:
@@ -35,7 +35,7 @@ def make_usable(root: Path) -> None:
         KitError: it is damaged, or cannot be brought to that form.
         OSError, sqlite3.OperationalError: it cannot be written.
     """
-    make_room(root)
+    make_folder(root)
     with damage_told(root):
         _refuse_unwritable(root)
         _create(root)

@@ -1,0 +1,280 @@
+"""What a program's probe writes: one class for each kind of line. The diagnosis reads the lines into the same classes.
+
+Times are seconds of the system's monotonic clock, which is the same in every process of a machine. Fields that have a
+default may be missing in a line: a program can forge its lines.
+"""
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+_NOTICED = 0.05
+"""If one run of a callback takes this many seconds, whatever waits for its end notices it."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Where:
+    """A line of the student's own files."""
+
+    line: str = ""
+    """For example `talker.py:12`; empty if none of the student's lines is involved."""
+    code: str = ""
+    """The source code of this line."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Attached:
+    """The probe works."""
+
+    e: Literal["attached"] = "attached"
+
+
+@dataclass(frozen=True, kw_only=True)
+class ProbeFailed:
+    """A part of rclpy cannot be watched, so nothing may be concluded from what the other events do not say."""
+
+    e: Literal["probe_failed"] = "probe_failed"
+    what: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class MemoryFailed:
+    """The program ends because it ran out of memory; `sandbox/running_program.py` reads this event."""
+
+    e: Literal["memory_error"] = "memory_error"
+
+
+@dataclass(frozen=True, kw_only=True)
+class CallbackError(Where):
+    """An exception left a callback."""
+
+    e: Literal["callback_error"] = "callback_error"
+    kind: str = ""
+    name: str = ""
+    """Full name of the topic or service, if it has one."""
+    when: float = 0.0
+    type: str
+    text: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ThreadError(Where):
+    """An exception ended a thread that the program started itself."""
+
+    e: Literal["thread_error"] = "thread_error"
+    type: str
+    text: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class BadReturn(Where):
+    """A callback returned something of the wrong type."""
+
+    e: Literal["bad_return"] = "bad_return"
+    kind: str
+    text: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class BadMessage(Where):
+    """A message, request or response could not be sent because the value of a field has the wrong type."""
+
+    e: Literal["bad_message"] = "bad_message"
+    kind: str
+    name: str
+    field: str
+    """Empty if the whole message has the wrong type."""
+    expected: str
+    given: str
+    value: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class LifecyclePublishOff(Where):
+    """A lifecycle publisher dropped a message because it is not activated."""
+
+    e: Literal["lifecycle_publish_off"] = "lifecycle_publish_off"
+    name: str
+    state: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ran:
+    """Runs of callbacks, and messages sent. Only the first ones of a program are written."""
+
+    e: Literal["ran"] = "ran"
+    runs: list[tuple[int, float, float, int]]
+    """Number of the thing, begin, end, and thread; a message begins and ends at the same time."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class GoalLeft(Where):
+    """An execute callback has returned, and its goal has neither succeeded nor been aborted or canceled."""
+
+    e: Literal["goal_left"] = "goal_left"
+    name: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Awaits(Where):
+    """The line where a coroutine callback waits; empty if it does not wait."""
+
+    client: int = 0
+    """The client whose answer it awaits, if it awaits one."""
+    since: float = 0.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class ThingMade(Where):
+    """What is known of a thing when it is made; `line` is where its callback begins."""
+
+    kind: str
+    name: str = ""
+    """Full name on the graph."""
+    given: str = ""
+    """The name in the code, before namespace and remap rules are applied."""
+    node: str = ""
+    made: str = ""
+    """The line that made it."""
+    group: str = ""
+    group_id: int = 0
+    default_group: bool = False
+    period: float = 0.0
+    cancelled: bool = False
+    destroyed: bool = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class Thing(ThingMade):
+    """A timer, subscription, service, client, publisher or action server, or a callback of another kind."""
+
+    e: Literal["thing"] = "thing"
+    id: int
+    runs: int = 0
+    """How often its callback began; of a publisher: messages, of a client: requests, of an action server: feedback."""
+    done: int = 0
+    """How often its callback ended; of a client: answers taken."""
+    raised: int = 0
+    most: int = 0
+    """The largest number of its runs that were under way at once."""
+    last: float = 0.0
+    """When it last began."""
+    spent: float = 0.0
+    """Seconds that its complete runs took together."""
+    running: list[tuple[float, int]] = field(default_factory=list)
+    """The runs that are under way: since when, and on which thread."""
+    threads: int = 0
+    """On how many threads it ran; of a publisher: from how many threads it was used."""
+    awaits: Awaits = Awaits()
+    awaited: str = ""
+    """The line where a run of it last awaited."""
+
+    @property
+    def exclusive(self) -> bool:
+        """Whether it is in a mutually exclusive group."""
+        return self.group == "MutuallyExclusiveCallbackGroup"
+
+    @property
+    def has_callback(self) -> bool:
+        """Whether an executor runs a callback of the student's for it."""
+        return self.kind in ("timer", "subscription", "service")
+
+    @property
+    def takes_time(self) -> bool:
+        """Whether its runs last so long that whatever waits for their end notices it."""
+        return bool(self.running) or self.spent > _NOTICED * self.done
+
+
+@dataclass(frozen=True, kw_only=True)
+class Call(Where):
+    """A call that may block, from one line."""
+
+    e: Literal["call"] = "call"
+    what: str
+    """client.call, wait_for_service, action_client.send_goal, rate.sleep, spin or shutdown."""
+    in_callback: bool
+    callback: int = 0
+    target: int = 0
+    begun: int
+    ended: int
+    vain: int = 0
+    """How often it spun until a future was done, and came back before that."""
+    since: float = 0.0
+    """When it last began."""
+    thread: int = 0
+
+    @property
+    def blocks(self) -> bool:
+        """Whether it has not come back."""
+        return self.begun > self.ended
+
+
+@dataclass(frozen=True, kw_only=True)
+class ExecutorSeen:
+    """An executor."""
+
+    e: Literal["executor"] = "executor"
+    id: int
+    type: str = ""
+    threads: int | None = None
+    """Of a multi-threaded one."""
+    threads_given: bool | None = None
+    nodes: list[str] = field(default_factory=list)
+    spins: int = 0
+    spinning: bool = False
+    main: bool = False
+    """The program's main thread is in its `spin`, which goes on until the end."""
+    busy: int = 0
+    """How many callbacks are on its threads now."""
+    most: int = 0
+    """The largest number of callbacks that were on its threads at once."""
+
+    @property
+    def size(self) -> int:
+        """How many callbacks it can run at once."""
+        return self.threads or 1
+
+
+@dataclass(frozen=True, kw_only=True)
+class NodeSeen:
+    """A node, from the end of `Node.__init__` on."""
+
+    e: Literal["node"] = "node"
+    name: str
+    made: float = 0.0
+    spun: float = 0.0
+    """When it was last seen in an executor that was spinning; 0: never."""
+    destroyed: bool = False
+    foreign: bool = False
+    """It is in an executor that the probe does not watch."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ParameterSeen:
+    """A parameter of a node."""
+
+    e: Literal["parameter"] = "parameter"
+    node: str
+    name: str
+    declared: bool = False
+    gets: int = 0
+    sets: int = 0
+    last_get: float = 0.0
+    last_set: float = 0.0
+
+
+Record = Thing | Call | ExecutorSeen | NodeSeen | ParameterSeen
+"""What is known of a thing so far: written again whenever it has changed."""
+
+Event = (
+    Attached
+    | ProbeFailed
+    | MemoryFailed
+    | CallbackError
+    | ThreadError
+    | BadReturn
+    | BadMessage
+    | LifecyclePublishOff
+    | Ran
+    | GoalLeft
+    | Record
+)
