@@ -184,7 +184,7 @@ def differences(lab: Lab, student: str, result: SubmissionResult) -> list[str]:
 
 def was_too_busy(check: CheckResult) -> bool:
     """Whether this machine had too little time for a check, which then says nothing."""
-    return any(outcome.code == TOO_BUSY for outcome in check.outcomes)
+    return any(outcome.code == TOO_BUSY.code for outcome in check.outcomes)
 
 
 def skip_if_too_busy(result: SubmissionResult) -> None:

@@ -57,7 +57,7 @@ def test_a_check_in_which_the_grader_is_made_stuck_costs_no_other_and_is_flagged
     before, check, after = run_in_worker(job(name, SET_UP + SCORES, SOON_STUCK + GOOD, check_of(name), GOOD)).checks
     assert (before.points, after.points) == (1, 1)
     assert check.status is Status.UNKNOWN and check.points is None and check.flags, check
-    assert check.outcomes[0].code == supervisor.STUCK, check
+    assert check.outcomes[0].code == supervisor.STUCK.code, check
 
 
 def check_of(name: str) -> str:

@@ -311,12 +311,15 @@ def test_labs_come_in_the_order_of_the_settings(course: Path, tmp_path: Path) ->
     assert page.startswith("# Robots\n") and page.index(f"{LAB}.ipynb") < page.index("lab1_greeter.ipynb")
 
 
-def test_a_course_that_lists_a_lab_it_does_not_have_is_told_so(course: Path, tmp_path: Path) -> None:
+def test_a_course_that_lists_a_lab_or_a_code_that_there_is_not_is_told_so(course: Path, tmp_path: Path) -> None:
     root = shutil.copytree(course, tmp_path / "course", ignore=shutil.ignore_patterns("build"))
-    (root / "course.toml").write_text(f'labs = ["lab1_greeting", "{LAB}"]\n')
+    sections = '[lectures]\nA = "a"\n[sections.A]\nB = ["topic-nam", "topic-name"]\n'
+    (root / "course.toml").write_text(f'labs = ["lab1_greeting", "{LAB}"]\n{sections}')
     lint = [Path(sys.executable).with_name("autograder"), "lint", "--static", "--course", root]
     done = subprocess.run(lint, capture_output=True, text=True)
     assert "error: course.toml lists a lab that there is not, `lab1_greeting`." in done.stdout.splitlines()
+    assert "error: course.toml explains a reason that nothing gives, `topic-nam`." in done.stdout.splitlines()
+    assert "`topic-name`" not in done.stdout
     assert done.returncode == 1 and done.stderr == ""
     assert subprocess.run([*lint, LAB], capture_output=True).returncode == 0
 

@@ -140,7 +140,9 @@ def test_a_class_runs_what_was_starved_again_at_its_end_one_by_one(
     assert points == {"ann": [0.0, 0.0], "bob": [None, 0.0], "eve": [0.0, 0.0]}
     assert [check.run_again for check in results["ann"].checks] == [True, False]
     failure = results["bob"].checks[0].first_failure
-    assert failure is not None and failure.code == TOO_BUSY and "when the machine has less to do" in failure.because
+    assert (
+        failure is not None and failure.code == TOO_BUSY.code and "when the machine has less to do" in failure.because
+    )
     for who in ("ann", "bob"):  # a person may look at both runs
         check = results[who].checks[0]
         assert check.flags == ["odd in both", "odd first", "odd again"]

@@ -20,6 +20,12 @@ _SETTINGS = """\
 title = "The labs"
 # The labs in the course's order; those that are not listed follow by their names.
 labs = ["{lab}"]
+
+# What hints call your lectures, and the page of each; the sections that explain a reason, by its code.
+# [lectures]
+# "Week 1" = "01_names"
+# [sections."Week 1"]
+# "Remap rules" = ["rule-order", "rule-prefix"]
 """
 _IGNORED = """\
 # What is made again, and what is known of students.

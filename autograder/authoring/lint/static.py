@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -11,17 +12,27 @@ from autograder.authoring.lint.checks import check_findings
 from autograder.authoring.lint.finding import Finding
 from autograder.authoring.lint.metadata import metadata_findings
 from autograder.core.errors import KitError
+from autograder.course.book import read_book
 from autograder.course.cells import MARK
 from autograder.course.lab import Lab, lab_names, load_lab
 from autograder.course.paths import CoursePaths
 from autograder.course.settings import SETTINGS_FILE, read_settings
 from autograder.grading.known_answers import known_answers, wrong_answers
+from autograder.reasons import all_kinds
 
 
 def course_findings(root: Path) -> list[Finding]:
-    """Say what is wrong with the course's own settings: labs that they list and that are not there."""
-    missing = [name for name in read_settings(root).labs if name not in lab_names(root)]
-    return [Finding("", f"{SETTINGS_FILE} lists a lab that there is not, `{name}`.") for name in missing]
+    """Say what is wrong with the course's own settings: labs and codes that they list and that are not there."""
+    names = lab_names(root)
+    missing = [name for name in read_settings(root).labs if name not in names]
+    found = [Finding("", f"{SETTINGS_FILE} lists a lab that there is not, `{name}`.") for name in missing]
+    explained = read_book(root).sections
+    if explained:
+        checks = "".join(cell.source for name in names for cell in load_lab(root, name).cells)
+        known = all_kinds().keys() | set(re.findall(r"""code=["']([a-z-]+)""", checks))
+        unknown = [code for code in explained if code not in known]
+        found += [Finding("", f"{SETTINGS_FILE} explains a reason that nothing gives, `{code}`.") for code in unknown]
+    return found
 
 
 def read_findings(root: Path, name: str) -> list[Finding]:
