@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from autograder.core.picture import Picture
+from autograder.core.results import Picture
 from autograder.pictures.graph import Endpoint, Mismatch
 from autograder.pictures.svg import SMALL, TEXT, WIDTH, Canvas, shortened
 
