@@ -21,7 +21,7 @@ import reference  # noqa: E402
 from autograder.checks.codes import GROUPS  # noqa: E402
 from autograder.checks.launch import Launch  # noqa: E402
 from autograder.diagnosis.codes import CODES  # noqa: E402
-from autograder.report.reading import LECTURES, SECTIONS  # noqa: E402
+from autograder.report.hints import LECTURES, SECTIONS  # noqa: E402
 
 LISTED = [*CODES, *(code for group in GROUPS.values() for code in group)]
 PAGES = sorted((ROOT / "lectures" / "instructors").glob("*.md"))

@@ -38,7 +38,7 @@ Told = CheckResult | tuple[int, str]
 """A check's result, or which worker is at what."""
 
 
-class Ear:
+class ResultListener:
     """Hears one worker's results while it still runs, line by line.
 
     Args:
@@ -135,8 +135,8 @@ def run_in_workers(job: Job, workers: int, follower: Follower | None = None) -> 
     with ThreadPoolExecutor(max(1, len(shares)), thread_name_prefix="share") as pool:
         try:  # from the first share on: Ctrl-C may come before the last of them is begun
             for number, share in enumerate(shares):
-                ear = Ear(number, told.put) if follower is not None else None
-                pool.submit(_run_share, job, share, given_up, ear).add_done_callback(told.put)
+                listener = ResultListener(number, told.put) if follower is not None else None
+                pool.submit(_run_share, job, share, given_up, listener).add_done_callback(told.put)
             checks = _follow(told, len(shares), follower)
         except BaseException:  # nobody waits for the shares any more
             given_up.set()
@@ -185,7 +185,7 @@ def _result(job: Job, checks: list[CheckResult], began: float) -> SubmissionResu
 
 
 def _run_share(
-    job: Job, share: Sequence[Cell], stop: threading.Event | None, ear: Ear | None = None
+    job: Job, share: Sequence[Cell], stop: threading.Event | None, listener: ResultListener | None = None
 ) -> list[CheckResult]:
     """Run some of a job's checks, one after the other.
 
@@ -201,15 +201,15 @@ def _run_share(
         cells = [cell for cell in job.cells if cell.points is None or cell in left]
         part = job.model_copy(update={"cells": cells})
         seconds = limit(len(left)) + ALONE * job.alone * len(left) + job.build_seconds
-        if ear is not None:
-            ear.begin(left)
+        if listener is not None:
+            listener.begin(left)
         run = run_in_sandbox(
             ["autograder.grading.worker"],
             part.model_dump_json().encode("utf-8"),
             job.isolation,
             seconds,
             stop,
-            ear.hear if ear is not None else None,
+            listener.hear if listener is not None else None,
         )
         said = _said(run.stdout)
         once_more = {check.grade_id for check in said if was_killed(check)} - killed

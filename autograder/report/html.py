@@ -17,7 +17,7 @@ from autograder.core.output import last_lines, plain
 from autograder.core.results import CellResult, Status
 from autograder.report import words
 from autograder.report.audience import Audience, check_for
-from autograder.report.reading import hints
+from autograder.report.hints import hints
 from autograder.report.words import Verdict
 
 _LOOK = {

@@ -15,7 +15,7 @@ from autograder.core.output import last_lines
 from autograder.core.results import CellResult, CheckResult, Isolation, NodeLog, Outcome, Status, SubmissionResult
 from autograder.report import words
 from autograder.report.audience import Audience, check_for, reason, result_for
-from autograder.report.reading import section_for
+from autograder.report.hints import section_for
 from autograder.report.words import Verdict
 from autograder.submission.similar import Pair
 
