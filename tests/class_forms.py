@@ -21,7 +21,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from autograder.core.errors import KitError
 from autograder.intake.collect import Collected, collect
-from autograder.intake.naming import file_name
+from autograder.intake.roster import file_name
 
 LAB = "toy"
 PEOPLE = [

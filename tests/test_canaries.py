@@ -22,11 +22,10 @@ from autograder.course.paths import CoursePaths
 from autograder.gradebook.class_run import ClassRun, grade_class, try_class
 from autograder.gradebook.grades import read_grades
 from autograder.grading import executors
-from autograder.grading.canaries import Canaries
+from autograder.grading.canaries import Canaries, known_answers, wrong_answers
 from autograder.grading.class_runner import run_class
 from autograder.grading.executors import EXECUTORS, Local
 from autograder.grading.job import Job
-from autograder.grading.known_answers import known_answers, wrong_answers
 from autograder.grading.runner import Settings
 from autograder.grading.supervisor import unknown
 

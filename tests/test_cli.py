@@ -22,8 +22,7 @@ import toy
 from junitparser import JUnitXml
 from kill_anything import in_shared_memory
 
-from autograder.core.files import remove_unfinished, write_beside
-from autograder.core.lock import only_one
+from autograder.core.files import only_one, remove_unfinished, write_beside
 from autograder.core.results import CheckResult, Isolation, Outcome, Status, SubmissionResult
 from autograder.course.lab import load_lab
 from autograder.course.paths import CoursePaths

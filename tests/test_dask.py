@@ -13,9 +13,8 @@ from dask_cluster import KIT, cluster, until
 from autograder.core.errors import KitError
 from autograder.core.results import Isolation
 from autograder.course.lab import load_lab
-from autograder.grading.canaries import Canaries
+from autograder.grading.canaries import Canaries, known_answers
 from autograder.grading.class_runner import run_class
-from autograder.grading.known_answers import known_answers
 from autograder.grading.runner import Settings
 from autograder.sandbox.isolation import preflight
 

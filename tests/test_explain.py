@@ -10,8 +10,7 @@ from pathlib import Path
 import sample_class
 from rosbags.highlevel import AnyReader
 
-from autograder.core.picture import Picture
-from autograder.core.results import CheckResult, Isolation, NodeLog, Outcome, Status, SubmissionResult
+from autograder.core.results import CheckResult, Isolation, NodeLog, Outcome, Picture, Status, SubmissionResult
 from autograder.course.lab import load_lab
 from autograder.course.paths import CoursePaths
 from autograder.grading.store import ResultStore

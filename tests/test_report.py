@@ -24,8 +24,8 @@ from autograder.report.export.entry import Entry
 from autograder.report.export.gradescope import results_json
 from autograder.report.export.junit import junit_xml
 from autograder.report.feedback_page import Heading, Task, feedback_html
+from autograder.report.hints import hints
 from autograder.report.html import check_html
-from autograder.report.reading import hints
 from autograder.report.terminal import check_text, check_view, class_view, submission_view, undecided_view
 
 ROOT = Path(__file__).resolve().parent.parent

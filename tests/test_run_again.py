@@ -16,7 +16,7 @@ import toy
 from autograder.core.results import CheckResult, Isolation, NodeLog, Outcome, Status, SubmissionResult
 from autograder.course.lab import load_lab
 from autograder.course.paths import CoursePaths
-from autograder.grading import executors, once_more
+from autograder.grading import executors, validation
 from autograder.grading.class_runner import run_class
 from autograder.grading.job import Cell, Job
 from autograder.grading.runner import Settings
@@ -153,10 +153,10 @@ def test_a_class_runs_what_was_starved_again_at_its_end_one_by_one(
 
 def test_what_lost_nothing_is_not_run_again() -> None:
     check = CheckResult(grade_id="check", max_points=2, points=2, starved=9.0)
-    assert not once_more.is_open(check)
-    assert once_more.is_open(check.model_copy(update={"points": 1.0}))
-    assert once_more.is_open(check.model_copy(update={"points": None}))
-    assert not once_more.is_open(check.model_copy(update={"points": 0.0, "starved": 0.0}))
+    assert not validation.is_open(check)
+    assert validation.is_open(check.model_copy(update={"points": 1.0}))
+    assert validation.is_open(check.model_copy(update={"points": None}))
+    assert not validation.is_open(check.model_copy(update={"points": 0.0, "starved": 0.0}))
 
 
 def test_an_interruption_while_checks_are_run_again_loses_no_first_result(

@@ -11,8 +11,8 @@ import toy
 import yaml
 
 from autograder.course.lab import Lab, load_lab
+from autograder.submission.answers import Submission
 from autograder.submission.reader import read_submission
-from autograder.submission.submission import Submission
 
 
 @pytest.fixture

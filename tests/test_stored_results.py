@@ -8,8 +8,7 @@ from pathlib import Path
 import pytest
 import toy
 
-from autograder.core.picture import Picture
-from autograder.core.results import CheckResult, Status, SubmissionResult
+from autograder.core.results import CheckResult, Picture, Status, SubmissionResult
 from autograder.course.lab import load_lab
 from autograder.grading import runner, supervisor
 from autograder.grading.class_runner import run_class

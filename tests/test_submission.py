@@ -22,11 +22,10 @@ from autograder.core.errors import KitError
 from autograder.course.cells import BadNameError, grade_id_of, hidden_lines, parse, without_hidden_tests
 from autograder.course.lab import Lab, load_lab
 from autograder.intake.collect import collect
-from autograder.submission.cell_files import OWN_FILES
+from autograder.submission.answers import OWN_FILES, Submission
 from autograder.submission.copies import told_of_copies
 from autograder.submission.notebook_file import NOTEBOOK_BYTES
 from autograder.submission.reader import PROBLEMS_KEPT, read_submission
-from autograder.submission.submission import Submission
 
 ROOT = Path(__file__).resolve().parent.parent
 ORDINARY_USER = 12345

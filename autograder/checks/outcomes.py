@@ -15,8 +15,7 @@ from typing import NoReturn
 from autograder.checks import findings, runtime, unusable
 from autograder.checks.misuse import place_of
 from autograder.core.errors import KitError
-from autograder.core.picture import Picture
-from autograder.core.results import Outcome, Status
+from autograder.core.results import Outcome, Picture, Status
 from autograder.course.cells import MORE_AT_GRADING, hidden_lines
 from autograder.graph.observer import ForgedGraph
 from autograder.reasons import Group, Kind, Reason

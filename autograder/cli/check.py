@@ -113,10 +113,10 @@ def checked(
         audience: for whom the report is printed, each verdict as soon as it is there; None prints none.
     """
     from autograder.grading.runner import WORKERS_FOR_ONE, run_submission
-    from autograder.report.growing import GrowingReport
+    from autograder.report.live_report import LiveReport
 
     student = notebook.parent.resolve().name
-    with GrowingReport([check.grade_id for check in lab.checks], audience, book) as report:
+    with LiveReport([check.grade_id for check in lab.checks], audience, book) as report:
         result = run_submission(notebook, student, lab, settings, workers=WORKERS_FOR_ONE, follower=report)
         report.finish(result)
     return result

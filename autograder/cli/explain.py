@@ -96,7 +96,7 @@ def _messages(root: Path, result: SubmissionResult, check: CheckResult, bag: Pat
     from autograder.course.paths import CoursePaths
     from autograder.grading.messages import received, write_mcap
     from autograder.grading.runner import Settings
-    from autograder.report.growing import working
+    from autograder.report.live_report import working
     from autograder.report.terminal import console
     from autograder.sandbox.isolation import choose
     from autograder.submission.reader import read_submission

@@ -75,7 +75,7 @@ def lint(
     from autograder.course.lab import lab_names, load_lab
     from autograder.course.paths import CoursePaths
     from autograder.gradebook.release import released_files
-    from autograder.grading.known_answers import known_answers
+    from autograder.grading.canaries import known_answers
     from autograder.sandbox.isolation import choose
 
     root = course_root(course)

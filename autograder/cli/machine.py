@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import sys
 from typing import Annotated
 
 import typer
@@ -22,9 +24,27 @@ def jupyter(
     words: Annotated[list[str] | None, typer.Argument(metavar="...", help="Options of `jupyter lab`.")] = None,
 ) -> None:
     """Open the course's labs in JupyterLab, with the settings that students work with."""
-    from autograder.cli.jupyter import open_labs
+    from autograder.core.errors import KitError
+    from autograder.course.folder import course_root, is_students_kit
+    from autograder.course.paths import CoursePaths
+    from autograder.notebook import JUPYTER_SETTINGS
+    from autograder.setup.labs import put_labs
 
-    open_labs(words or [])
+    if is_students_kit():
+        put_labs()
+    labs = CoursePaths(course_root()).labs
+    if not labs.is_dir():
+        raise KitError(f"There are no labs in {labs}.", "Make them from the solutions: autograder release")
+    # A student's kit is shown whole: its lectures can be opened beside the labs.
+    whole = ["--LabApp.default_url=/lab/tree/labs/README.md"] if is_students_kit() else []
+    os.chdir(labs.parent if whole else labs)
+    # The settings are not those of the whole environment: an instructor who starts `jupyter lab` there has formgrader.
+    environment = os.environ | {"JUPYTER_CONFIG_PATH": str(JUPYTER_SETTINGS)}
+    # What runs in a notebook starts the environment's programs by their bare name.
+    environment["PATH"] = os.pathsep.join((os.path.dirname(sys.executable), os.environ.get("PATH", os.defpath)))  # noqa: PTH120
+    root = ["--allow-root"] if os.getuid() == 0 else []
+    command = [sys.executable, "-P", "-m", "jupyterlab", *whole, *root, *(words or [])]
+    os.execve(sys.executable, command, environment)
 
 
 @app.command("ros2", add_help_option=False, context_settings={"ignore_unknown_options": True})

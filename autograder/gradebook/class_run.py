@@ -14,17 +14,15 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
 from autograder.core.errors import KitError
-from autograder.core.files import remove_unfinished
+from autograder.core.files import only_one, remove_unfinished
 from autograder.core.grades import Grade
-from autograder.core.lock import only_one
 from autograder.core.results import Status, SubmissionResult
 from autograder.course.lab import Lab, load_lab
 from autograder.course.paths import CoursePaths
 from autograder.gradebook.grades import read_grades, write_grades
 from autograder.gradebook.recorder import Recorder, Recording
-from autograder.grading.canaries import Canaries
+from autograder.grading.canaries import Canaries, known_answers
 from autograder.grading.class_runner import run_class
-from autograder.grading.known_answers import known_answers
 from autograder.grading.runner import Settings
 from autograder.grading.store import ResultStore
 from autograder.intake.asked import Accepted

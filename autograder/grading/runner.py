@@ -13,13 +13,12 @@ from pathlib import Path
 from autograder.core.cpu_use import cpus
 from autograder.core.results import Isolation, Status, SubmissionResult
 from autograder.course.lab import Lab
-from autograder.grading.follower import Follower
 from autograder.grading.job import Job
 from autograder.grading.store import ResultStore
-from autograder.grading.supervisor import run_in_workers
+from autograder.grading.supervisor import Follower, run_in_workers
 from autograder.grading.validation import all_for_one_reason, lacks_a_result
+from autograder.submission.answers import Submission
 from autograder.submission.reader import read_submission
-from autograder.submission.submission import Submission
 
 WORKERS_FOR_ONE = 3
 """Workers that share the checks of a submission for which somebody waits: two cores carry them."""

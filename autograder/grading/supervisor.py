@@ -4,25 +4,91 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from queue import SimpleQueue
+from typing import Protocol
 
 from pydantic import ValidationError
 
-from autograder.core.results import CheckResult, SubmissionResult
+from autograder.core.results import CheckResult, Outcome, SubmissionResult
 from autograder.course.lab import Cell
-from autograder.grading import once_more
+from autograder.grading import validation
 from autograder.grading.builds import with_interfaces
-from autograder.grading.follower import Ear, Follower, Told
 from autograder.grading.job import CELL_SECONDS, STUCK_SECONDS, Job
-from autograder.grading.validation import undecided, validated, was_killed
+from autograder.grading.validation import believed, is_open, undecided, validated, was_killed
 from autograder.graph.patience import ALONE
 from autograder.reasons import KINDS, Group, Kind
 from autograder.sandbox.outer import OuterRun, run_in_sandbox
 
 STUCK = Kind("stuck", "the grader did not come on at this check; an instructor decides", Group.GRADER)
 DIED = Kind("died", "the grader died at this check, twice; an instructor decides", Group.GRADER)
+
+
+class Follower(Protocol):
+    """Shows what becomes known. It is told in the thread that has asked for the run, and may take its time."""
+
+    def begun(self, problems: Sequence[Outcome]) -> None:
+        """The submission has been read: this is wrong with it as a whole."""
+
+    def at(self, worker: int, what: str) -> None:
+        """A worker is at this check now; empty: it has nothing more to do."""
+
+    def decided(self, check: CheckResult) -> None:
+        """A check came to this; nothing will change that."""
+
+
+Told = CheckResult | tuple[int, str]
+"""A check's result, or which worker is at what."""
+
+
+class ResultListener:
+    """Hears one worker's results while it still runs, line by line.
+
+    Args:
+        worker: its number.
+        tell: is called with what is heard, in the thread that reads; it must not wait for anybody.
+    """
+
+    def __init__(self, worker: int, tell: Callable[[Told], None]) -> None:
+        """Nothing has been heard yet."""
+        self._worker, self._tell = worker, tell
+        self._left: list[Cell] = []
+        self._line = bytearray()
+        self._killed: set[str] = set()
+
+    def begin(self, cells: Sequence[Cell]) -> None:
+        """A process begins with these checks."""
+        self._left, self._line = list(cells), bytearray()
+        self._now()
+
+    def hear(self, data: bytes) -> None:
+        """It has written more."""
+        *ends, rest = data.split(b"\n")
+        for end in ends:
+            self._line += end
+            self._take(bytes(self._line))
+            self._line.clear()
+        self._line += rest
+
+    def _take(self, line: bytes) -> None:
+        try:
+            check = CheckResult.model_validate_json(line)
+        except ValidationError:
+            self._left = []  # no result comes after what is none
+            return
+        cell = next((one for one in self._left if one.grade_id == check.grade_id), None)
+        if cell is not None:
+            self._left.remove(cell)
+            if was_killed(check) and check.grade_id not in self._killed:
+                self._killed.add(check.grade_id)  # it is tried once more
+            elif not is_open(check):  # else it is run again, alone, when the others have ended
+                self._tell(believed(cell, check))
+            self._now()
+
+    def _now(self) -> None:
+        self._tell((self._worker, self._left[0].title or self._left[0].grade_id if self._left else ""))
+
 
 SECONDS_PER_CHECK = 120.0
 """Seconds that each check may take on average; besides, one of them may get stuck. It takes 10 on a quiet machine."""
@@ -69,14 +135,14 @@ def run_in_workers(job: Job, workers: int, follower: Follower | None = None) -> 
     with ThreadPoolExecutor(max(1, len(shares)), thread_name_prefix="share") as pool:
         try:  # from the first share on: Ctrl-C may come before the last of them is begun
             for number, share in enumerate(shares):
-                ear = Ear(number, told.put) if follower is not None else None
-                pool.submit(_run_share, job, share, given_up, ear).add_done_callback(told.put)
+                listener = ResultListener(number, told.put) if follower is not None else None
+                pool.submit(_run_share, job, share, given_up, listener).add_done_callback(told.put)
             checks = _follow(told, len(shares), follower)
         except BaseException:  # nobody waits for the shares any more
             given_up.set()
             raise
     result = _result(job, checks, began)
-    again = once_more.open_checks(job, result)
+    again = validation.open_checks(job, result)
     return result if again is None else _again(again, result, follower)
 
 
@@ -84,7 +150,7 @@ def _again(job: Job, first: SubmissionResult, follower: Follower | None) -> Subm
     """Run the open checks of a result once more, now that nothing else runs."""
     if follower is not None:
         follower.at(0, "once more, alone: " + ", ".join(cell.title or cell.grade_id for cell in job.checks))
-    result = once_more.settled(job, first, run_in_worker(job))
+    result = validation.settled(job, first, run_in_worker(job))
     for check in result.checks:
         if follower is not None and check.run_again:
             follower.decided(check)
@@ -119,7 +185,7 @@ def _result(job: Job, checks: list[CheckResult], began: float) -> SubmissionResu
 
 
 def _run_share(
-    job: Job, share: Sequence[Cell], stop: threading.Event | None, ear: Ear | None = None
+    job: Job, share: Sequence[Cell], stop: threading.Event | None, listener: ResultListener | None = None
 ) -> list[CheckResult]:
     """Run some of a job's checks, one after the other.
 
@@ -135,15 +201,15 @@ def _run_share(
         cells = [cell for cell in job.cells if cell.points is None or cell in left]
         part = job.model_copy(update={"cells": cells})
         seconds = limit(len(left)) + ALONE * job.alone * len(left) + job.build_seconds
-        if ear is not None:
-            ear.begin(left)
+        if listener is not None:
+            listener.begin(left)
         run = run_in_sandbox(
             ["autograder.grading.worker"],
             part.model_dump_json().encode("utf-8"),
             job.isolation,
             seconds,
             stop,
-            ear.hear if ear is not None else None,
+            listener.hear if listener is not None else None,
         )
         said = _said(run.stdout)
         once_more = {check.grade_id for check in said if was_killed(check)} - killed

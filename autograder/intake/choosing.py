@@ -6,8 +6,7 @@ import re
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 
-from autograder.intake.claims import Claim
-from autograder.intake.entries import Kind, NotUnderstoodError
+from autograder.intake.entries import Claim, Kind, NotUnderstoodError
 from autograder.intake.members import Member, is_hidden, is_notebook
 from autograder.submission import exchange_secret, timestamp
 from autograder.submission.notebook_file import NOTEBOOK_BYTES

@@ -16,8 +16,7 @@ import yaml
 
 from autograder.intake.asked import FormatName
 from autograder.intake.choosing import is_of_lab
-from autograder.intake.claims import Claim, Recognised
-from autograder.intake.entries import Entry, Kind, NotUnderstoodError
+from autograder.intake.entries import Claim, Entry, Kind, NotUnderstoodError, Recognised
 from autograder.intake.members import is_hidden, is_notebook
 from autograder.intake.roster import FILE_NAME as ROSTER
 from autograder.submission.timestamp import moment

@@ -12,11 +12,10 @@ from pathlib import Path
 
 from autograder.core.errors import KitError
 from autograder.intake.choosing import choose, is_of_lab
-from autograder.intake.claims import Claim, Recognised
-from autograder.intake.entries import Entry, Kind, NotUnderstoodError, listed
+from autograder.intake.entries import Claim, Entry, Kind, NotUnderstoodError, Recognised, listed
 from autograder.intake.formats import CLASSROOM, PLAIN, PLATFORMS, Format, by_lab, owner_of
 from autograder.intake.members import is_hidden, is_notebook
-from autograder.intake.naming import given_name
+from autograder.intake.roster import given_name
 from autograder.intake.words import some
 
 _MOST_AROUND = 3

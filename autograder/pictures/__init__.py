@@ -4,7 +4,7 @@ They are drawn from plain data, as SVG with text that can be read in black and w
 shows. A check cell, a lecture and the report under a failed check draw the same ones.
 """
 
-from autograder.core.picture import Picture
+from autograder.core.results import Picture
 from autograder.pictures.graph import Endpoint, graph, qos
 from autograder.pictures.lifecycle import lifecycle, steps
 from autograder.pictures.timeline import Run, Runs, Traffic, arrivals, timeline

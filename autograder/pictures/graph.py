@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from autograder.core.picture import Picture
+from autograder.core.results import Picture
 from autograder.pictures.svg import SMALL, TEXT, WIDTH, Canvas, shortened, width_of
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from autograder.core.picture import Picture
+from autograder.core.results import Picture
 from autograder.pictures.svg import SMALL, WIDTH, Canvas
 
 _BOX = (170.0, 50.0)

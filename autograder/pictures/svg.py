@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from html import escape
 
-from autograder.core.picture import Picture
+from autograder.core.results import Picture
 
 TEXT = 18
 """Size of words, in units of a canvas that is WIDTH wide: still 2.5 % of the height of a slide that it fills."""

@@ -18,7 +18,7 @@ from autograder.core.results import CellResult, Status
 from autograder.course.book import NO_BOOK, Book
 from autograder.report import words
 from autograder.report.audience import Audience, check_for
-from autograder.report.reading import hints
+from autograder.report.hints import hints
 from autograder.report.words import Verdict
 
 _LOOK = {

@@ -17,10 +17,8 @@ from autograder.core.errors import KitError
 from autograder.core.files import signature
 from autograder.course.lab import Lab, lab_names, load_lab
 from autograder.reasons import Group, Kind
-from autograder.submission.answers import take_answers
-from autograder.submission.cell_files import take_files, take_own_files
+from autograder.submission.answers import Submission, take_answers, take_files, take_own_files
 from autograder.submission.notebook_file import UnreadableError, cells_of, grade_ids_in, problem
-from autograder.submission.submission import Submission
 
 MORE_PROBLEMS = Kind("more-problems", "the notebook has more problems than are listed", Group.NOTEBOOK)
 

@@ -16,7 +16,7 @@ from docutils import nodes
 from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
 
-from autograder.core.picture import Picture
+from autograder.core.results import Picture
 from autograder.pictures.svg import Canvas
 
 

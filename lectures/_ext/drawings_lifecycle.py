@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from autograder.core.picture import Picture
+from autograder.core.results import Picture
 from autograder.pictures import lifecycle
 from autograder.pictures.svg import Canvas
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from autograder.core.picture import Picture
+from autograder.core.results import Picture
 from autograder.pictures.svg import Canvas
 
 

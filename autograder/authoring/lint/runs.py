@@ -11,9 +11,8 @@ from autograder.authoring.mutation.reach import reached
 from autograder.authoring.mutation.source import Mutant
 from autograder.core.results import Isolation, SubmissionResult
 from autograder.course.lab import Cell, Lab
-from autograder.grading.canaries import otherwise
+from autograder.grading.canaries import KnownAnswers, otherwise
 from autograder.grading.job import Job
-from autograder.grading.known_answers import KnownAnswers
 from autograder.grading.supervisor import run_in_worker
 
 _TRIES = 40

@@ -17,7 +17,7 @@ from autograder.course.cells import MARK
 from autograder.course.lab import Lab, lab_names, load_lab
 from autograder.course.paths import CoursePaths
 from autograder.course.settings import SETTINGS_FILE, read_settings
-from autograder.grading.known_answers import known_answers, wrong_answers
+from autograder.grading.canaries import known_answers, wrong_answers
 from autograder.reasons import all_kinds
 
 

@@ -7,8 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from autograder.report.export.entry import Entry, Export, header, scores
-from autograder.report.export.tables import table
+from autograder.report.export.entry import Entry, Export, header, scores, table
 
 
 def to_blackboard(entries: Sequence[Entry], column: str) -> Export:

@@ -9,9 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import PurePosixPath
 
-from autograder.report.export.entry import Entry, Export, header, scores
-from autograder.report.export.feedback_zip import feedback_zip
-from autograder.report.export.tables import table
+from autograder.report.export.entry import Entry, Export, feedback_zip, header, scores, table
 
 
 def to_canvas(entries: Sequence[Entry], column: str) -> Export:

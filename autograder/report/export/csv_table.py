@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from autograder.report.export.entry import Entry, Export, points
-from autograder.report.export.tables import table
+from autograder.report.export.entry import Entry, Export, points, table
 
 
 def to_csv(entries: Sequence[Entry], _: str) -> Export:

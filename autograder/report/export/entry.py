@@ -1,8 +1,11 @@
-"""What an export is made of: a class's submissions with results, grades and the names that platforms have for them."""
+"""What exports are made of: a class's submissions with what platforms call them, CSV, and the zip of feedback."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+import csv
+import io
+import zipfile
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -70,3 +73,51 @@ def scores(entries: Sequence[Entry], left_out: list[str]) -> list[tuple[Entry, s
 def header(entries: Sequence[Entry], column: str) -> str:
     """Return the heading of the column of scores: what was asked for, or the lab's name."""
     return column or entries[0].lab
+
+
+_FORMULA = ("=", "+", "-", "@", "\t", "\r")
+"""What makes a spreadsheet take a text for a formula."""
+
+
+def table(rows: Iterable[Sequence[str]], quote_all: bool = False) -> str:
+    """Return rows as CSV; no text of a student's becomes a formula where somebody opens the file as a spreadsheet."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n", quoting=csv.QUOTE_ALL if quote_all else csv.QUOTE_MINIMAL)
+    writer.writerows([[_harmless(cell) for cell in row] for row in rows])
+    return text.getvalue()
+
+
+def _harmless(cell: str) -> str:
+    number = cell.removeprefix("-").replace(".", "", 1).isdigit()
+    return f"'{cell}" if cell.startswith(_FORMULA) and cell != "-" and not number else cell
+
+
+_ALWAYS = (1980, 1, 1, 0, 0, 0)
+"""Date of every file, so that equal pages give equal zips."""
+
+
+def feedback_zip(entries: Sequence[Entry], platform: str, place: Callable[[Entry], str]) -> Export:
+    """Return the pages of a class in a zip.
+
+    Args:
+        entries: of one lab.
+        platform: that takes it.
+        place: the name of a student's page in it; empty if the platform could not tell whose it is.
+    """
+    left_out = []
+    content = io.BytesIO()
+    with zipfile.ZipFile(content, "w", zipfile.ZIP_DEFLATED) as archive:
+        for entry in entries:
+            name = place(entry)
+            if not name:
+                left_out.append(
+                    f"{entry.student}: {platform} could not tell whose page it is. Grade what it gives out,"
+                    " or name its number for the student in roster.csv."
+                )
+            elif entry.feedback is None:
+                left_out.append(f"{entry.student} has no feedback page: run autograder grade {entry.lab} once more.")
+            else:
+                info = zipfile.ZipInfo(name, _ALWAYS)
+                info.compress_type = zipfile.ZIP_DEFLATED
+                archive.writestr(info, entry.feedback.read_bytes())
+    return Export(content.getvalue(), left_out)

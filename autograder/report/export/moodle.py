@@ -9,9 +9,7 @@ import datetime
 import re
 from collections.abc import Sequence
 
-from autograder.report.export.entry import Entry, Export, scores
-from autograder.report.export.feedback_zip import feedback_zip
-from autograder.report.export.tables import table
+from autograder.report.export.entry import Entry, Export, feedback_zip, scores, table
 
 _COLUMNS = (
     "Identifier", "Full name", "Email address", "Grade", "Maximum Grade", "Last modified (grade)", "Feedback comments",

@@ -16,7 +16,7 @@ from autograder.report.audience import Audience, check_for, result_for
 from autograder.report.terminal import check_view, console, plain, problems_view, total_view
 
 
-class GrowingReport:
+class LiveReport:
     """A report on one submission that is printed while its checks still run, in the lab's order.
 
     A verdict is printed once it is known and those above it are. On a terminal a line below says what is waited for; a
@@ -40,7 +40,7 @@ class GrowingReport:
         self._line = _line(self._screen if audience else Console(stderr=True))
         self._task = self._line.add_task(self._says(), total=None)
 
-    def __enter__(self) -> GrowingReport:
+    def __enter__(self) -> LiveReport:
         """Begin to show the line."""
         self._line.start()
         return self
