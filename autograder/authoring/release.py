@@ -1,14 +1,63 @@
-"""Gives a lab out: only one in which nothing is wrong that can be read."""
+"""Writes `labs/`: each lab as students get it, unless something in it is wrong, and the page that lists the labs."""
 
 from __future__ import annotations
 
+import json
+import re
 from pathlib import Path
 
 from autograder.authoring.lint.static import read_findings, release_findings
 from autograder.core.errors import KitError
 from autograder.core.files import write_beside
+from autograder.course.lab import lab_names, source_of
 from autograder.course.paths import CoursePaths
+from autograder.course.settings import read_settings
 from autograder.gradebook.release import released_files
+
+START_PAGE = "README.md"
+
+_TOP = """\
+# {title}
+
+Open a lab with a click on its name, and work through it from the top: run each cell with Shift+Enter. A cell that
+begins with `%%node NAME` or `%%file NAME` writes your program or file. The check below it runs that and says at once
+what holds, and what does not and why.
+
+| lab | about |
+|---|---|
+"""
+
+_BOTTOM = """
+- After a change run the cell again, and then its check.
+- After a restart of the kernel run the first code cell again, and then the cells of your programs.
+- Your programs lie in the folder `nodes` of the lab, below the name of the notebook. What you write in cells is what is
+  graded; a file that you put into that folder yourself stays yours, but is not handed in.
+- `%%node?` and `%%file?` show an example. The tab key completes: after `launch("` the names of your programs, after
+  `%ros2` its commands and what is on the graph, after `ros.` what a launch can do.
+- `%lab` at a lab's end shows what is done and what is open.
+- Hand in the notebook, the file with the ending `.ipynb`, once you have saved it. In a terminal `autograder submit
+  NOTEBOOK` puts a copy with a receipt into the folder `handed_in`, and says what to know before.
+"""
+
+
+def start_page(labs: Path) -> str:
+    """Return the page for the labs in a folder, by the first heading of each and the sentence below it."""
+    rows = []
+    for path in [labs / name / f"{name}.ipynb" for name in lab_names(labs.parent)]:
+        if not path.is_file():
+            continue
+        first = source_of(json.loads(path.read_text(encoding="utf-8"))["cells"][0])
+        heading = re.search(r"^#\s+(.+?)\s*$", first, re.MULTILINE)
+        below = _sentence(first[heading.end() :]) if heading else ""
+        title = heading[1] if heading else path.stem
+        rows.append(f"| [{title}]({path.stem}/{path.name}) | {below} |\n")
+    return _TOP.format(title=read_settings(labs.parent).title) + "".join(rows) + _BOTTOM
+
+
+def _sentence(text: str) -> str:
+    """The first sentence of a paragraph, in one line."""
+    paragraph = " ".join(text.strip().split("\n\n")[0].split())
+    return re.split(r"(?<=\.)\s", paragraph, maxsplit=1)[0]
 
 
 def release(root: Path, lab: str) -> Path:
