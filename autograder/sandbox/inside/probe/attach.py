@@ -5,13 +5,11 @@ import importlib
 from typing import Any
 
 from . import events, own_lines, rclpy_names
+from .callbacks import watch_blocking, watch_callbacks, watch_threads
 from .watch_actions import watch_actions
-from .watch_calls import watch_blocking, watch_callbacks, watch_threads
 from .watch_executors import watch_executors
-from .watch_lifecycle import watch_lifecycle
 from .watch_messages import watch_messages
-from .watch_nodes import watch_nodes, watch_things
-from .watch_parameters import watch_parameters
+from .watch_nodes import watch_lifecycle, watch_nodes, watch_parameters, watch_things
 from .writing import emit, ledger, open_channel, quiet
 
 _MODULES = (

@@ -5,7 +5,7 @@ from typing import Any
 
 from . import events
 from .own_lines import own_line
-from .thing import thing_of
+from .records import thing_of
 from .writing import emit_once, quiet
 
 
