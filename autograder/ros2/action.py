@@ -19,7 +19,7 @@ from autograder.ros2.failure import Failure
 from autograder.ros2.interfaces import interface
 from autograder.ros2.options import joins, values, yaml_text
 from autograder.ros2.session import Session
-from autograder.ros2.topic_listen import full_topic
+from autograder.ros2.topic import full_topic
 
 _STATUS = {
     GoalStatus.STATUS_SUCCEEDED: "SUCCEEDED",

@@ -7,11 +7,10 @@ from typing import Any
 
 from lifecycle_msgs.srv import ChangeState, GetAvailableTransitions, GetState
 
-from autograder.ros2.calls import ask
 from autograder.ros2.failure import Failure
 from autograder.ros2.node import absolute
 from autograder.ros2.options import joins
-from autograder.ros2.session import Session
+from autograder.ros2.session import Session, ask
 
 
 def add_verbs(verbs: Any) -> None:

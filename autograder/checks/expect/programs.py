@@ -16,7 +16,7 @@ from autograder.checks.expect.expectations import WITHIN, Expectations
 from autograder.checks.misuse import Misuse
 from autograder.checks.program import Program
 from autograder.diagnosis import Diagnosis
-from autograder.graph.clock import ClockDriver
+from autograder.graph.publishing import ClockDriver
 from autograder.graph.recording import Recording
 from autograder.sandbox.running_program import RunningProgram
 

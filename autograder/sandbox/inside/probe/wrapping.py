@@ -1,4 +1,4 @@
-"""Putting a note around a function of rclpy, which goes on to do what it did; for one that may block, how often it does."""
+"""Putting a note around a function of rclpy, which goes on to do what it did, and noting how often one blocks."""
 
 import _thread
 import functools
