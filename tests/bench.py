@@ -31,7 +31,7 @@ from autograder.core.results import Isolation, SubmissionResult
 from autograder.course.lab import grade_id_of, lab_names, load_lab
 from autograder.gradebook.preparation import prepare_nbgrader
 from autograder.grading.store import ResultStore
-from autograder.sandbox.outer import run_in_sandbox
+from autograder.sandbox.grading_sandbox import run_in_sandbox
 
 prepare_nbgrader()
 from nbgrader.api import Gradebook  # noqa: E402

@@ -21,27 +21,37 @@ from rclpy.validate_full_topic_name import validate_full_topic_name
 from autograder.ros2 import messages
 from autograder.ros2.failure import Failure
 from autograder.ros2.interfaces import interface
-from autograder.ros2.options import above_zero, joins, positive, profile, qos, to_match, unsigned, values, yaml_text
+from autograder.ros2.options import (
+    above_zero,
+    add_graph_options,
+    positive,
+    profile,
+    qos,
+    to_match,
+    unsigned,
+    values,
+    yaml_text,
+)
 from autograder.ros2.session import Session
 
 
 def add_verbs(verbs: Any) -> None:
     """Add them to the parser."""
-    parser = joins(verbs.add_parser("list", help="Output a list of available topics"))
+    parser = add_graph_options(verbs.add_parser("list", help="Output a list of available topics"))
     parser.add_argument("-t", "--show-types", action="store_true", help="Additionally show the topic type")
     parser.add_argument("-c", "--count-topics", action="store_true", help="Only display the number of topics")
     parser.add_argument("-v", "--verbose", action="store_true", help="List full details about each topic")
     _hidden(parser)
     parser.set_defaults(run=_list)
-    parser = joins(verbs.add_parser("info", help="Print information about a topic"))
+    parser = add_graph_options(verbs.add_parser("info", help="Print information about a topic"))
     parser.add_argument("topic_name", help="Name of the ROS topic to get info (e.g. '/chatter')")
     parser.add_argument("-v", "--verbose", action="store_true", help="Prints detailed information like the node name")
     parser.set_defaults(run=_info)
-    parser = joins(verbs.add_parser("type", help="Print a topic's type"))
+    parser = add_graph_options(verbs.add_parser("type", help="Print a topic's type"))
     parser.add_argument("topic_name", help="Name of the ROS topic to get type (e.g. '/chatter')")
     _hidden(parser)
     parser.set_defaults(run=_type)
-    parser = joins(verbs.add_parser("find", help="Output a list of available topics of a given type"))
+    parser = add_graph_options(verbs.add_parser("find", help="Output a list of available topics of a given type"))
     parser.add_argument("topic_type", help="Name of the ROS topic type to filter for (e.g. 'std_msgs/msg/String')")
     parser.add_argument("-c", "--count-topics", action="store_true", help="Only display the number of topics")
     _hidden(parser)
@@ -110,7 +120,7 @@ LONGEST = 128
 
 def _add_echo(verbs: Any) -> None:
     """Add it to the parser."""
-    parser = joins(verbs.add_parser("echo", help="Output messages from a topic"))
+    parser = add_graph_options(verbs.add_parser("echo", help="Output messages from a topic"))
     parser.add_argument("topic_name", help="Name of the ROS topic to listen to (e.g. '/chatter')")
     parser.add_argument("message_type", nargs="?", help="Type of the ROS message (e.g. 'std_msgs/msg/String')")
     qos(parser, "sensor_data")
@@ -288,15 +298,15 @@ _EVERY = 1.0
 
 def _add_measures(verbs: Any) -> None:
     """Add them to the parser."""
-    parser = joins(verbs.add_parser("hz", help="Print the average receiving rate to screen"))
+    parser = add_graph_options(verbs.add_parser("hz", help="Print the average receiving rate to screen"))
     _common(parser, 10_000)
     parser.add_argument("--filter", dest="expression", metavar="EXPR", help="only measure messages that match")
     parser.add_argument("--wall-time", action="store_true", help="calculates rate using wall time")
     parser.set_defaults(run=_hz)
-    parser = joins(verbs.add_parser("bw", help="Display bandwidth used by topic"))
+    parser = add_graph_options(verbs.add_parser("bw", help="Display bandwidth used by topic"))
     _common(parser, 100)
     parser.set_defaults(run=_bw)
-    parser = joins(verbs.add_parser("delay", help="Display delay of topic from timestamp in header"))
+    parser = add_graph_options(verbs.add_parser("delay", help="Display delay of topic from timestamp in header"))
     _common(parser, 10_000)
     parser.set_defaults(run=_delay)
 
@@ -412,7 +422,7 @@ _SAY_AGAIN = 1.0
 
 def _add_pub(verbs: Any) -> None:
     """Add it to the parser."""
-    parser = joins(verbs.add_parser("pub", help="Publish a message to a topic"))
+    parser = add_graph_options(verbs.add_parser("pub", help="Publish a message to a topic"))
     parser.add_argument("topic_name", help="Name of the ROS topic to publish to (e.g. '/chatter')")
     parser.add_argument("message_type", help="Type of the ROS message (e.g. 'std_msgs/msg/String')")
     values(parser, "values", "Values in YAML format (e.g. '{data: Hello World}')")

@@ -11,7 +11,7 @@ import shutil
 import signal
 import socket
 
-from . import fresh_places
+from . import own_mounts
 from .kernel import (
     CLONE_NEWNS,
     CLONE_NEWPID,
@@ -66,8 +66,8 @@ def _fork_first_process(launch: Launch) -> None:
     try:
         prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
         if launch.namespaces:
-            fresh_places.make(launch.disk, launch.inodes)
-            fresh_places.close_settings()
+            own_mounts.make(launch.disk, launch.inodes)
+            own_mounts.close_settings()
             give_up_privileges()
         _, most = resource.getrlimit(resource.RLIMIT_NOFILE)
         if resource.RLIM_INFINITY != most < launch.limits["RLIMIT_NOFILE"]:  # right programs would lack them

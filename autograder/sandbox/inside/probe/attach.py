@@ -4,7 +4,7 @@ import atexit
 import importlib
 from typing import Any
 
-from . import events, own_lines, rclpy_names
+from . import events, rclpy_names, student_lines
 from .callbacks import watch_blocking, watch_callbacks, watch_threads
 from .watch_actions import watch_actions
 from .watch_executors import watch_executors
@@ -47,7 +47,7 @@ def prepare() -> list[str]:
 def begin(descriptor: int, folder: str) -> None:
     """Begin to write to a descriptor; the program's own lines are those of files in `folder`."""
     open_channel(descriptor)
-    own_lines.own_files_are_in(folder)
+    student_lines.own_files_are_in(folder)
     for what in _failed:
         emit(events.ProbeFailed(what=what))
     emit(events.Attached())

@@ -9,8 +9,8 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from . import events, rclpy_names
-from .own_lines import awaited_line, callback_line, error_line
 from .records import Executor, Thing, here, thing_of
+from .student_lines import awaited_line, callback_line, error_line
 from .watch_messages import note_misfit
 from .wrapping import wrap, wrap_blocking
 from .writing import PAUSE, emit, emit_once, ledger, quiet

@@ -8,8 +8,8 @@ from typing import Any
 
 from . import events, rclpy_names
 from .callbacks import noted
-from .own_lines import callback_line, own_line
 from .records import Thing, group_of, here, node_name, thing_of
+from .student_lines import callback_line, own_line
 from .wrapping import wrap
 from .writing import emit_once, ledger, quiet
 

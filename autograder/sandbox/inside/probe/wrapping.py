@@ -7,8 +7,8 @@ from collections.abc import Callable
 from typing import Any
 
 from . import events
-from .own_lines import own_line
 from .records import Executor, Thing, executor_of, here, thing_of
+from .student_lines import own_line
 from .writing import ledger, quiet
 
 

@@ -141,7 +141,7 @@ class ProgramPipes:
             os.close(descriptor)
 
 
-def enforce(first: int, base: int, programs: Sequence[RunningProgram], limits: Limits) -> bool:
+def enforce_limits(first: int, base: int, programs: Sequence[RunningProgram], limits: Limits) -> bool:
     """Look at what a launch uses, and end the biggest of its programs if that is too much.
 
     Args:
@@ -319,7 +319,7 @@ class ProgramGroup:
             self._pipes.go_on()
             for program in programs:
                 program.priority.look(program.pid)
-            if not enforce(self.pid, self._base, programs, self._limits):
+            if not enforce_limits(self.pid, self._base, programs, self._limits):
                 signal.pidfd_send_signal(self._first, signal.SIGKILL)
             self.changed.notify_all()
 
