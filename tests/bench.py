@@ -32,7 +32,7 @@ from autograder.course.cells import grade_id_of
 from autograder.course.lab import lab_names, load_lab
 from autograder.gradebook.own_courses import prepare_nbgrader
 from autograder.grading.store import ResultStore
-from autograder.sandbox.outer import run_in_sandbox
+from autograder.sandbox.grading_sandbox import run_in_sandbox
 
 prepare_nbgrader()
 from nbgrader.api import Gradebook  # noqa: E402

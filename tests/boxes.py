@@ -9,7 +9,7 @@ from pathlib import Path
 
 from autograder.core.results import Isolation
 from autograder.sandbox.environment import python_environment
-from autograder.sandbox.outer import run_in_sandbox
+from autograder.sandbox.grading_sandbox import run_in_sandbox
 from autograder.sandbox.walls import bubblewrap
 
 ROOT = Path(__file__).parent.parent

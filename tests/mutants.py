@@ -20,9 +20,8 @@ import yaml
 from rich.progress import track
 from sample_class import ROOT
 
-from autograder.authoring.mutation.generate import handed_in, mutants
-from autograder.authoring.mutation.reach import reached
-from autograder.authoring.mutation.source import Mutant
+from autograder.authoring.mutation.mutants import handed_in, mutants, reached
+from autograder.authoring.mutation.rules import Mutant
 from autograder.core.files import write_beside
 from autograder.core.results import Isolation, SubmissionResult
 from autograder.course.lab import Lab, load_lab

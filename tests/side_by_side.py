@@ -68,7 +68,7 @@ def record(out: str, domains: int = 0) -> None:
     """
     from autograder.graph import domains as module
     from autograder.graph.observer import Observer
-    from autograder.sandbox.group import ProgramGroup
+    from autograder.sandbox.program_group import ProgramGroup
 
     if domains:
         module.LAST = domains

@@ -51,7 +51,7 @@ def report(request: pytest.FixtureRequest) -> dict[str, dict[str, Any]]:
         else:
             text = as_ordinary_user(
                 "from autograder.core.results import Isolation\n"
-                "from autograder.sandbox.outer import run_in_sandbox\n"
+                "from autograder.sandbox.grading_sandbox import run_in_sandbox\n"
                 f"run = run_in_sandbox({[*RUN_STDIN]!r}, {source.encode()!r}, Isolation.FULL, {RUN})\n"
                 "print(run.stdout.decode(), run.stderr)\n",
                 RUN + 30,

@@ -24,8 +24,8 @@ from autograder.grading.supervisor import run_in_workers
 from autograder.reasons import Group, all_kinds
 from autograder.sandbox import build as sandbox_build
 from autograder.sandbox.build import BuildRun
+from autograder.sandbox.grading_sandbox import SandboxRun
 from autograder.sandbox.isolation import preflight
-from autograder.sandbox.outer import OuterRun
 
 SENSORS = {
     "package.xml": """<?xml version="1.0"?>
@@ -619,5 +619,5 @@ def test_a_name_that_no_text_can_say_is_left_out_of_what_was_built() -> None:
     with tarfile.open(fileobj=archive, mode="w", errors="surrogateescape") as tar:
         for name in ("car/share/odd\udcff", "car/share/plain"):
             tar.addfile(tarfile.TarInfo(name))
-    run = sandbox_build._finished(OuterRun(archive.getvalue(), "", 0, False), sandbox_build._Watched())
+    run = sandbox_build._finished(SandboxRun(archive.getvalue(), "", 0, False), sandbox_build._Watched())
     assert list(BuildRun.model_validate_json(run.model_dump_json()).installed) == ["car/share/plain"]

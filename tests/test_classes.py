@@ -19,7 +19,7 @@ import pytest
 import sample_class
 from sample_class import ROOT
 
-from autograder.authoring.mutation.reach import using
+from autograder.authoring.mutation.mutants import using
 from autograder.core.results import CheckResult, SubmissionResult
 from autograder.course.lab import Cell, Lab, load_lab
 from autograder.grading import validation

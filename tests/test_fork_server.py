@@ -13,8 +13,8 @@ from boxes import ROOT, RUN_STDIN, in_sandbox
 
 from autograder.core.results import Isolation
 from autograder.sandbox.forks import KILLED, Fork, ForkServer
+from autograder.sandbox.grading_sandbox import Stopped, run_in_sandbox, start_fork_server
 from autograder.sandbox.isolation import preflight
-from autograder.sandbox.outer import Stopped, run_in_sandbox, start_fork_server
 
 pytestmark = pytest.mark.skipif(not preflight().full, reason=f"no full isolation here: {preflight().why_not_full}")
 

@@ -8,12 +8,9 @@ import mutants
 import pytest
 from sample_class import ROOT
 
-from autograder.authoring.mutation.generate import handed_in
-from autograder.authoring.mutation.generate import mutants as made_from
-from autograder.authoring.mutation.python_rules import changes, swaps
-from autograder.authoring.mutation.reach import reached
-from autograder.authoring.mutation.source import Source
-from autograder.authoring.mutation.text_rules import text_changes, without_a_line
+from autograder.authoring.mutation.mutants import handed_in, reached
+from autograder.authoring.mutation.mutants import mutants as made_from
+from autograder.authoring.mutation.rules import Source, changes, swaps, text_changes, without_a_line
 from autograder.course.lab import load_lab
 
 PROGRAM = """\

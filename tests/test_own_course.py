@@ -14,7 +14,7 @@ import pytest
 from linked import link_tree
 from typer.testing import CliRunner
 
-from autograder.authoring.new import new_course
+from autograder.authoring.courses import new_course
 from autograder.cli.main import app
 from autograder.core.errors import KitError
 from autograder.core.version import VERSION
@@ -301,7 +301,7 @@ def test_sections_name_lectures_that_there_are_and_each_code_once(tmp_path: Path
 
 
 def test_labs_come_in_the_order_of_the_settings(course: Path, tmp_path: Path) -> None:
-    from autograder.authoring.start_page import start_page
+    from autograder.authoring.release import start_page
     from autograder.course.lab import lab_names
 
     root = shutil.copytree(course, tmp_path / "course", ignore=shutil.ignore_patterns("build"))

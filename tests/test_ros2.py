@@ -395,10 +395,10 @@ def test_a_program_that_ends_by_itself_is_told(notebook: Notebook) -> None:
 
 
 def test_what_goes_on_ends_with_the_cell(notebook: Notebook) -> None:
-    notebook.run("from autograder.notebook import ros2_magic")
+    notebook.run("from autograder.notebook import magics")
     notebook.run('robot = launch("talker").start()')
     for seconds in A_WHILE:
-        notebook.run(f"ros2_magic._ENDLESS = {seconds}")
+        notebook.run(f"magics._ENDLESS = {seconds}")
         shown = notebook.run("%ros2 topic hz /chatter").text
         assert f"(stopped after {seconds:g} s" in shown
         if "average rate: " in shown:
@@ -507,10 +507,10 @@ def test_a_node_that_nothing_spins_is_told(notebook: Notebook) -> None:
     stuck = "import threading\nimport rclpy\nrclpy.init()\nnode = rclpy.create_node('stuck')\nthreading.Event().wait()"
     notebook.run(f"%%node stuck\n{stuck}", "stuck")
     notebook.run('robot = launch("stuck", "talker").start()')
-    notebook.run("from autograder.notebook import ros2_magic\nros2_magic._ENDLESS = 50.0")
+    notebook.run("from autograder.notebook import magics\nmagics._ENDLESS = 50.0")
     shown = notebook.run("%ros2 param list").text
     assert "/stuck:\nException while calling service of node '/stuck': None\n/talker:\n  start" in shown
-    notebook.run("ros2_magic._ENDLESS = 1.0")
+    notebook.run("magics._ENDLESS = 1.0")
     shown = notebook.run("%ros2 param get /stuck use_sim_time").text
     assert "a node answers only while something spins it" in shown
     notebook.run("robot.stop()")

@@ -19,11 +19,11 @@ from autograder.core.errors import KitError
 from autograder.core.processes import descendants
 from autograder.core.results import Isolation
 from autograder.sandbox import isolation, loop
-from autograder.sandbox.group import ProgramGroup
+from autograder.sandbox.grading_sandbox import run_in_sandbox
 from autograder.sandbox.isolation import Preflight, choose, preflight
 from autograder.sandbox.limits import Limits
 from autograder.sandbox.node_sandbox import NodeSandbox
-from autograder.sandbox.outer import run_in_sandbox
+from autograder.sandbox.program_group import ProgramGroup
 
 HONEST = "print('fine')\n"
 
@@ -44,7 +44,7 @@ def test_when_the_parent_is_killed_nothing_remains(kind: Isolation, processes: i
         f"s = NodeSandbox(p, Isolation.{kind.name}); g = s.group(); g.start('sleeper'); g.start('sleeper').wait(600)\n"
     )
     outer = (
-        "from autograder.core.results import Isolation\nfrom autograder.sandbox.outer import run_in_sandbox\n"
+        "from autograder.core.results import Isolation\nfrom autograder.sandbox.grading_sandbox import run_in_sandbox\n"
         f"run_in_sandbox({[*RUN_STDIN]!r}, {inner.encode()!r}, Isolation.{kind.name}, 600.0)\n"
     )
     mounts = Path("/proc/self/mounts").read_text()

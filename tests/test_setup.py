@@ -22,8 +22,8 @@ from pathlib import Path
 import pytest
 
 from autograder.setup import bootstrap, refusals
+from autograder.setup.bootstrap import pin
 from autograder.setup.labs import put_labs
-from autograder.setup.packages import pin
 from autograder.setup.places import MARKER
 
 ROOT = Path(__file__).resolve().parent.parent

@@ -32,8 +32,7 @@ from autograder.course.lab import lab_names
 @pytest.fixture(scope="module")
 def course(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A course of one small lab, released."""
-    from autograder.authoring.release import release
-    from autograder.authoring.start_page import START_PAGE, start_page
+    from autograder.authoring.release import START_PAGE, release, start_page
 
     root = toy.make_course(tmp_path_factory.mktemp("toy"))
     release(root, toy.LAB)

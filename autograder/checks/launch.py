@@ -40,7 +40,7 @@ from autograder.launch_files import remove_written
 from autograder.packages.workspace import INSTALLED
 from autograder.reasons import Reason, Refused
 from autograder.sandbox.environment import profile_environment, remove_logs
-from autograder.sandbox.group import ProgramGroup
+from autograder.sandbox.program_group import ProgramGroup
 
 
 @watched

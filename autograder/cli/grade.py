@@ -117,7 +117,7 @@ def _places(course: Path | None, lab: str, submissions: Path | None) -> tuple[Pa
             "Name a folder or zip." if submissions else f"Build the sample class: python tests/sample_class.py {lab}",
         )
     if submissions is None:
-        from autograder.authoring.sample_course import sample_course
+        from autograder.authoring.courses import sample_course
 
         root = sample_course(root)
     if root.is_relative_to(source.resolve()):

@@ -20,8 +20,8 @@ def new_course(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="A folder that does not exist yet, or is empty.")],
 ) -> None:
     """Write a course with its settings and one small lab."""
-    from autograder.authoring.new import FIRST_LAB
-    from autograder.authoring.new import new_course as write
+    from autograder.authoring.courses import FIRST_LAB
+    from autograder.authoring.courses import new_course as write
     from autograder.gradebook.own_courses import trust as note
 
     for path in write(folder):
@@ -53,7 +53,7 @@ def new_lab(
     course: CourseOption = None,
 ) -> None:
     """Write a small, complete lab with checks into the course, which you change into your own."""
-    from autograder.authoring.new import new_lab as write
+    from autograder.authoring.courses import new_lab as write
     from autograder.course.folder import course_root
 
     for path in write(course_root(course), name):
@@ -107,8 +107,8 @@ def release(
     course: CourseOption = None,
 ) -> None:
     """Generate what students receive, `labs/`, from `solutions/`; refuse a lab in which `lint` finds an error."""
+    from autograder.authoring.release import START_PAGE, start_page
     from autograder.authoring.release import release as generate
-    from autograder.authoring.start_page import START_PAGE, start_page
     from autograder.core.files import write_beside
     from autograder.course.folder import course_root
     from autograder.course.lab import lab_names

@@ -17,7 +17,7 @@ from autograder.core.results import Isolation
 from autograder.grading.job import Job
 from autograder.packages.workspace import digest_of, missing_tools
 from autograder.sandbox.build import BUILD_SECONDS, BuildRun
-from autograder.sandbox.outer import run_in_sandbox
+from autograder.sandbox.grading_sandbox import run_in_sandbox
 
 KEPT = 32
 """Builds that are kept; one of four interfaces has about 2 MiB."""

@@ -20,7 +20,7 @@ from autograder.grading.runner import Settings, job_of
 from autograder.grading.supervisor import limit
 from autograder.graph.bag import BagMessage
 from autograder.ros2.interfaces import source_of
-from autograder.sandbox.outer import run_in_sandbox
+from autograder.sandbox.grading_sandbox import run_in_sandbox
 from autograder.submission.reader import read_submission
 
 

@@ -19,7 +19,7 @@ from autograder.grading.job import CELL_SECONDS, STUCK_SECONDS, Job
 from autograder.grading.validation import believed, is_open, undecided, validated, was_killed
 from autograder.graph.patience import ALONE
 from autograder.reasons import KINDS, Group, Kind
-from autograder.sandbox.outer import OuterRun, run_in_sandbox
+from autograder.sandbox.grading_sandbox import SandboxRun, run_in_sandbox
 
 STUCK = Kind("stuck", "the grader did not come on at this check; an instructor decides", Group.GRADER)
 DIED = Kind("died", "the grader died at this check, twice; an instructor decides", Group.GRADER)
@@ -253,7 +253,7 @@ def unknown(job: Job, because: str, said: str = "") -> SubmissionResult:
     return job.result([undecided(cell, because, said) for cell in job.checks])
 
 
-def _died(cell: Cell, run: OuterRun) -> CheckResult:
+def _died(cell: Cell, run: SandboxRun) -> CheckResult:
     because = f"The grader ended twice at this check, at last with status {run.status}, without a result."
     check = undecided(cell, because, run.stderr, DIED)
     check.flags.append(
@@ -264,7 +264,7 @@ def _died(cell: Cell, run: OuterRun) -> CheckResult:
     return check
 
 
-def _stuck(cell: Cell, run: OuterRun, seconds: float) -> CheckResult:
+def _stuck(cell: Cell, run: SandboxRun, seconds: float) -> CheckResult:
     stacks = (b"\n" + run.stdout).partition(_STACKS)[2].decode("utf-8", "replace")
     if not stacks:
         return undecided(cell, f"The grader took longer than {seconds:.0f} s.", run.stderr, STUCK)

@@ -14,8 +14,8 @@ from autograder.core.errors import KitError
 from autograder.course.book import NO_BOOK, Book, read_book
 from autograder.course.cells import CELL_BYTES, BadNameError, CellFile, check_free, check_name, parse
 from autograder.course.folder import book_of_kit, course_root, is_students_kit, trusted_course
-from autograder.notebook import completion, lab_magic, ros2_magic
 from autograder.notebook.kernel import Kernel, now
+from autograder.notebook.magics import lab_magic, register_completion, ros2_magic
 from autograder.notebook.program_folder import Written, shown
 
 if TYPE_CHECKING:
@@ -57,14 +57,14 @@ def register(shell: Any) -> None:
     kernel = known if isinstance(known, Kernel) and known.shell is shell else Kernel(shell)
     for magic, text in (("node", _NODE_HELP), ("file", _FILE_HELP)):
         shell.register_magic_function(_writer(kernel, magic, text), magic_kind="cell", magic_name=magic)
-    shell.register_magic_function(ros2_magic.magic(kernel), magic_kind="line", magic_name="ros2")
-    shell.register_magic_function(lab_magic.magic(kernel), magic_kind="line", magic_name="lab")
+    shell.register_magic_function(ros2_magic(kernel), magic_kind="line", magic_name="ros2")
+    shell.register_magic_function(lab_magic(kernel), magic_kind="line", magic_name="lab")
     if kernel is known:
         return
     shell.input_transformers_cleanup.append(_with_body)
     front_end.active = kernel
     kernel.start()
-    completion.register(shell, kernel)
+    register_completion(shell, kernel)
     shell.events.register("pre_run_cell", kernel.begin_cell)
     shell.events.register("post_run_cell", kernel.end_cell)
     shell.display_formatter.mimebundle_formatter.for_type_by_name("autograder.checks.scoring", "Score", shown_score)

@@ -17,9 +17,9 @@ from autograder.graph.names import full_name
 from autograder.ros2 import messages
 from autograder.ros2.failure import Failure
 from autograder.ros2.interfaces import interface
-from autograder.ros2.options import joins, values, yaml_text
+from autograder.ros2.options import add_graph_options, values, yaml_text
 from autograder.ros2.session import Session
-from autograder.ros2.topic_listen import full_topic
+from autograder.ros2.topic import full_topic
 
 _STATUS = {
     GoalStatus.STATUS_SUCCEEDED: "SUCCEEDED",
@@ -32,19 +32,19 @@ _CANCELED_WITHIN = 5.0
 
 def add_verbs(verbs: Any) -> None:
     """Add them to the parser."""
-    parser = joins(verbs.add_parser("list", help="Output a list of action names"))
+    parser = add_graph_options(verbs.add_parser("list", help="Output a list of action names"))
     parser.add_argument("-t", "--show-types", action="store_true", help="Additionally show the action type")
     parser.add_argument("-c", "--count-actions", action="store_true", help="Only display the number of actions")
     parser.set_defaults(run=_list)
-    parser = joins(verbs.add_parser("info", help="Print information about an action"))
+    parser = add_graph_options(verbs.add_parser("info", help="Print information about an action"))
     parser.add_argument("action_name", help="Name of the ROS action to get info (e.g. '/fibonacci')")
     parser.add_argument("-t", "--show-types", action="store_true", help="Additionally show the action type")
     parser.add_argument("-c", "--count", action="store_true", help="Only display the number of clients and servers")
     parser.set_defaults(run=_info)
-    parser = joins(verbs.add_parser("type", help="Print an action's type"))
+    parser = add_graph_options(verbs.add_parser("type", help="Print an action's type"))
     parser.add_argument("action_name", help="Name of the ROS action to get type (e.g. '/fibonacci')")
     parser.set_defaults(run=_type)
-    parser = joins(verbs.add_parser("send_goal", help="Send an action goal"))
+    parser = add_graph_options(verbs.add_parser("send_goal", help="Send an action goal"))
     parser.add_argument("action_name", help="Name of the ROS action (e.g. '/fibonacci')")
     parser.add_argument("action_type", help="Type of the ROS action (e.g. 'test_msgs/action/Fibonacci')")
     values(parser, "goal", "Goal in YAML format (e.g. '{order: 10}')")

@@ -44,7 +44,7 @@ class _End:
 
 
 @dataclass(frozen=True)
-class Seen:
+class GraphView:
     """All that a node has heard of the graph; what the kit's own nodes have is left out."""
 
     nodes: list[str]
@@ -79,11 +79,11 @@ def _is_whole(ends: list[_End]) -> bool:
     return {end.number for end in ends} >= set(range(min(last) + 1, max(last)))
 
 
-def look(node: Node) -> Seen:
+def look(node: Node) -> GraphView:
     """What a node has heard by now."""
     found = dict(_ends(node))
     kits = {gid[:_PARTICIPANT] for gid, end in found.items() if _is_the_kits(end.node.rpartition("/")[2])}
-    return Seen(
+    return GraphView(
         sorted(
             full_name(space, name) for name, space in node.get_node_names_and_namespaces() if not _is_the_kits(name)
         ),

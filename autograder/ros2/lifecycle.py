@@ -7,16 +7,15 @@ from typing import Any
 
 from lifecycle_msgs.srv import ChangeState, GetAvailableTransitions, GetState
 
-from autograder.ros2.calls import ask
 from autograder.ros2.failure import Failure
 from autograder.ros2.node import absolute
-from autograder.ros2.options import joins
-from autograder.ros2.session import Session
+from autograder.ros2.options import add_graph_options
+from autograder.ros2.session import Session, ask
 
 
 def add_verbs(verbs: Any) -> None:
     """Add them to the parser."""
-    parser = joins(verbs.add_parser("nodes", help="Output a list of nodes with lifecycle"))
+    parser = add_graph_options(verbs.add_parser("nodes", help="Output a list of nodes with lifecycle"))
     parser.add_argument("-a", "--all", action="store_true", help="Display all nodes even hidden ones")
     parser.add_argument("-c", "--count-nodes", action="store_true", help="Only display the number of nodes")
     parser.set_defaults(run=_nodes)
@@ -35,7 +34,7 @@ def add_verbs(verbs: Any) -> None:
 
 def _with_hidden(parser: Any) -> Any:
     parser.add_argument("--include-hidden-nodes", action="store_true", help="Consider hidden nodes as well")
-    return joins(parser)
+    return add_graph_options(parser)
 
 
 def _lifecycle_nodes(session: Session, hidden: bool) -> list[str]:

@@ -10,7 +10,7 @@ from rclpy.node import Node
 
 from autograder.graph.names import full_name
 from autograder.ros2.failure import Failure
-from autograder.ros2.options import joins
+from autograder.ros2.options import add_graph_options
 from autograder.ros2.session import Session, is_hidden
 
 
@@ -37,11 +37,11 @@ def find_node(
 
 def add_verbs(verbs: Any) -> None:
     """Add them to the parser."""
-    parser = joins(verbs.add_parser("list", help="Output a list of available nodes"))
+    parser = add_graph_options(verbs.add_parser("list", help="Output a list of available nodes"))
     parser.add_argument("-a", "--all", action="store_true", help="Display all nodes even hidden ones")
     parser.add_argument("-c", "--count-nodes", action="store_true", help="Only display the number of nodes discovered")
     parser.set_defaults(run=_list)
-    parser = joins(verbs.add_parser("info", help="Output information about a node"))
+    parser = add_graph_options(verbs.add_parser("info", help="Output information about a node"))
     parser.add_argument("node_name", help="Node name to request information")
     parser.add_argument("--include-hidden", action="store_true", help="Display hidden topics, services, and actions")
     parser.set_defaults(run=_info)

@@ -20,7 +20,7 @@ from rclpy.topic_endpoint_info import TopicEndpointInfo
 Parser = argparse.ArgumentParser
 
 
-def joins(parser: Parser) -> Parser:
+def add_graph_options(parser: Parser) -> Parser:
     """Add what every verb has that looks at the graph."""
     parser.add_argument("--spin-time", type=float, help="seconds to listen before the graph is believed")
     parser.add_argument("-s", "--use-sim-time", action="store_true", help="take the time from /clock")

@@ -13,11 +13,10 @@ from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import DescribeParameters, GetParameters, ListParameters, SetParameters
 from rclpy.parameter import get_parameter_value, parameter_dict_from_yaml_file, parameter_value_to_python
 
-from autograder.ros2.calls import ask
 from autograder.ros2.failure import Failure
 from autograder.ros2.node import absolute, find_node
-from autograder.ros2.options import joins
-from autograder.ros2.session import Session
+from autograder.ros2.options import add_graph_options
+from autograder.ros2.session import Session, ask
 
 _ANSWER_WITHIN = 5.0
 """Seconds that a node may take to list its parameters; the real tool gives it one."""
@@ -60,7 +59,7 @@ def add_verbs(verbs: Any) -> None:
 
 
 def _verb(verbs: Any, name: str, text: str, run: Any, node: bool = True) -> Any:
-    parser = joins(verbs.add_parser(name, help=text))
+    parser = add_graph_options(verbs.add_parser(name, help=text))
     if node:
         parser.add_argument("node_name", help="Name of the ROS node")
     parser.add_argument("--include-hidden-nodes", action="store_true", help="Consider hidden nodes as well")

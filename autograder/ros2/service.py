@@ -9,30 +9,30 @@ import yaml
 from autograder.ros2 import messages
 from autograder.ros2.failure import Failure
 from autograder.ros2.interfaces import interface
-from autograder.ros2.options import above_zero, joins, values, yaml_text
+from autograder.ros2.options import above_zero, add_graph_options, values, yaml_text
 from autograder.ros2.session import Session
 
 
 def add_verbs(verbs: Any) -> None:
     """Add them to the parser."""
-    parser = joins(verbs.add_parser("list", help="Output a list of available services"))
+    parser = add_graph_options(verbs.add_parser("list", help="Output a list of available services"))
     parser.add_argument("-t", "--show-types", action="store_true", help="Additionally show the service type")
     parser.add_argument("-c", "--count-services", action="store_true", help="Only display the number of services")
     _hidden(parser)
     parser.set_defaults(run=_list)
-    parser = joins(verbs.add_parser("type", help="Output a service's type"))
+    parser = add_graph_options(verbs.add_parser("type", help="Output a service's type"))
     parser.add_argument("service_name", help="Name of the ROS service to get type (e.g. '/talker/list_parameters')")
     _hidden(parser)
     parser.set_defaults(run=_type)
-    parser = joins(verbs.add_parser("info", help="Print information about a service"))
+    parser = add_graph_options(verbs.add_parser("info", help="Print information about a service"))
     parser.add_argument("service_name", help="Name of the ROS service to get info (e.g. '/add_two_ints')")
     parser.set_defaults(run=_info)
-    parser = joins(verbs.add_parser("find", help="Output a list of services of a given type"))
+    parser = add_graph_options(verbs.add_parser("find", help="Output a list of services of a given type"))
     parser.add_argument("service_type", help="Name of the ROS service type to filter for")
     parser.add_argument("-c", "--count-services", action="store_true", help="Only display the number of services")
     _hidden(parser)
     parser.set_defaults(run=_find)
-    parser = joins(verbs.add_parser("call", help="Call a service"))
+    parser = add_graph_options(verbs.add_parser("call", help="Call a service"))
     parser.add_argument("service_name", help="Name of the ROS service to call to (e.g. '/add_two_ints')")
     parser.add_argument("service_type", help="Type of the ROS service (e.g. 'std_srvs/srv/Empty')")
     values(parser, "values", "Values in YAML format (e.g. '{a: 1, b: 2}')")

@@ -27,7 +27,7 @@ from autograder.core import interrupts
 from autograder.graph.names import full_name
 from autograder.graph.observer import Observer, leave_graph
 from autograder.ros2.discovery import PREFIX, is_observer, look, participants_here
-from autograder.ros2.failure import TimeIsUp
+from autograder.ros2.failure import Failure, TimeIsUp
 
 _POLL = 0.05
 """Seconds between two looks at the graph. What follows counts looks: on a busy machine one takes longer, and so does
@@ -251,3 +251,19 @@ def _whole_round() -> Iterator[None]:
 def is_hidden(name: str) -> bool:
     """Whether a part of a topic's or service's name begins with an underscore."""
     return any(part.startswith("_") for part in name.split("/"))
+
+
+_READY_WITHIN = 5.0
+"""Seconds that a service of a node that is on the graph may take to show up, as with the real tool."""
+
+
+def ask(session: Session, node: str, service: str, srv_type: Any, request: Any, within: float | None = None) -> Any:
+    """The answer of a node's service, or None if it did not come within so many seconds.
+
+    Raises:
+        Failure: the service is not there.
+    """
+    client = session.node.create_client(srv_type, f"{node}/{service}")
+    if not session.spin_until(client.service_is_ready, _READY_WITHIN):
+        raise Failure("Wait for service timed out")
+    return session.answer(client.call_async(request), within)

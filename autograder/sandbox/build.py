@@ -25,8 +25,8 @@ from autograder.core.errors import KitError
 from autograder.core.processes import cpu_time, descendants, memory, wants_cpu
 from autograder.core.results import Isolation
 from autograder.sandbox.environment import INSIDE, python_environment
+from autograder.sandbox.grading_sandbox import OUTPUT_LIMIT, SandboxRun, exchange
 from autograder.sandbox.limits import MIB
-from autograder.sandbox.outer import OUTPUT_LIMIT, OuterRun, exchange
 from autograder.sandbox.scratch import Scratch
 from autograder.sandbox.walls import bubblewrap, seccomp
 
@@ -187,7 +187,7 @@ def _end_session(process: subprocess.Popen[bytes]) -> None:
     process.wait()
 
 
-def _finished(run: OuterRun, watched: _Watched) -> BuildRun:
+def _finished(run: SandboxRun, watched: _Watched) -> BuildRun:
     too_much = [*watched.over, *["output"] * (len(run.stdout) > OUTPUT_LIMIT)]
     if run.timed_out and not too_much:
         if watched.had_no_chance:

@@ -30,7 +30,7 @@ from pathlib import Path
 from typing import NoReturn
 
 from autograder.sandbox.forks import BEGUN
-from autograder.sandbox.inside import fresh_places
+from autograder.sandbox.inside import own_mounts
 from autograder.sandbox.inside.kernel import (
     CLONE_NEWIPC,
     CLONE_NEWNET,
@@ -172,7 +172,7 @@ def _become_first_process(life_line: socket.socket, streams: list[int]) -> None:
 def _furnish() -> None:
     """Set up the new namespaces, and give up what that takes."""
     try:
-        fresh_places.make(DISK, 0)
+        own_mounts.make(DISK, 0)
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as any_socket:
             fcntl.ioctl(any_socket, _SET_FLAGS, struct.pack("16sH14x", b"lo", _UP_AND_RUNNING))
         give_up_privileges()

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from autograder.core.errors import KitError
 from autograder.core.results import Isolation
-from autograder.sandbox.outer import run_in_sandbox
+from autograder.sandbox.grading_sandbox import run_in_sandbox
 from autograder.sandbox.walls import bubblewrap, landlock
 
 _TIME_LIMIT = 60.0
@@ -72,7 +72,7 @@ def _why_not_full() -> str:
     if not bubblewrap.bwrap():
         return "bubblewrap is missing from the virtual environment"
     try:
-        run = run_in_sandbox(["autograder.sandbox.trial"], b"", Isolation.FULL, _TIME_LIMIT)
+        run = run_in_sandbox(["autograder.sandbox.preflight"], b"", Isolation.FULL, _TIME_LIMIT)
     except OSError as error:
         return f"bubblewrap does not start ({error})"
     if run.status == 0 and run.stdout.strip() == b"isolated":

@@ -2,8 +2,8 @@
 
 Nothing here is a statement about the machine. How long a program runs, how much it computes and how much it prints
 depends on how fast that is and on what else it does, so none of these ends a program: it runs until the end of its
-launch. One that computes on and on gives way to others (`priority.py`), and one that prints without end is read no
-faster than a terminal would (`program_pipes.py`).
+launch. One that computes on and on gives way to others (`running_program.py`), and one that prints without end is read
+no faster than a terminal would (`program_group.py`).
 """
 
 from __future__ import annotations

@@ -19,9 +19,9 @@ from pathlib import Path
 from autograder.core.errors import KitError
 from autograder.core.results import Isolation
 from autograder.sandbox.environment import INSIDE, python_environment
-from autograder.sandbox.group import GroupLost, ProgramGroup
 from autograder.sandbox.limits import Limits
 from autograder.sandbox.loop import Loop
+from autograder.sandbox.program_group import GroupLost, ProgramGroup
 from autograder.sandbox.scratch import Scratch
 from autograder.sandbox.walls import bubblewrap, seccomp
 

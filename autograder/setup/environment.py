@@ -1,6 +1,6 @@
 # Written for Python 3.6 and up, so that an old Python meets a sentence and not a SyntaxError.
 # ruff: noqa: UP006, UP031, UP035
-"""The environment `.venv`: empty, finished with a marker, or thrown away."""
+"""The environment `.venv`: made empty, pointed to the kit and the course, finished with a marker, or removed."""
 
 import contextlib
 import hashlib
@@ -9,12 +9,59 @@ import os
 import shutil
 from typing import Any, Dict, List, Tuple
 
-from autograder.setup.commands import write_commands
+from autograder.setup.first_lines import FILE, TEXT
 from autograder.setup.interpreter import Interpreter, output_of
-from autograder.setup.jupyter import lead_jupyter
-from autograder.setup.places import MARKER, PYTHON, ROOT, VENV
-from autograder.setup.python import lead_python
+from autograder.setup.places import MARKER, PYTHON, ROOT, VENV, WHEEL
 from autograder.setup.refusals import SetUpError, refuse_full_disk, tail
+
+# A #! line can hold no space and is cut at 127 bytes: /bin/sh starts the Python that lies beside this file.
+# Guarded, since processes of a pool import the main script once more.
+_COMMAND = (
+    '#!/bin/sh\n\'\'\'exec\' "$(dirname "$(readlink -f "$0")")/python" "$0" "$@"\n\' \'\'\'\n'
+    "import sys\n\nfrom autograder.cli import %s\n\nif __name__ == '__main__':\n    sys.exit(%s())\n"
+)
+
+
+def write_commands() -> None:
+    """Write those that are missing or of an earlier form."""
+    for name, function in (("autograder", "main"), ("ros2", "ros2")):
+        command = VENV / "bin" / name
+        text = _COMMAND % (function, function)
+        if not command.exists() or command.read_text(encoding="utf-8") != text:
+            command.write_text(text, encoding="utf-8")
+            command.chmod(0o755)
+
+
+def lead_jupyter() -> None:
+    """Let nbgrader, nbconvert and kernels of this environment use the course's configuration, wherever they start.
+
+    Started elsewhere than in the course, nbgrader would go on with its own stages, which run what students wrote.
+    nbconvert would write reports into Markdown as HTML, though they have a plain text. Kernels would not know what to
+    say when a notebook's first cell was not run.
+    """
+    if WHEEL:
+        return
+    ours = ROOT / "autograder" / "notebook" / "jupyter"
+    for folder, config in (
+        ("jupyter", ROOT / "nbgrader_config.py"),
+        ("jupyter", ours / "jupyter_nbconvert_config.json"),
+        ("ipython", ours / "ipython_kernel_config.json"),
+    ):
+        link = VENV / "etc" / folder / config.name
+        if not link.exists() or link.resolve() != config:
+            with contextlib.suppress(OSError):
+                link.unlink()
+            link.parent.mkdir(parents=True, exist_ok=True)
+            link.symlink_to(config)
+
+
+def lead_python() -> None:
+    """Write the file that each Python of the environment reads first, if it says something else."""
+    text = TEXT if WHEEL else "%s\n%s" % (ROOT, TEXT)
+    for folder in VENV.glob("lib/python3*/site-packages"):
+        file = folder / FILE
+        if not file.exists() or file.read_text(encoding="utf-8") != text:
+            file.write_text(text, encoding="utf-8")
 
 
 def digest(lock: str) -> str:

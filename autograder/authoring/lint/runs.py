@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 
-from autograder.authoring.lint.finding import Finding
-from autograder.authoring.mutation.generate import handed_in, mutants
-from autograder.authoring.mutation.reach import reached
-from autograder.authoring.mutation.source import Mutant
+from autograder.authoring.lint.static import Finding
+from autograder.authoring.mutation.mutants import handed_in, mutants, reached
+from autograder.authoring.mutation.rules import Mutant
 from autograder.core.results import Isolation, SubmissionResult
 from autograder.course.lab import Cell, Lab
 from autograder.grading.canaries import KnownAnswers, otherwise

@@ -15,7 +15,7 @@ from autograder.checks import outcomes
 from autograder.checks.expect.expectations import WITHIN, Expectations
 from autograder.checks.misuse import Misuse
 from autograder.checks.program import Program
-from autograder.graph.clock import ClockDriver
+from autograder.graph.publishing import ClockDriver
 from autograder.graph.recording import Recording
 from autograder.reasons import Group, Kind, Reason
 from autograder.sandbox.running_program import RunningProgram

@@ -13,7 +13,7 @@ from autograder.checks.expect.endpoints import EndExpectations
 from autograder.checks.expect.expectations import WITHIN
 from autograder.checks.parts import asked
 from autograder.graph.names import node_of
-from autograder.graph.stream import Stream
+from autograder.graph.publishing import Stream
 
 RELIABLE_DEEP = 1000
 """Depth of the check's own publishers, so that a burst of its own is never cut."""

@@ -37,9 +37,9 @@ def _parts(*names: str) -> list[Any]:
 
 
 if __name__ == "__main__":
-    launches, first_process, program, warm_up = _parts("launches", "first_process", "program", "warm_up")
+    launches, program, warm_up = _parts("launches", "program", "warm_up")
     warm_up.warm_up()
     launch = launches.serve_launches(socket.socket(fileno=int(sys.argv[1])), "".join(sys.argv[2:]))
-    start = first_process.serve_programs(launch)
+    start = launches.serve_programs(launch)
     program.become(start)
     program.run(start)

@@ -4,14 +4,12 @@ import atexit
 import importlib
 from typing import Any
 
-from . import events, own_lines, rclpy_names
+from . import events, rclpy_names, student_lines
+from .callbacks import watch_blocking, watch_callbacks, watch_threads
 from .watch_actions import watch_actions
-from .watch_calls import watch_blocking, watch_callbacks, watch_threads
 from .watch_executors import watch_executors
-from .watch_lifecycle import watch_lifecycle
 from .watch_messages import watch_messages
-from .watch_nodes import watch_nodes, watch_things
-from .watch_parameters import watch_parameters
+from .watch_nodes import watch_lifecycle, watch_nodes, watch_parameters, watch_things
 from .writing import emit, ledger, open_channel, quiet
 
 _MODULES = (
@@ -49,7 +47,7 @@ def prepare() -> list[str]:
 def begin(descriptor: int, folder: str) -> None:
     """Begin to write to a descriptor; the program's own lines are those of files in `folder`."""
     open_channel(descriptor)
-    own_lines.own_files_are_in(folder)
+    student_lines.own_files_are_in(folder)
     for what in _failed:
         emit(events.ProbeFailed(what=what))
     emit(events.Attached())

@@ -6,8 +6,8 @@ from typing import Any
 
 from . import events, rclpy_names
 from .callbacks import ActionCallback, action_callbacks
-from .own_lines import callback_line, own_line
-from .thing import Thing, group_of, node_name, thing_of
+from .records import Thing, group_of, node_name, thing_of
+from .student_lines import callback_line, own_line
 from .watch_messages import note_misfit
 from .wrapping import wrap
 from .writing import ledger, quiet

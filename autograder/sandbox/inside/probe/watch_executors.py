@@ -4,11 +4,8 @@ import functools
 from typing import Any
 
 from . import rclpy_names
-from .blocking import wrap_blocking
-from .executor import executor_of
-from .thing import thing_of
-from .thread_state import here
-from .wrapping import wrap
+from .records import executor_of, here, thing_of
+from .wrapping import wrap, wrap_blocking
 from .writing import ledger, quiet
 
 

@@ -4,8 +4,8 @@ import functools
 from typing import Any
 
 from . import events
-from .own_lines import own_line
-from .thing import thing_of
+from .records import thing_of
+from .student_lines import own_line
 from .writing import emit_once, quiet
 
 

@@ -1,4 +1,4 @@
-"""A steady stream of messages from the observer: a sensor or a controller that behaves just as a check needs it."""
+"""What the observer publishes itself: a steady stream of messages, and the simulated time on `/clock`."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ from collections.abc import Callable
 from typing import Any
 
 from rclpy.qos import QoSProfile
+from rclpy.time import Time
+from rosgraph_msgs.msg import Clock
 
 from autograder.graph.observer import Observer
 
@@ -53,3 +55,31 @@ class Stream:
         """Stop sending: from outside it looks like a program that hangs."""
         if self._timer is not None:
             self._timer.cancel()
+
+
+REPEAT = 0.1
+"""Seconds after which an unanswered stamp is sent again: it may have been lost before the node was matched."""
+
+
+class ClockDriver:
+    """Publishes `/clock`, only when told to: time in the launch stands still in between."""
+
+    def __init__(self, observer: Observer) -> None:
+        """Start at 1 s: rclpy takes time 0 for "not set"."""
+        self._observer = observer
+        self._publisher = observer.publisher("/clock", Clock, 10)
+        self.now = 1.0
+        """Simulated seconds."""
+
+    def advance(self, step: float, effect: Callable[[], bool], within: float = 5.0) -> bool:
+        """Move time on by `step` seconds and wait for its effect; the stamp is repeated until the effect shows.
+
+        A clock that runs freely loses ticks on a busy machine; in lock-step each run has the same ticks.
+        """
+        self.now += step
+        stamp = Clock(clock=Time(nanoseconds=round(self.now * 1e9)).to_msg())
+        for _ in range(max(1, round(within / REPEAT))):
+            self._publisher.publish(stamp)
+            if self._observer.wait(effect, REPEAT):
+                return True
+        return False

@@ -1,15 +1,18 @@
-"""The mutants of a lab."""
+"""The mutants of a lab, and which checks each of them can reach.
+
+`tests/test_classes.py` shows that nothing else reaches them: without the files that are said not to reach a check, the
+solution passes it all the same.
+"""
 
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
-from autograder.authoring.mutation.python_rules import changes, swaps
-from autograder.authoring.mutation.source import Mutant, Source
-from autograder.authoring.mutation.text_rules import text_changes, without_a_line
+from autograder.authoring.mutation.rules import Mutant, Source, changes, swaps, text_changes, without_a_line
 from autograder.course.cells import grade_id_of, source_of
-from autograder.course.lab import Answer, Lab
+from autograder.course.lab import Answer, Cell, Lab
+from autograder.packages.workspace import SOURCES
 
 
 def mutants(lab: Lab) -> list[Mutant]:
@@ -84,3 +87,31 @@ def handed_in(lab: Lab, mutant: Mutant) -> dict[str, str]:
     """The files of a submission that is the solution but for this change."""
     solutions = {grade_id: answer.solution for grade_id, answer in lab.answers.items()}
     return lab.files_with(solutions | {mutant.answer: mutant.source})
+
+
+def reached(lab: Lab, answers: Iterable[str]) -> list[Cell]:
+    """The cells to run for changed answers: set-up, and the checks that use one's file or a file that mentions it."""
+    files = {answer.grade_id: answer.file for answer in lab.answers.values() if answer.file is not None}
+    names = set(answers) & files.keys()
+    grown = True
+    while grown:
+        grown = False
+        for other in files.keys() - names:
+            body = lab.answers[other].solution.partition("\n")[2]
+            if any(_word(files[name].name) in body for name in names):
+                names.add(other)
+                grown = True
+    words = [word for name in names for word in (f'"{_word(files[name].name)}"', f"'{_word(files[name].name)}'")]
+    mentioning = {cell.grade_id for cell in lab.cells if any(word in cell.source for word in words)}
+    everything = any(cell.points is None and cell.grade_id in mentioning for cell in lab.cells)
+    return [cell for cell in lab.cells if cell.points is None or everything or cell.grade_id in mentioning]
+
+
+def _word(name: str) -> str:
+    """What others name a file by: itself, or the package that it is a file of."""
+    return name.split("/")[1] if name.startswith(f"{SOURCES}/") else name
+
+
+def using(lab: Lab, check: Cell) -> frozenset[str]:
+    """The answers that reach a check."""
+    return frozenset(name for name in lab.answers if check in reached(lab, [name]))

@@ -45,7 +45,7 @@ _RUN_AND_END_WITH_PARENT = (
 
 
 @dataclass
-class OuterRun:
+class SandboxRun:
     """What came out of a run in the sandbox."""
 
     stdout: bytes
@@ -66,7 +66,7 @@ def run_in_sandbox(
     time_limit: float,
     stop: threading.Event | None = None,
     heard: Callable[[bytes], None] | None = None,
-) -> OuterRun:
+) -> SandboxRun:
     """Run `python -m <module_args…>` in the grading sandbox and wait for it.
 
     The module sees this virtual environment, the `autograder` package and an empty /tmp; no labs, no submissions, no
@@ -106,7 +106,7 @@ def _run(
     time_limit: float,
     stop: threading.Event | None,
     heard: Callable[[bytes], None] | None,
-) -> OuterRun:
+) -> SandboxRun:
     try:
         return exchange(process, stdin, time_limit, stop, heard)
     finally:
@@ -185,7 +185,7 @@ def exchange(
     time_limit: float,
     stop: threading.Event | None = None,
     heard: Callable[[bytes], None] | None = None,
-) -> OuterRun:
+) -> SandboxRun:
     """Feed a process and take what it writes, until it ends, writes too much, or its time is over.
 
     Args:
@@ -238,7 +238,7 @@ def exchange(
     except subprocess.TimeoutExpired:
         process.kill()
         status, timed_out = process.wait(), True
-    return OuterRun(bytes(taken["stdout"]), taken["stderr"].decode("utf-8", "replace"), status, timed_out)
+    return SandboxRun(bytes(taken["stdout"]), taken["stderr"].decode("utf-8", "replace"), status, timed_out)
 
 
 def _fed(pipe: int, waiting: memoryview) -> memoryview:

@@ -1,7 +1,8 @@
-"""Writes a course, or a lab of one, to begin with: small, complete, and graded like any other."""
+"""Writes courses: a new one, a new lab, and the one that sample classes are graded in."""
 
 from __future__ import annotations
 
+import contextlib
 import json
 import re
 from pathlib import Path
@@ -10,7 +11,7 @@ from autograder.core.errors import KitError
 from autograder.core.files import write_beside
 from autograder.course.paths import CoursePaths
 from autograder.course.settings import SETTINGS_FILE
-from autograder.gradebook.own_courses import TEMPLATE
+from autograder.gradebook.own_courses import TEMPLATE, trust
 from autograder.gradebook.settings import CONFIG_FILE
 
 FIRST_LAB = "lab1_greeter"
@@ -78,3 +79,19 @@ def new_lab(root: Path, name: str) -> list[Path]:
     for path in (requirements, canaries):
         write_beside(path, (_TEMPLATES / path.name).read_text(encoding="utf-8"))
     return [notebook, requirements, canaries]
+
+
+def sample_course(root: Path) -> Path:
+    """Make the course for sample classes below the course at `root`, and return its folder."""
+    sample = CoursePaths(root).sample_course
+    sample.mkdir(parents=True, exist_ok=True)
+    for path in (CoursePaths(root).solutions, CoursePaths(root).labs, root / "tests"):
+        link = sample / path.name
+        if not link.is_symlink():
+            link.symlink_to(path, target_is_directory=True)
+    settings = root / SETTINGS_FILE
+    write_beside(sample / SETTINGS_FILE, settings.read_bytes() if settings.is_file() else b"")
+    write_beside(sample / CONFIG_FILE, TEMPLATE.read_bytes())
+    with contextlib.suppress(OSError):  # the kit's own commands do not need it
+        trust(sample)
+    return sample
