@@ -170,7 +170,7 @@ class MessageExpectations(SourceExpectations):
             `ros.expect_messages("/chatter", String, at_least=10, rate=2, publisher="/talker")`
 
         Codes:
-            `too-few`, `too-many`, `content`, `message-field`, `rate`, `extra-publisher`, `wrong-node`, those of silence.
+            `too-few`, `too-many`, `content`, `message-field`, `rate`, `extra-publisher`, `wrong-node`, and of silence.
         """
         need, most = _numbers(at_least, at_most, exactly, rate)
         recording = self._observer.record(topic, msg_type, qos)
