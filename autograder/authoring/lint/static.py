@@ -60,6 +60,21 @@ def metadata_findings(cells: list[dict[str, Any]]) -> Iterator[Finding]:
                 yield Finding(name, "another cell has the same grade_id.")
             for sentence in (*_marks(nbgrader_of(cell), cell["cell_type"]), *_answer(cell)):
                 yield Finding(name, sentence)
+            if _is_check(cell) and not _says_something(cells[number - 2] if number > 1 else {}):
+                yield Finding(
+                    name, "students see it folded, and no sentence above says what it looks at.", warning=True
+                )
+
+
+def _is_check(cell: dict[str, Any]) -> bool:
+    marks = nbgrader_of(cell)
+    return bool(marks.get("grade")) and not marks.get("solution") and cell["cell_type"] == "code"
+
+
+def _says_something(cell: dict[str, Any]) -> bool:
+    """Whether a cell is text that ends with more than a heading."""
+    lines = source_of(cell).strip().splitlines() if cell.get("cell_type") == "markdown" else []
+    return bool(lines) and not lines[-1].startswith("#")
 
 
 def _marks(marks: dict[str, Any], kind: str) -> Iterator[str]:
@@ -97,8 +112,7 @@ def _outside(cell: dict[str, Any]) -> Iterator[str]:
     found = {match[2] for match in MARK.finditer(source_of(cell))}
     if "SOLUTION" in found and not marks.get("solution"):
         yield "a solution stands in a cell that is not to be filled in; students would receive it."
-    check = marks.get("grade") and not marks.get("solution") and cell["cell_type"] == "code"
-    if "HIDDEN TESTS" in found and not check:
+    if "HIDDEN TESTS" in found and not _is_check(cell):
         yield "hidden tests stand in a cell that is no check."
 
 
