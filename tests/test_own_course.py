@@ -324,5 +324,17 @@ def test_a_course_that_lists_a_lab_or_a_code_that_there_is_not_is_told_so(course
     assert subprocess.run([*lint, LAB], capture_output=True).returncode == 0
 
 
+def test_lint_asks_for_a_sentence_above_each_check(course: Path, tmp_path: Path) -> None:
+    root = tmp_path / "course"
+    shutil.copytree(course, root, ignore=shutil.ignore_patterns("build"))
+    notebook = root / "solutions" / LAB / f"{LAB}.ipynb"
+    raw = json.loads(notebook.read_text(encoding="utf-8"))
+    raw["cells"] = [one for one in raw["cells"] if one["id"] != "about-check-facts"]
+    notebook.write_text(json.dumps(raw), encoding="utf-8")
+    lint = [Path(sys.executable).with_name("autograder"), "lint", "--static", "--course", root, LAB]
+    told = subprocess.run(lint, capture_output=True, text=True).stdout
+    assert "cell `check_facts`: students see it folded" in " ".join(told.split())
+
+
 def test_this_repositorys_configuration_is_what_a_new_course_gets() -> None:
     assert (KIT / "nbgrader_config.py").read_text() == TEMPLATE.read_text()
