@@ -278,7 +278,7 @@ CASES = {
         COUNTS.format(AGREE),
         EXECUTE + "    goal.abort()\n" + SUCCEED,
         says="execute-exception",
-        because="it ends only once",
+        because="a goal can end only once",
         ask=of_goal("why_not_finished"),
     ),
     "aborts_by_itself": Case(
@@ -336,7 +336,7 @@ CASES = {
         EXECUTE.replace("def execute", "async def execute") + "    time.sleep(0.5)\n" + SUCCEED,
         THREADS.format(1),
         says="goal-holds-thread",
-        because="only an `await` gives the thread back. Give it two threads",
+        because="only `await` frees the thread. Give it two threads",
         never=("cancel-return", "goal-holds-group"),
         ask=of_goal("why_not_canceled"),
     ),
@@ -453,7 +453,7 @@ CASES = {
         main="threading.Thread(target=node.stay).start()\nrclpy.spin_once(node)",
         methods="def stay(self):\n    while True:\n        time.sleep(0.1)\n",
         says="thread-left",
-        because="still runs `stay`",
+        because="is still in `stay`",
         never=("spinning-ended",),
     ),
     "keeps_a_thread": Case(
@@ -467,10 +467,10 @@ CASES = {
         "self.create_timer(0.05, self.tick())\n",
         "def tick(self):\n    pass\n",
         says="callback-exception",
-        because="has None for its callback",
+        because="creates is None",
     ),
     # Blocked callbacks.
-    "calls": Case(ASKER.format(""), CALL, says="call-in-callback", because="holds the only thread"),
+    "calls": Case(ASKER.format(""), CALL, says="call-in-callback", because="occupies the only thread"),
     "calls_same_group": Case(
         ASKER.format(""), CALL, THREADS.format(4), says="call-same-group", never=("call-in-callback",)
     ),
@@ -515,7 +515,7 @@ CASES = {
         "self.create_timer(0.05, lambda: self.ask())\n",
         "async def ask(self):\n    self.out.publish(String())\n",
         says="never-awaited",
-        because="It.ask` was called and never awaited",
+        because="It.ask` was called, but never awaited",
     ),
     "asks_as_another_type": Case(
         "from rclpy.context import Context\nfrom std_srvs.srv import SetBool\n"
@@ -525,7 +525,7 @@ CASES = {
         "self.client = self.create_client(SetBool, '~/gate')\nself.client.call_async(SetBool.Request())\n"
         "self.create_timer(0.05, lambda: None)\n",
         says="wrong-type",
-        because="as a std_srvs/srv/SetBool, and the service there is a std_srvs/srv/Trigger",
+        because="the type std_srvs/srv/SetBool, but the service has the type std_srvs/srv/Trigger",
         never=("waits-for-service",),
     ),
     "polls": Case(ASKER.format(OWN), POLL, says="busy-wait", because="no thread is free", never=("stuck-callback",)),
@@ -536,7 +536,7 @@ CASES = {
         "    rclpy.spin_until_future_complete(self, self.client.call_async(Trigger.Request()), timeout_sec=0.3)\n",
         "executor = SingleThreadedExecutor()\nexecutor.add_node(node)\nexecutor.spin()",
         says="nested-spin",
-        because="took the node away",
+        because="removes the node from the executor",
         never=("spinning-ended",),
     ),
     "spins_in_vain": Case(
@@ -547,7 +547,7 @@ CASES = {
         "        future = self.client.call_async(Trigger.Request())\n"
         "        rclpy.spin_until_future_complete(self, future, timeout_sec=0.1)\n",
         says="nested-spin",
-        because="without what it spun for",
+        because="before its future was done",
     ),
     "spins_before": Case(
         "self.create_timer(0.05, self.tick)\n",
@@ -627,7 +627,7 @@ CASES = {
     "thread_exits": Case(
         "import sys\nself.create_timer(0.05, lambda: None)\nthreading.Thread(target=sys.exit).start()\n",
         says="thread-exception",
-        because="that ends the thread in which it is raised, and no other",
+        because="which ends only the thread in which it is raised",
     ),
     "thread_raises": Case(
         "self.create_timer(0.05, self.tick)\nthreading.Thread(target=self.work).start()\n",
@@ -681,7 +681,7 @@ CASES = {
     "outlived": Case(
         MAP.format(", lifespan=Duration(seconds=0.2)") + TALK,
         says="lifespan",
-        because="the publisher's lifespan is 0.2 s",
+        because="The publisher's lifespan is 0.2 s",
         never=("silent",),
         ask=silent_late,
     ),
@@ -713,7 +713,7 @@ CASES = {
         SLOW,
         THREADS.format(2),
         says="few-threads",
-        because="2 threads, and 3",
+        because="2 threads, but 3",
         ask=together(3),
         never=("one-group", "machine-threads"),
     ),
@@ -746,7 +746,7 @@ CASES = {
         SLOW,
         THREADS.format(4),
         says="group-limit",
-        because="no more than 2 callbacks run at once, and 3 have to",
+        because="at most 2 callbacks to run at the same time, but 3 have to",
         ask=together(3),
         never=("one-group",),
     ),
@@ -775,14 +775,14 @@ CASES = {
         "spins = threading.Event()\none.create_task(spins.set)\n"
         "threading.Thread(target=one.spin, daemon=True).start()\nspins.wait()\nother.spin()",
         says="single-threaded-executor",
-        because="a node is in one executor at a time",
+        because="a node belongs only to the executor to which it was added last",
         ask=together(),
     ),
     "last_of_the_loop": Case(
         "for word in ('a', 'b'):\n    self.create_timer(0.05, lambda: self.say(word))\n",
         "def say(self, word):\n    self.out.publish(String(data=word))\n",
         says="late-binding",
-        because="looks `word` up when it runs",
+        because="reads `word` only when it runs",
         ask=alike,
     ),
     "each_of_the_loop": Case(
@@ -848,7 +848,7 @@ CASES = {
         main="import mmap, tempfile\nfile = tempfile.TemporaryFile()\nfile.truncate(4096)\n"
         "mapped = mmap.mmap(file.fileno(), 4096)\nfile.truncate(0)\nmapped[0] = 1",
         says="crashed",
-        because="a part of a mapped file",
+        because="a part of a memory-mapped file",
         ask=trouble,
     ),
     "ended_by_another_signal": Case(
@@ -859,7 +859,7 @@ CASES = {
         "self.create_timer(0.05, lambda: self.future.done() or self.future.set_result(1))\n",
         main="rclpy.spin_until_future_complete(node, node.future)\nNone()",
         says="crashed",
-        because="handed over without brackets",
+        because="Pass a callback without brackets",
         ask=trouble,
     ),
     "exits": Case(
@@ -872,7 +872,7 @@ CASES = {
     "exits_after_one": Case(
         main="def spin(it):\n    rclpy.spin_once(it, timeout_sec=0.1)\nspin(node)",
         says="exited",
-        because="`) runs one callback at the most and returns",
+        because="`) runs at most one callback and then returns",
         ask=trouble,
     ),
     "exits_unspun": Case(main="pass", says="not-spinning", ask=trouble, never=("exited",)),
@@ -883,7 +883,7 @@ CASES = {
         "self.create_service(Trigger, '~/gate', self.answer)\n" + CLIENT.format("") + ONCE,
         "def answer(self, request):\n    return Trigger.Response()\n",
         says="service-exception",
-        because="It could not be called: the function takes another number of arguments",
+        because="It could not be called, because the function takes a different number of arguments",
         ask=inside,
     ),
     "builtin_callback": Case(
@@ -913,7 +913,7 @@ CASES = {
         "self.create_timer(0.05, self.tick)\n",
         "def tick(self):\n    next(iter(()))\n",
         says="crashed",
-        because="let a StopIteration out",
+        because="raised StopIteration",
         ask=trouble,
     ),
     "one_place_two_levels": Case(
@@ -921,7 +921,7 @@ CASES = {
         "hot = False\n\ndef tick(self):\n    self.hot = not self.hot\n"
         "    log = self.get_logger().warning if self.hot else self.get_logger().info\n    log('x')\n",
         says="callback-exception",
-        because="a call of its own",
+        because="a separate call",
     ),
     "no_such_module": Case("import car_sensor\n", says="crashed", because="finds no module of this name", ask=trouble),
     "other_value_error": Case("int('x')\n", says="crashed", ask=trouble, never=("builtin-callback",)),
@@ -977,7 +977,7 @@ CASES = {
         "def tick(self):\n    rclpy.shutdown()\n",
         "rclpy.spin(node)\nrclpy.shutdown()",
         says="shutdown-in-callback",
-        because="done already",
+        because="failed because of this",
         ask=lambda scene, name: None if scene.programs[0].running() else diagnosis.shut_down_inside(scene),
     ),
     # More errors in callbacks.
@@ -1035,7 +1035,7 @@ CASES = {
         "self.set_parameters([rclpy.Parameter('x', value='other')])\n",
         "def check(self, new):\n    return all(one.value > 1 for one in new)",
         says="callback-exception",
-        because="look at its `name`",
+        because="check its `name`",
     ),
     "parameter_returns": Case(
         "from rcl_interfaces.msg import SetParametersResult\nself.declare_parameter('x', 1)\n"
@@ -1161,7 +1161,7 @@ CASES = {
     "hears_nobody": Case(
         TALK,
         says="no-answer",
-        because="but no answer came",
+        because="but no response arrived",
         never=("not-spinning",),
         ask=lambda scene, name: diagnosis.why_no_answer(scene, f"/{name}/out"),
     ),

@@ -478,7 +478,7 @@ def test_interfaces_are_built_and_a_program_uses_them(found: dict[str, CheckResu
 
 def test_a_field_with_a_value_of_another_type_ends_a_program_and_that_is_told(found: dict[str, CheckResult]) -> None:
     first = next(one for one in found["float for int"].outcomes if one.because)
-    assert "has to be `int` and holds a value of another type" in first.because, first
+    assert "a field of type `int` holds a value of another type" in first.because, first
 
 
 def test_a_field_of_another_type_is_named(found: dict[str, CheckResult]) -> None:

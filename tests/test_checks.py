@@ -250,7 +250,7 @@ def test_a_program_that_is_told_to_end_may_end_cleanly(grade: Grade, by: str) ->
         ("    rclpy.try_shutdown()", "    raise SystemExit(4)", "SIGTERM", "unclean-end", "with exit status 4."),
         ("        pass", "        import time; time.sleep(60)", "SIGTERM", "signal-ignored", "still runs; it is in"),
         ("rclpy.init()", SIGNALS_NOT_TAKEN, "SIGTERM", "unclean-end", "Nothing in the program took the signal"),
-        ("    rclpy.try_", THREAD_LEFT, "SIGTERM", "signal-ignored", "that is no daemon"),
+        ("    rclpy.try_", THREAD_LEFT, "SIGTERM", "signal-ignored", "except daemon threads"),
         ('super().__init__("talker")', 'raise ValueError("no")', "SIGINT", "crashed", "ValueError: no"),
     ],
 )  # fmt: skip

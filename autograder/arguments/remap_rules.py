@@ -29,20 +29,18 @@ PARAMETER_VALUE = Kind(
     "the parameter has another value or type, or a value on the command line cannot be read",
     Group.STATES,
 )
-NAME_FORM = Kind("name-form", "`~` stands where it means nothing, or the whole is no name", Group.RULES)
+NAME_FORM = Kind("name-form", "`~` is in a place where it has no meaning, or the text is not a name", Group.RULES)
 NAMESPACE_WITHOUT_SLASH = Kind("namespace-without-slash", "the new namespace does not begin with a slash", Group.RULES)
 NAMESPACE_END = Kind("namespace-end", "the new namespace ends with a slash", Group.RULES)
-RULE_SPECIAL = Kind(
-    "rule-special", "`__node` or `__ns` is misspelt, or something else stands where these do", Group.RULES
-)
+RULE_SPECIAL = Kind("rule-special", "`__node` or `__ns` is misspelt, or something else is in their place", Group.RULES)
 RULE_SCHEME = Kind("rule-scheme", "`rostopic://` or `rosservice://` stands on the right side", Group.RULES)
 RULE_COLON = Kind("rule-colon", "what stands before a single `:` is no name of a node", Group.RULES)
 BEGINS_WITH_DIGIT = Kind("begins-with-digit", "a part of a name begins with a digit", Group.RULES)
 NAME_EMPTY = Kind("name-empty", "a side of the rule is empty", Group.RULES)
 NAME_SPACE = Kind("name-space", "a name holds a space", Group.RULES)
 WILDCARD = Kind("wildcard", "a rule has a `*`, which ROS 2 does not implement", Group.RULES)
-NAME_SLASH = Kind("name-slash", "a slash or a dot stands where no part of a name follows", Group.RULES)
-NAME_CHARACTERS = Kind("name-characters", "a name holds a character that names do not have", Group.RULES)
+NAME_SLASH = Kind("name-slash", "a slash or a dot is not followed by a part of a name", Group.RULES)
+NAME_CHARACTERS = Kind("name-characters", "a name contains a character that is not allowed", Group.RULES)
 DOUBLE_UNDERSCORE = Kind("double-underscore", "two underscores follow one another in a name", Group.RULES)
 RULE_KIND = Kind("rule-kind", "the rule is for names of another kind, or gives a parameter its value", Group.EFFECT)
 SLASH_IN_NODE_NAME = Kind("slash-in-node-name", "the new name of a node has a slash", Group.RULES)

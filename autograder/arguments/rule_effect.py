@@ -27,7 +27,11 @@ ABSOLUTE_RULE = Kind("absolute-rule", "one side of a rule is absolute, and the n
 PRIVATE_RULE = Kind(
     "private-rule", "one side of a rule is private to the node, and the other name is not", Group.EFFECT
 )
-ABSOLUTE_NAME = Kind("absolute-name", "the code gives a name with a leading slash, and the end is on that", Group.NAMES)
+ABSOLUTE_NAME = Kind(
+    "absolute-name",
+    "the code uses a name with a leading slash, and the publisher or subscription has this name",
+    Group.NAMES,
+)
 TOPIC_NAME = Kind("topic-name", "the end is on a topic with a similar name", Group.NAMES)
 RULE_TAKES_NAME = Kind(
     "rule-takes-name", "a rule renames the topic or node that already has the expected name", Group.EFFECT

@@ -22,7 +22,7 @@ from autograder.graph.names import nearest
 from autograder.reasons import Group, Kind, Refused
 
 ANSWER_FORM = Kind("answer-form", "the answer is none of the allowed ones", Group.FILES)
-WRONG_ANSWER = Kind("wrong-answer", "the answer is of the right form, and is not what happens", Group.FILES)
+WRONG_ANSWER = Kind("wrong-answer", "the answer has the right form, but something else happens", Group.FILES)
 
 _LINES = "Write one line for each question: `question: answer`, with a space after the colon."
 

@@ -24,12 +24,12 @@ FAILED = Kind("failed", "an expectation does not hold; nothing more is known", G
 GRADER = Kind("grader", "the check itself broke; no points are taken, and an instructor decides", Group.GRADER)
 FORGED_GRAPH = Kind(
     "forged-graph",
-    "what is on the ROS graph cannot be read, which no program made with rclpy brings about",
+    "the ROS graph cannot be read; no program that uses only rclpy can cause this",
     Group.GRADER,
 )
 UNUSABLE_DATA = Kind(
     "unusable-data",
-    "the check broke, and the programs had sent what no check can use: a NaN, a stamp below 0 s,"
+    "the check broke after the programs had sent data that no check can process: a NaN, a stamp below 0 s,"
     " or an extremely long text or list",
     Group.OUTPUT,
 )

@@ -17,7 +17,9 @@ AWAIT_SAME_GROUP = Kind(
     "await-same-group", "a callback awaits a client's answer; both are in one exclusive group", Group.BLOCKED
 )
 STUCK_CALLBACK = Kind(
-    "stuck-callback", "one run of a callback lasts; its thread is in one line or loop each time", Group.BLOCKED
+    "stuck-callback",
+    "a callback has not returned, and each look found its thread in the same line or loop",
+    Group.BLOCKED,
 )
 CALL_SAME_GROUP = Kind(
     "call-same-group",
@@ -44,14 +46,14 @@ BUSY_WAIT = Kind(
 WRONG_TYPE = Kind("wrong-type", "the end, or the service that is asked, is there with another type", Group.NAMES)
 WAITS_FOR_LOCK = Kind(
     "waits-for-lock",
-    "a run of a callback lasts, and its thread is where it takes a lock; or two callbacks take one",
+    "a callback has not returned, and its thread is waiting for a lock; or two callbacks take the same lock",
     Group.BLOCKED,
 )
 
 STUCK_AFTER = 1.5
 """Seconds that a run must have taken to count as one that does not end."""
 
-ONE_LOCK = "Callbacks that take one lock run one after another, whatever their groups and threads."
+ONE_LOCK = "Callbacks that take the same lock run one after another, no matter which groups and threads they have."
 
 _OWN_GROUP = "Give the client, or the callback that waits, a callback group of its own."
 
@@ -74,9 +76,9 @@ def call_same_group(inside: Inside) -> Reason | None:
             continue
         if executor and executor.size > 1:
             return CALL_SAME_GROUP(
-                f"{_at(inside, call)}`call()` blocks this callback until the answer is taken, but the client is in the "
-                "same mutually exclusive group as the callback: more threads do not help, the answer must wait for the "
-                "callback's end.",
+                f"{_at(inside, call)}`call()` blocks this callback until the response is processed. The client is in "
+                "the same mutually exclusive group as the callback, so the response is processed only after the "
+                "callback has ended: a deadlock. More threads do not help.",
                 _OWN_GROUP,
             )
     return None
@@ -90,8 +92,8 @@ def call_in_callback(inside: Inside) -> Reason | None:
         if executor and executor.busy >= executor.size:
             threads = "the only thread" if executor.size == 1 else f"the last of {executor.size} threads"
             return CALL_IN_CALLBACK(
-                f"{_at(inside, call)}`call()` blocks inside a callback until the answer comes, but no thread is free "
-                f"to take the answer: this callback holds {threads}, and waits for itself.",
+                f"{_at(inside, call)}`call()` blocks this callback until the response is processed, but no thread is "
+                f"free to process it: this callback occupies {threads}, so it waits for itself.",
                 "Use `call_async` with a done callback. Or keep `call()`, with a MultiThreadedExecutor, and with the "
                 "client in another group than the callback.",
             )
@@ -107,8 +109,10 @@ def waits_for_a_service(inside: Inside) -> Reason | None:
         lasting = call.blocks or (call.what == "wait_for_service" and call.begun > 1)
         services = inside.observer.services()
         if lasting and client.name and client.name not in services:
-            limit = " If it may be missing, wait with `timeout_sec`." if call.what == "wait_for_service" else ""
-            return _nobody_offers(client, services, f"{_at(inside, call)}it waits for ", limit)
+            limit = (
+                " If the service may be missing, wait with `timeout_sec`." if call.what == "wait_for_service" else ""
+            )
+            return _nobody_offers(client, services, f"{_at(inside, call)}this call waits for ", limit)
     return None
 
 
@@ -119,7 +123,7 @@ def asks_nobody(inside: Inside) -> Reason | None:
         if client.kind == "client" and waited and not client.destroyed:
             services = inside.observer.services()
             if client.name not in services:
-                return _nobody_offers(client, services, f"`{inside.name}` has asked for an answer of ")
+                return _nobody_offers(client, services, f"`{inside.name}` sent a request to ")
     return None
 
 
@@ -132,9 +136,9 @@ def asks_another_type(inside: Inside) -> Reason | None:
             asked = inside.observer.clients(client.node).get(client.name, [])
             if offered and asked and not set(asked) & set(offered):
                 return WRONG_TYPE(
-                    f"`{inside.name}` asks `{client.name}` as a {asked[0]}, and the service there is a {offered[0]}: "
-                    "its requests do not arrive.",
-                    "Client and server meet only with one name and one type.",
+                    f"`{inside.name}` calls the service `{client.name}` with the type {asked[0]}, but the service has "
+                    f"the type {offered[0]}. Therefore its requests do not arrive.",
+                    "A client reaches a server only if both use the same name and the same type.",
                 )
     return None
 
@@ -144,11 +148,11 @@ def _nobody_offers(client: Thing, services: dict[str, list[str]], said: str, els
     close = nearest(client.name, [n for n, types in services.items() if not types[0].startswith(own)])
     given = f" (`{client.given}` in the code)" if client.given and client.given != client.name else ""
     return WAITS_FOR_SERVICE(
-        f"{said}the service `{client.name}`{given}, and no node offers that"
+        f"{said}the service `{client.name}`{given}, but no node offers this service"
         + (f"; the nearest name is `{close}`." if close else "."),
-        "Wait with a time limit, and look at whether a server came."
+        "Wait with a time limit, and check whether the server is available."
         if not close
-        else "The name in the code begins with a slash, so no namespace reaches it: write it without."
+        else "The name in the code begins with a slash, so the namespace does not apply to it. Remove the slash."
         if client.given.startswith("/") and close.endswith(client.given)
         else f"Compare the names, namespace included.{else_do}",
     )
@@ -159,7 +163,7 @@ def nested_spin(inside: Inside) -> Reason | None:
     for call in inside.calls:
         if call.what == "spin" and call.in_callback and (harm := _harm_of_spinning(inside, call)):
             return NESTED_SPIN(
-                f"{_at(inside, call)}It spins inside a callback: {harm}",
+                f"{_at(inside, call)}this call spins inside a callback: {harm}",
                 "Never spin inside a callback: use `call_async` and a done callback, or `await`.",
             )
     return None
@@ -171,16 +175,16 @@ def _harm_of_spinning(inside: Inside, call: Call) -> str:
     lost = bool(callback and callback.node and not inside.spinning(callback.node))
     if call.blocks or (within and not lost):
         return (
-            "the callback has not ended since, and what it spins for cannot happen while it holds its thread and "
-            "its group."
+            "the callback has not returned since then. The event for which it spins cannot happen while the callback "
+            "occupies its thread and its group."
         )
     if lost:
-        return "it took the node away from the executor that runs it, so the node's other callbacks stop."
+        return "this removes the node from the executor that runs it, so the node's other callbacks no longer run."
     if call.vain:
         times = "once" if call.vain == 1 else f"{call.vain} times"
         return (
-            f"it came back {times} without what it spun for. Where the answer's callback is in the group of the "
-            "callback that spins, each waits for the other."
+            f"the call returned {times} before its future was done. If the callback for the response is in the same "
+            "group as the callback that spins, each waits for the other."
         )
     return ""
 
@@ -205,7 +209,7 @@ def rate_unspun(inside: Inside) -> Reason | None:
         spun = any(executor.spinning for executor in inside.executors)
         if call.what == "rate.sleep" and not call.in_callback and call.blocks and not spun and not _foreign(inside):
             return RATE_UNSPUN(
-                f"{_at(inside, call)}`rate.sleep()` waits for a timer of the node, and nothing spins the node.",
+                f"{_at(inside, call)}`rate.sleep()` waits for a timer of the node, but nothing spins the node.",
                 "Spin the node in another thread, or better: use a timer and `rclpy.spin`.",
             )
     return None
@@ -224,7 +228,8 @@ def await_same_group(inside: Inside) -> Reason | None:
         where = thing.awaits
         return AWAIT_SAME_GROUP(
             f"`{inside.name}`, {where.line} (`{where.code}`): the client is in the same mutually exclusive group as "
-            "the callback that awaits it. A group is held until its callback ends, so the answer is never taken.",
+            "the callback that awaits its response. The group is occupied until the callback ends, so the response is "
+            "never processed.",
             _OWN_GROUP,
         )
     return None
@@ -239,12 +244,12 @@ def busy_wait(inside: Inside) -> Reason | None:
         executor = inside.executor_of(thing.node)
         same = asked[0].exclusive and asked[0].group_id == thing.group_id
         if same or (executor and executor.busy >= executor.size):
-            why = "its client is in the same exclusive group" if same else "no thread is free to take the answer"
+            why = "the client is in the same exclusive group" if same else "no thread is free for it"
             return BUSY_WAIT(
-                f"`{inside.name}`: a callback waits in {place} for a future, for {since:.1f} s so far. While this "
-                f"callback runs, {why}, so the future is never done.",
-                "Let the callback end: `future.add_done_callback(...)` goes on when the answer is there, and so does "
-                "`await` with the client in another group.",
+                f"`{inside.name}`: a callback has been waiting for a future in {place} for {since:.1f} s. While this "
+                f"callback runs, its response cannot be processed, because {why}. So the future is never done.",
+                "Let the callback return. Use `future.add_done_callback(...)` for what has to happen after the "
+                "response has arrived, or `await` with the client in another group.",
             )
     return None
 
@@ -256,8 +261,8 @@ def takes_turn(inside: Inside) -> Reason | None:
             place = inside.turn(thread)
             if place:
                 return WAITS_FOR_LOCK(
-                    f"`{inside.name}`: {called(thing)} has waited for its turn for {since:.1f} s, in {place}: somebody "
-                    "else has taken what it wants.",
+                    f"`{inside.name}`: {called(thing)} has been waiting in {place} for {since:.1f} s, because the lock "
+                    "that it needs is not free.",
                     ONE_LOCK,
                 )
     return None
@@ -268,7 +273,8 @@ def stuck(inside: Inside) -> Reason | None:
     for thing, since, place in _stuck(inside):
         return STUCK_CALLBACK(
             f"`{inside.name}`: {called(thing)} has been running one callback for {since:.1f} s. It is in {place}.",
-            "A callback has to return: until then it holds its thread, and its group if that is mutually exclusive.",
+            "A callback has to return. Until then it occupies its thread, and also its group if the group is mutually "
+            "exclusive.",
         )
     return None
 

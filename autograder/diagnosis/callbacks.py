@@ -13,10 +13,14 @@ from autograder.reasons import Group, Kind, Reason
 from autograder.sandbox.inside.probe.events import BadMessage, BadReturn, CallbackError, Event, ThreadError
 
 NEVER_AWAITED = Kind(
-    "never-awaited", "Python warned of a coroutine that was never awaited, and nothing came", Group.CALLBACKS
+    "never-awaited",
+    "Python warned about a coroutine that was never awaited, and no message arrived",
+    Group.CALLBACKS,
 )
 CALLBACK_EXCEPTION = Kind(
-    "callback-exception", "an exception left a timer's or subscription's callback", Group.CALLBACKS
+    "callback-exception",
+    "a callback of a timer or subscription raised an exception that nothing caught",
+    Group.CALLBACKS,
 )
 MESSAGE_FIELD = Kind(
     "message-field",
@@ -46,9 +50,9 @@ LIFECYCLE_EXCEPTION = Kind("lifecycle-exception", "an exception left a lifecycle
 EXECUTE_EXCEPTION = Kind("execute-exception", "an exception left an execute callback", Group.GOALS)
 
 _AFTER = {
-    "service": "The client gets no answer and the node no longer spins.",
+    "service": "The client gets no response and the node no longer spins.",
     "lifecycle": "rclpy swallows it without a log line and treats the transition as ERROR.",
-    "execute": "rclpy aborts the goal with an empty result; the node goes on.",
+    "execute": "rclpy aborts the goal with an empty result; the node continues.",
 }
 _KINDS = {"service": SERVICE_EXCEPTION, "lifecycle": LIFECYCLE_EXCEPTION, "execute": EXECUTE_EXCEPTION}
 
@@ -76,14 +80,14 @@ def thread_failed(inside: Inside) -> Reason | None:
         error = f"{event.type}: {event.text}".strip(": ")
         if event.type == "SystemExit":
             return THREAD_EXCEPTION(
-                f"A thread of `{inside.name}` ended by `sys.exit` or SystemExit: that ends the thread in which it is "
-                "raised, and no other.",
-                "Only in the main thread does it end the program.",
+                f"A thread of `{inside.name}` ended because of `sys.exit` or SystemExit, which ends only the thread in "
+                "which it is raised.",
+                "SystemExit ends the whole program only if the main thread raises it.",
             )
         at = f" in {event.line}{quoted(event.code, error)}" if event.line else ""
         return THREAD_EXCEPTION(
             f"A thread of `{inside.name}` ended with an error{at}: {error}",
-            "What this thread had to do is not done any more; the rest of the program goes on.",
+            "The work of this thread is no longer done; the rest of the program continues.",
         )
     return None
 
@@ -94,10 +98,10 @@ def never_awaited(inside: Inside) -> Reason | None:
     if not found:
         return None
     return NEVER_AWAITED(
-        f"`{inside.name}`: the coroutine `{found[1]}` was called and never awaited (Python says so in the log), so "
-        "nothing in it has run.",
-        "To call an `async def` only makes a coroutine. Await it; to rclpy hand the function itself, for rclpy does "
-        "not await what a lambda returns.",
+        f"`{inside.name}`: the coroutine `{found[1]}` was called, but never awaited (Python says so in the log), so "
+        "none of its code has run.",
+        "Calling an `async def` function only creates a coroutine, so await it. Pass the function itself to rclpy, "
+        "because rclpy does not await what a lambda returns.",
     )
 
 
@@ -157,9 +161,10 @@ def _no_callback(inside: Inside, event: CallbackError) -> Reason | None:
         return None
     number = int(empty[0].made.rpartition(":")[2] or 0)
     return CALLBACK_EXCEPTION(
-        f"`{inside.name}`: the {event.kind} made in line {number} (`{inside.source.line(number)}`) has None for its "
-        "callback.",
-        "Hand over the function itself: with brackets it is called at once, and what it returns is handed over.",
+        f"`{inside.name}`: the callback of the {event.kind} that line {number} (`{inside.source.line(number)}`) "
+        "creates is None.",
+        "Pass the function itself, without brackets. With brackets, the function is called immediately, and its return "
+        "value is passed.",
     )
 
 
@@ -167,16 +172,16 @@ def _bad_message(program: str, event: BadMessage) -> Reason:
     at = f" in {event.line} (`{event.code}`)" if event.line else ""
     if not event.field:
         return MESSAGE_TYPE(
-            f"`{program}` sends the wrong type on `{event.name}`{at}: a {event.kind} there is a {event.expected}, and "
-            f"it got {event.value} ({event.given}).",
-            "The message class must be the one that the publisher, client or service was made with.",
+            f"`{program}` sends the wrong type on `{event.name}`{at}: the {event.kind} must be a {event.expected}, "
+            f"but it is {event.value} ({event.given}).",
+            "The message class must be the one with which the publisher, client or service was created.",
         )
     if event.kind in ("feedback", "result") and event.expected in ("float", "double"):
         return MESSAGE_FIELD(
             f"`{program}` sends a wrong number in its {event.kind} on `{event.name}`{at}: the field `{event.field}` is "
             f"of type {event.expected}, and its value is {event.value} ({event.given}), which rclpy does not convert.",
-            "Give it a float: `float(...)`, or a number with a point. What is sent of anything else is another number, "
-            "without an error.",
+            "Assign a float: use `float(...)` or a number with a decimal point. Otherwise a wrong number is sent, "
+            "without an error message.",
         )
     return MESSAGE_FIELD(
         f"`{program}` cannot send its {event.kind} on `{event.name}`{at}: the field `{event.field}` is of type "
@@ -189,8 +194,8 @@ def _bad_return(program: str, event: BadReturn) -> Reason:
     at = f" ({event.line})" if event.line else ""
     if event.kind == "service":
         return SERVICE_NO_RETURN(
-            f"A service callback of `{program}`{at} did not return the response, which ends the node's spinning: the "
-            "client never gets an answer.",
+            f"A service callback of `{program}`{at} did not return the response, which ends the node's spinning, so "
+            "the client never gets a response.",
             "Fill `response` and `return response`.",
         )
     if event.kind == "lifecycle":
@@ -208,12 +213,12 @@ def _bad_return(program: str, event: BadReturn) -> Reason:
         )
     if event.kind == "goal":
         return GOAL_RETURN(
-            f"{of_action} rclpy takes whatever is no GoalResponse as a refusal.",
+            f"{of_action} rclpy treats any value other than a GoalResponse as a rejection of the goal.",
             "Return GoalResponse.ACCEPT or GoalResponse.REJECT from every path.",
         )
     if event.kind == "cancel":
         return CANCEL_RETURN(
-            f"{of_action} rclpy takes whatever is no CancelResponse as a refusal.",
+            f"{of_action} rclpy treats any value other than a CancelResponse as a refusal to cancel.",
             "Return CancelResponse.ACCEPT, or CancelResponse.REJECT, from every path.",
         )
     return BAD_RETURN(
@@ -235,16 +240,16 @@ def _of_goal_state(error: str) -> str:
         return ""
     if _ended_already(error):
         return (
-            "The goal had ended already, and it ends only once: `goal_handle.is_active` tells whether it may end. Let "
-            "`return` follow the call that ends it."
+            "The goal had already ended, and a goal can end only once. `goal_handle.is_active` says whether it can "
+            "still be ended. Write `return` directly after the call that ends the goal."
         )
     if found[2] == "CANCELED":
         return (
-            "Call `canceled()` in the execute callback, and only while `goal_handle.is_cancel_requested` is true: "
-            "without a request to cancel this goal rclpy does not allow it. To give a goal up by yourself, call "
-            "`abort()`."
+            "Call `canceled()` in the execute callback, and only while `goal_handle.is_cancel_requested` is true. "
+            "rclpy does not allow it without a request to cancel this goal. If the server itself gives up the goal, "
+            "call `abort()`."
         )
-    return "The goal was accepted and is not executed yet: `goal_handle.execute()` has to be called before it can end."
+    return "The goal was accepted, but its execution has not begun. Call `goal_handle.execute()` first."
 
 
 def _error(program: str, event: CallbackError) -> Reason:
@@ -261,28 +266,29 @@ def _error(program: str, event: CallbackError) -> Reason:
         )
     if "ParameterAlreadyDeclared" in error:
         return DECLARED_TWICE(
-            f"{callback} declares a parameter that is declared already{source}: {error}. A parameter lives as long as "
+            f"{callback} declares a parameter that is already declared{source}: {error}. A parameter exists as long as "
             "its node.",
-            "Declare parameters in `__init__`, once for all lives of the node.",
+            "Declare each parameter once, in `__init__`. A lifecycle node keeps its parameters when it is configured "
+            "again.",
         )
     kind = _KINDS.get(event.kind, CALLBACK_EXCEPTION)
-    hint = "The line that raised it, and what was in its variables, is where to begin." if event.line else ""
+    hint = "Begin with the line that raised the error and with the values of its variables." if event.line else ""
     if event.kind == "parameter":
         hint = (
-            "A value that cannot be used is refused: what `add_on_set_parameters_callback` was given returns "
-            "SetParametersResult(successful=False, reason=…). An exception ends the node."
+            "To refuse a value, return SetParametersResult(successful=False, reason=…) from the callback that you pass "
+            "to `add_on_set_parameters_callback`. An exception ends the node."
         )
         if event.type == "TypeError":
-            hint = f"Every parameter that is set comes here: look at its `name` before its `value`. {hint}"
+            hint = f"This callback gets every parameter that is set, so check its `name` before its `value`. {hint}"
     hint = _of_goal_state(error) or hint
     if not event.line and "positional argument" in error:
-        hint = "It could not be called: the function takes another number of arguments than it is given here."
+        hint = "It could not be called, because the function takes a different number of arguments than rclpy passes."
     if event.kind == "task" and not event.line:
-        hint = "What `add_done_callback` is given is called with one argument, the future."
+        hint = "rclpy calls the function that you pass to `add_done_callback` with one argument, the future."
     for exception, known, advice in KNOWN_ERRORS:
         if exception in error and known in (CRASHED, PARAMETER_NOT_DECLARED, PARAMETER_TYPE):
             kind, hint = kind if known is CRASHED else known, advice
     after = _AFTER.get(event.kind, "It ended the spinning.")
     if event.kind == "execute" and _ended_already(error):
-        after = "The goal keeps the end that it had, with an empty result; the node goes on."
+        after = "The goal keeps its earlier status, with an empty result; the node continues."
     return kind(f"{callback} raised {error}{source}. {after}", hint)

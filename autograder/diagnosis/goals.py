@@ -30,7 +30,9 @@ GOAL_HOLDS_GROUP = Kind(
     "goal-holds-group", "an accepted or goal callback took its time in the action server's exclusive group", Group.GOALS
 )
 NO_SUCCEED = Kind(
-    "no-succeed", "an execute callback returned while its goal was still under way, so rclpy aborted that", Group.GOALS
+    "no-succeed",
+    "an execute callback returned although its goal had not ended, so rclpy aborted the goal",
+    Group.GOALS,
 )
 
 SEND_GOAL = "/_action/send_goal"
@@ -83,10 +85,10 @@ def why_not_finished(scene: Scene, name: str, status: str = "succeeded") -> Reas
         for event in inside.all(GoalLeft):
             if event.name == name:
                 return NO_SUCCEED(
-                    f"The execute callback of `{inside.name}` ({event.line}) returned without saying how the goal has "
-                    "ended, so rclpy aborts it.",
-                    f"Call `goal_handle.{_ENDS[status]}` before `return`: a result alone does not say how the goal has "
-                    "ended.",
+                    f"The execute callback of `{inside.name}` ({event.line}) returned without setting the status of "
+                    "the goal, so rclpy aborts the goal.",
+                    f"Call `goal_handle.{_ENDS[status]}` before `return`, because a result alone does not set the "
+                    "status of the goal.",
                 )
     return None
 
@@ -134,9 +136,9 @@ def _no_cancel_callback(scene: Scene, name: str) -> Reason | None:
     if not things or "action_server" not in kinds or "cancel" in kinds or not things[0][0].attached:
         return None
     return NO_CANCEL_CALLBACK(
-        f"`{things[0][0].name}`: the action server of `{name}` was made without a cancel callback, and rclpy's own "
-        "refuses every request to cancel.",
-        "Hand one over: `ActionServer(..., cancel_callback=...)`. It returns CancelResponse.ACCEPT.",
+        f"`{things[0][0].name}`: the action server of `{name}` was created without a cancel callback, and rclpy's "
+        "default callback refuses every request to cancel.",
+        "Pass one that returns CancelResponse.ACCEPT: `ActionServer(..., cancel_callback=...)`.",
     )
 
 
@@ -151,19 +153,22 @@ def why_waits_for_a_goal(scene: Scene, name: str) -> Reason | None:
             continue
         executor = inside.executor_of(thing.node)
         if thing.kind == "execute" and executor and executor.size == 1 and not thing.awaited:
-            alone = " `async` alone changes nothing: only an `await` gives the thread back." * ("async " in thing.code)
+            alone = " `async` alone does not change this, because only `await` frees the thread." * (
+                "async " in thing.code
+            )
             return GOAL_HOLDS_THREAD(
-                f"`{inside.name}`: {called(thing)} holds the only thread of its {executor.type} until it returns, so "
-                f"nothing else of the node runs meanwhile: no timer, no new goal, no request to cancel.{alone}",
+                f"`{inside.name}`: {called(thing)} occupies the only thread of its {executor.type} until it returns. "
+                "Meanwhile, the node runs no timer, takes no new goal and takes no request to cancel." + alone,
                 "Give it two threads or more: `MultiThreadedExecutor(num_threads=2)`."
                 if executor.type == "MultiThreadedExecutor"
                 else "Add the node to a MultiThreadedExecutor(num_threads=...) and spin that.",
             )
         if thing.kind in ("accepted", "goal") and thing.exclusive:
             return GOAL_HOLDS_GROUP(
-                f"`{inside.name}`: {called(thing)} takes its time, and the action server is in a mutually exclusive "
-                "group: until it returns, no other goal and no request to cancel is taken.",
-                "Let it return at once: `goal_handle.execute()` starts the execute callback, which may take its time.",
+                f"`{inside.name}`: {called(thing)} takes a long time, and the action server is in a mutually exclusive "
+                "group. Until the callback returns, the server takes no other goal and no request to cancel.",
+                "Let this callback return immediately: `goal_handle.execute()` starts the execute callback, which may "
+                "take a long time.",
             )
     return None
 

@@ -27,8 +27,10 @@ def late_binding(inside: Inside) -> Reason | None:
         name = inside.source.late_name(number) if number and len(things) > 1 else ""
         if name:
             return LATE_BINDING(
-                f"`{inside.name}`, line {number} (`{inside.source.line(number)}`): the lambda looks `{name}` up when "
-                f"it runs, and then the loop is over: all {len(things)} callbacks made there use its last value.",
-                f"Give the lambda the value when it is made: `lambda {name}={name}: ...`. Or use `functools.partial`.",
+                f"`{inside.name}`, line {number} (`{inside.source.line(number)}`): the lambda reads `{name}` only "
+                f"when it runs. By then the loop has ended, so all {len(things)} callbacks use the last value of "
+                f"`{name}`.",
+                f"Give the lambda the value when it is created: `lambda {name}={name}: ...`. Or use "
+                "`functools.partial`.",
             )
     return None

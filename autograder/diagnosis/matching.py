@@ -36,8 +36,8 @@ def why_not_matched(scene: Scene, topic: str, profile: QoSProfile, kind: str) ->
             gives, wants = qos.describe(offered)[words], qos.describe(requested)[words]
             owner = node_of(end)
             return MISMATCH[words](
-                f"Publisher and subscription on `{topic}` do not match over {policy}: offered {qos.in_words(gives)}, "
-                f"requested {qos.in_words(wants)} (the {kind} is that of `{owner}`).",
-                "A subscription may not ask for more than the publisher offers.",
+                f"The {policy} of the publisher on `{topic}` does not match that of the subscription: offered is "
+                f"{qos.in_words(gives)}, requested is {qos.in_words(wants)}. The {kind} belongs to `{owner}`.",
+                "A subscription must not request more than the publisher offers.",
             )
     return None

@@ -17,7 +17,9 @@ from autograder.reasons import Group, Kind, Reason
 from autograder.sandbox.inside.probe.events import Thing
 
 NOT_MADE_YET = Kind(
-    "not-made-yet", "a method of the source makes the end in a line where the probe has seen none made", Group.NAMES
+    "not-made-yet",
+    "a method in the source code creates the publisher or subscription in a line that the probe has not seen executed",
+    Group.NAMES,
 )
 NODE_NAME = Kind("node-name", "the node is not there, others are", Group.NAMES)
 DUPLICATE_NODE = Kind("duplicate-node", "several nodes have one name", Group.NAMES)
@@ -46,8 +48,8 @@ def _no_node_at_all(scene: Scene) -> Reason:
     """Nothing is on the graph, though nothing is known to be wrong with a program."""
     if not scene.programs:
         return NOTHING_STARTED(
-            "No program was started: there is nothing to look at.",
-            "A launch file starts what its `node` entries name.",
+            "No program was started, so there is nothing to check.",
+            "A launch file starts the programs that its `node` entries name.",
         )
     names = ", ".join(f"`{program.name}`" for program in scene.programs)
     return inside_reason(scene) or NO_NODE(
@@ -130,20 +132,20 @@ def why_no_node(scene: Scene, wanted: str) -> Reason:
     if there:
         return NAMESPACE(
             f"The node `{base}` exists, but in another namespace: {', '.join(f'`{name}`' for name in there)}.",
-            "A namespace is given at the start (`-r __ns:=/name`, in a launch file `namespace` or "
-            "`push_ros_namespace` above it in the same group, and each of these adds a level), and reaches every node "
-            "that does not fix its own.",
+            "Set the namespace when the node starts: with `-r __ns:=/name`, or in a launch file with `namespace` or "
+            "with `push_ros_namespace` above the node in the same group. In a launch file, each of these adds a level. "
+            "The namespace applies to every node that does not set its own.",
         )
     space = wanted.rpartition("/")[0]
     if space in own:
         return NAMESPACE(
-            f"The node is called `{space}`; that was to be its namespace.",
-            "`__ns` gives the namespace, `__node` the name of the node: `-r __ns:=" + space + "`.",
+            f"`{space}` is the name of the node, but it should be its namespace.",
+            "`__ns` sets the namespace, and `__node` sets the name of the node: `-r __ns:=" + space + "`.",
         )
     close = nearest(wanted, own) or own[0]
     return NODE_NAME(
         f"There is no node `{wanted}`; the nearest name on the graph is `{close}`.",
-        "The name given to the Node constructor (or by `-r __node:=`, in a launch file by `name`) decides.",
+        "The node gets its name from the Node constructor, or from `-r __node:=` (in a launch file: from `name`).",
     )
 
 
@@ -178,10 +180,9 @@ def absolute_name(scene: Scene, kind: str, name: str, wanted: str = "") -> Reaso
         if thing.given.startswith("/"):
             at = f" in {thing.made}" if thing.made else ""
             return ABSOLUTE_NAME(
-                f"The {kind} is on `{name}`: the code{at} gives the absolute name `{thing.given}`, which does not "
-                "follow the namespace.",
-                "A topic name with a leading slash is absolute: no namespace reaches it. "
-                + _not_absolute(thing, wanted),
+                f"The {kind} is on `{name}`. The code{at} uses the absolute name `{thing.given}`, and a namespace does "
+                "not change an absolute name.",
+                f"A topic name with a leading slash is absolute. {_not_absolute(thing, wanted)}",
             )
     return None
 
@@ -189,8 +190,8 @@ def absolute_name(scene: Scene, kind: str, name: str, wanted: str = "") -> Reaso
 def _not_absolute(thing: Thing, wanted: str) -> str:
     """What to write so that the name becomes the wanted one."""
     if thing.node and wanted.startswith(f"{thing.node}/"):
-        return f"Write `~{wanted.removeprefix(thing.node)}`: that is below the node's own name."
-    return "Write it without the slash."
+        return f"Write `~{wanted.removeprefix(thing.node)}`: such a name is placed below the node's own name."
+    return "Remove the slash."
 
 
 def why_topic_present(scene: Scene, topic: str) -> Reason:
@@ -240,7 +241,7 @@ def why_no_endpoint(scene: Scene, topic: str, msg_type: type | None, kind: str, 
     opposite = observer.subscriptions(topic) if kind == "publisher" else observer.publishers(topic)
     if opposite:
         return WRONG_END(
-            f"On `{topic}` there is only the other end: a {'subscription' if kind == 'publisher' else 'publisher'}.",
+            f"`{topic}` has a {'subscription' if kind == 'publisher' else 'publisher'}, but no {kind}.",
         )
     return inside_reason(scene, node) or NO_TOPIC(
         f"No node has a {kind} on `{topic}`. The nodes are {', '.join(observer.nodes())}; "
@@ -321,9 +322,9 @@ def not_made_yet(scene: Scene, topic: str, kind: str, node: str) -> Reason | Non
         for method, call in _makers(inside, topic, kind) if inside.alive else []:
             code = inside.source.line(call.lineno)
             return NOT_MADE_YET(
-                f"The code makes the {kind} on `{topic}` in `{method}`, line {call.lineno} (`{code}`), and the program "
-                "has not come to that line.",
-                "Make it in the callback after which it is to be there.",
+                f"The code creates the {kind} on `{topic}` in `{method}`, line {call.lineno} (`{code}`), but the "
+                "program has not reached this line.",
+                f"Create the {kind} in the callback after which it must exist.",
             )
     return None
 

@@ -38,7 +38,8 @@ def program_trouble(scene: Scene) -> Reason | None:
     for name in scene.missing:
         return PROGRAM_MISSING(
             f"There is no program `{name}`: no cell that begins with `%%node {name}` was found.",
-            "Check the first line of the cell, which must stand there unchanged; in a notebook, run the cell first.",
+            f"Check the first line of the cell: it must be exactly `%%node {name}`. In a notebook, run this cell "
+            "before the check.",
         )
     for trouble in scene.trouble:
         return trouble
@@ -63,8 +64,8 @@ def _death(inside: Inside) -> Reason:
     limit = program.stopped_by()
     if limit:
         return _LIMITS[limit](
-            f"`{program.name}` was ended because it went over the {limit}.",
-            "Look for a loop without an end, or for data that grows without a bound.",
+            f"`{program.name}` was stopped because it exceeded the {limit}.",
+            "Look for a loop that never ends, or for data that grows without a limit.",
         )
     if _NO_THREAD.search(program.output()[-10_000:]) and (trouble := no_threads(f"`{program.name}`")):
         raise trouble
@@ -75,15 +76,16 @@ def _death(inside: Inside) -> Reason:
     wrong = _WRONG_FIELD.search(program.output()[-10_000:])
     if wrong and wrong[2] in _KINDS:
         return MESSAGE_FIELD(
-            f"`{program.name}` sent something of `{wrong[1]}` with a field that has to be `{_KINDS[wrong[2]]}`"
-            " and holds a value of another type. That ended the program, without a word of Python's.",
+            f"`{program.name}` sent data of an interface in the package `{wrong[1]}`. In this data, a field of type "
+            f"`{_KINDS[wrong[2]]}` holds a value of another type. This ended the program without an error message from "
+            "Python.",
         )
     if status == -signal.SIGBUS:
         return CRASHED(
-            f"`{program.name}` was ended by signal 7 (SIGBUS), because it used a part of a mapped file that does not"
-            " exist, or for which there was no room. When a program is graded, its files in /tmp may have"
-            f" {Limits().disk // MIB} MiB together, and so may those in /dev/shm.",
-            "Map less of the file, or make the file as long as what you map of it.",
+            f"`{program.name}` was ended by signal 7 (SIGBUS), because it used a part of a memory-mapped file that"
+            " does not exist or for which there was no space. During grading, the program's files in /tmp may use"
+            f" {Limits().disk // MIB} MiB in total, and its files in /dev/shm may use as much.",
+            "Map a smaller part of the file, or make the file at least as long as the part that you map.",
         )
     if status is not None and status < 0:
         return CRASHED(
@@ -110,11 +112,12 @@ def _why_over(inside: Inside) -> str:
     names = ("spin", "spin_once", "spin_until_future_complete")
     spins = {name: number for name in names if (number := inside.source.calls(name))}
     if not spins or "spin" in spins:
-        return "`spin()` goes on until the program is stopped, or until it shuts down itself." if spins else ""
+        return "`spin()` runs until the program is stopped or shuts itself down." if spins else ""
     name, number = spins.popitem()
-    returns = "runs one callback at the most" if name == "spin_once" else "spins until its future is done"
+    returns = "runs at most one callback" if name == "spin_once" else "spins until its future is done"
     return (
-        f"Line {number} (`{inside.source.line(number)}`) {returns} and returns. `spin()` goes on until it is stopped."
+        f"Line {number} (`{inside.source.line(number)}`) {returns} and then returns. Use `spin()`, which runs until "
+        "the program is stopped."
     )
 
 
@@ -125,11 +128,11 @@ def shut_down_inside(scene: Scene) -> Reason | None:
             if call.what == "shutdown" and call.in_callback:
                 error = last_traceback(inside.program.output(), inside.name)
                 return SHUTDOWN_IN_CALLBACK(
-                    f"`{inside.name}`, {call.line} (`{call.code}`) shuts down inside a callback, "
+                    f"`{inside.name}`, {call.line} (`{call.code}`) shuts down rclpy or the executor inside a callback"
                     + (
-                        f"and what comes after finds it done already: {error.because}"
+                        f". Code that ran later failed because of this: {error.because}"
                         if error
-                        else "so what spins the node is pulled away under it."
+                        else ", while the executor is still spinning the node."
                     ),
                     SHUT_DOWN_IN_MAIN,
                 )

@@ -78,7 +78,7 @@ def lifecycle_silence(scene: Scene, topic: str = "") -> Reason | None:
             return LIFECYCLE_INACTIVE(
                 f"`{inside.name}` publishes in {event.line} while it is {event.state or 'not active'}: a lifecycle "
                 "publisher drops such messages.",
-                "It sends from `on_activate` to `on_deactivate` only.",
+                "It only sends between `on_activate` and `on_deactivate`.",
             )
     return None
 
@@ -97,8 +97,9 @@ def too_old(scene: Scene, topic: str, profile: QoSProfile) -> Reason | None:
             if isinstance(lifespan, float) and lifespan < age:
                 return LIFESPAN(
                     f"`{inside.name}` published {publisher.runs} message{'s' * (publisher.runs > 1)} on `{topic}`, "
-                    f"{'the last of them ' * (publisher.runs > 1)}{age:.1f} s ago, and the publisher's lifespan is "
-                    f"{qos.in_words(lifespan)}: nothing is kept for who comes later than that.",
+                    f"{'the last one ' * (publisher.runs > 1)}{age:.1f} s ago. The publisher's lifespan is "
+                    f"{qos.in_words(lifespan)}, so it keeps no message for a subscription that is created later than "
+                    "that.",
                     "A publisher without a lifespan keeps its last messages for late joiners.",
                 )
     return None
@@ -172,19 +173,19 @@ def _publishers(scene: Scene, topic: str) -> list[tuple[Inside, Thing]]:
 def account(scene: Scene, topic: str) -> str:
     """What was seen of a silent publisher, and so ruled out, where no reason is established."""
     found = _publishers(scene, topic)
-    said = [f"The publisher on `{topic}` is on the graph"]
+    said = [f"The publisher on `{topic}` exists"]
     if not found or not all(inside.alive for inside, _ in found):
         # That of /rosout is made by rcl, where the probe does not see it: what ran is said of every node.
         said += [text for inside in scene.insides if inside.alive for text in _runs(inside)][:6]
-        return f"{', '.join(said)}, and nothing (more) came from it."
+        return f"{', '.join(said)}, but no (further) message arrived from it."
     inside, publisher = found[0]
     said += [f"its node `{publisher.node}` is spun", *_runs(inside, publisher.node)[:6]]
-    sent = {0: "nothing was published", 1: "one message was published"}.get(
+    sent = {0: "no message was published", 1: "one message was published"}.get(
         publisher.runs, f"{publisher.runs} messages were published"
     )
     if publisher.runs:
-        sent += f", {'the last of them ' * (publisher.runs > 1)}{inside.now - publisher.last:.1f} s ago"
-    return f"{', '.join(said)}, and {sent}."
+        sent += f", {'the last one ' * (publisher.runs > 1)}{inside.now - publisher.last:.1f} s ago"
+    return f"{', '.join(said)}, {'and' if publisher.runs else 'but'} {sent}."
 
 
 def _runs(inside: Inside, node: str = "") -> list[str]:
@@ -218,12 +219,12 @@ def why_no_answer(scene: Scene, name: str) -> Reason:
         for thing in inside.things.values():
             if thing.kind == "service" and thing.name == name:
                 ran = {0: "has not run", 1: "ran once"}.get(thing.runs, f"ran {thing.runs} times")
-                ended = "" if thing.done == thing.runs else f"; of these runs, {thing.runs - thing.done} did not end"
+                ended = "" if thing.done == thing.runs else f", and {thing.runs - thing.done} of these runs did not end"
                 return NO_ANSWER(
-                    f"The service `{name}` is on the graph and its node is spun, but no answer came; its callback "
-                    f"{ran}{ended}.",
+                    f"The service `{name}` exists and its node is spun, but no response arrived. Its callback "
+                    f"{ran}{' and did not end' if thing.runs == 1 and ended else ended}.",
                 )
-    return NO_ANSWER(f"The service `{name}` is on the graph, but no answer came.")
+    return NO_ANSWER(f"The service `{name}` exists, but no response arrived.")
 
 
 def _owner(scene: Scene, name: str) -> str:

@@ -24,7 +24,7 @@ SPINNING_ENDED = Kind(
     "spinning-ended", "the node was spun, and no spinning executor has held it for a while", Group.SPINNING
 )
 
-SHUT_DOWN_IN_MAIN = "Let the callback set a future or a flag, and let `main` end the spinning and shut down."
+SHUT_DOWN_IN_MAIN = "Set a future or a flag in the callback. Then let `main` stop spinning and shut down."
 
 ENDED_AFTER = 1.0
 """Seconds without spinning after which it has ended: a program may spin once in a while."""
@@ -45,8 +45,8 @@ def in_the_constructor(inside: Inside) -> Reason | None:
     if place is None or place.function != "__init__":
         return None
     return STUCK_IN_INIT(
-        f"`{inside.name}` is still in `__init__`, in {place}: it has not reached its spinning, so no callback can run.",
-        "A constructor has to end. What must happen again and again belongs in a timer.",
+        f"`{inside.name}` is still in `__init__`, in {place}. It has not begun to spin, so no callback can run.",
+        "A constructor has to return. Use a timer for work that repeats.",
     )
 
 
@@ -56,8 +56,8 @@ def not_added(inside: Inside) -> Reason | None:
     empty = [executor for executor in inside.executors if executor.spinning and not executor.nodes]
     if unspun and empty and not any(executor.nodes for executor in inside.executors):
         return NODE_NOT_ADDED(
-            f"`{inside.name}` spins a {empty[0].type}, but that holds no node: `{unspun[0]}` was never added to it.",
-            "`executor.add_node(node)` comes before `executor.spin()`.",
+            f"`{inside.name}` spins a {empty[0].type} that contains no node: `{unspun[0]}` was never added to it.",
+            "Call `executor.add_node(node)` before `executor.spin()`.",
         )
     return None
 
@@ -80,7 +80,7 @@ def _never_spun(inside: Inside, names: list[str]) -> Reason | None:
         others = [node.name for node in inside.nodes.values() if node.spun]
         place = inside.main_place() if not others else None
         return NOT_SPINNING(
-            f"`{inside.name}` made its node `{name}` but nothing spins it, so no callback of it can run."
+            f"`{inside.name}` created the node `{name}`, but nothing spins it, so none of its callbacks can run."
             + (f" The program is in {place}." if place else "")
             + (f" Only {', '.join(f'`{other}`' for other in others)} is spun." if others else ""),
             "Call `rclpy.spin(node)`, or `spin()` of the executor that the node was added to.",
@@ -94,8 +94,8 @@ def pulled_down(inside: Inside) -> Reason | None:
     for call in inside.calls:
         if call.what == "shutdown" and call.in_callback and not spun:
             return SHUTDOWN_IN_CALLBACK(
-                f"`{inside.name}`, {call.line} (`{call.code}`) shuts down inside a callback, so what spins the node is "
-                "pulled away under it; the program itself runs on.",
+                f"`{inside.name}`, {call.line} (`{call.code}`) shuts down rclpy or the executor inside a callback, so "
+                "nothing spins the node any more, but the program continues to run.",
                 SHUT_DOWN_IN_MAIN,
             )
     return None
@@ -110,9 +110,9 @@ def thread_left(inside: Inside) -> Reason | None:
         place = inside.place(thread)
         if place:
             return THREAD_LEFT(
-                f"`{inside.name}`: `main` has come to its end, but a thread of the program still runs "
-                f"`{place.function}`, in {place}. Python waits for each thread that is no daemon.",
-                "Tell the thread to end and `join` it, or make it with `daemon=True`.",
+                f"`{inside.name}`: `main` has ended, but another thread of the program is still in "
+                f"`{place.function}`, in {place}. Python waits until all threads have ended, except daemon threads.",
+                "Tell the thread to end and `join` it, or create it with `daemon=True`.",
             )
     return None
 
@@ -125,8 +125,8 @@ def no_longer_spun(inside: Inside) -> Reason | None:
             busy = any(executor.spinning for executor in inside.executors)
             place = None if busy else inside.main_place()
             return SPINNING_ENDED(
-                f"`{inside.name}`: the node `{node.name}` was spun for a while, and nothing spins it now."
+                f"`{inside.name}`: the node `{node.name}` was spun at first, but nothing spins it any more."
                 + (f" The program is in {place}." if place else ""),
-                "Only while something spins the node can its callbacks run.",
+                "The node's callbacks can run only while an executor spins the node.",
             )
     return None

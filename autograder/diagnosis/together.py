@@ -83,15 +83,17 @@ def single_threaded(inside: Inside) -> Reason | None:
     unused = [e for e in inside.executors if e.threads is not None and not e.most]
     if any(e.spinning and not e.nodes for e in inside.executors):
         because = (
-            "It spins more than one executor, but a node is in one executor at a time, the one to which it was added "
-            f"last: all callbacks ran on the one thread of a {used[0].type}."
+            "The program spins several executors, but a node belongs only to the executor to which it was added last. "
+            f"All callbacks ran on the single thread of a {used[0].type}."
         )
     elif unused:
-        because = "It makes a MultiThreadedExecutor, but spins the node with another, single-threaded one."
+        because = "The program creates a MultiThreadedExecutor, but spins the node with another, single-threaded one."
     elif any(thing.group == "ReentrantCallbackGroup" for thing in _active(inside)):
-        because = f"It is spun by a {used[0].type}, one callback at a time: a reentrant group changes nothing there."
+        because = (
+            f"A {used[0].type} spins the node and runs one callback at a time. A reentrant group does not change this."
+        )
     else:
-        because = f"It is spun by a {used[0].type} (that is what `rclpy.spin` uses), which runs one callback at a time."
+        because = f"A {used[0].type} spins the node (`rclpy.spin` uses one, too), and it runs one callback at a time."
     return SINGLE_THREADED_EXECUTOR(
         f"`{inside.name}`: {because}",
         "Add the node to a MultiThreadedExecutor(num_threads=...) and spin that.",
@@ -106,13 +108,14 @@ def few_threads(inside: Inside, at_once: int) -> Reason | None:
         have = f"{executor.threads} thread{'s' * (executor.threads != 1)}"
         if not executor.threads_given:
             return MACHINE_THREADS(
-                f"`{inside.name}` leaves the number of threads to the machine: MultiThreadedExecutor() took {have} "
-                f"here, as many as there are CPUs, and {at_once} callbacks have to run at once.",
-                "Name the number that the task asks for: MultiThreadedExecutor(num_threads=...).",
+                f"`{inside.name}` does not set the number of threads. On this machine, MultiThreadedExecutor() uses "
+                f"{have}, one for each CPU, but {at_once} callbacks have to run at the same time.",
+                "Pass the number of threads that the task needs: MultiThreadedExecutor(num_threads=...).",
             )
         return FEW_THREADS(
-            f"`{inside.name}`: its MultiThreadedExecutor has {have}, and {at_once} callbacks have to run at once.",
-            "Each callback that runs needs a thread of its own while it runs: count those that may run at once.",
+            f"`{inside.name}`: its MultiThreadedExecutor has {have}, but {at_once} callbacks have to run at the same "
+            "time.",
+            "Each running callback needs its own thread. Count the callbacks that have to run at the same time.",
         )
     return None
 
@@ -147,10 +150,10 @@ def groups_allow_fewer(inside: Inside, at_once: int) -> Reason | None:
     if len(active) < at_once or limit >= at_once or any(thing.most > 1 for thing in active):
         return None
     return GROUP_LIMIT(
-        f"`{inside.name}`: its groups let no more than {limit} callbacks run at once, and {at_once} have to: "
-        f"{_kinds(groups)}.",
-        "Of a mutually exclusive group one callback runs at a time: what may overlap the others belongs in another "
-        "group.",
+        f"`{inside.name}`: its groups allow at most {limit} callback{'s' * (limit != 1)} to run at the same time, but "
+        f"{at_once} have to: {_kinds(groups)}.",
+        "Only one callback of a mutually exclusive group runs at a time. Put callbacks that may overlap the others "
+        "into another group.",
     )
 
 
@@ -174,8 +177,8 @@ def exclusive_itself(inside: Inside) -> Reason | None:
     if not active or any(not thing.exclusive for thing in active):
         return None
     return EXCLUSIVE_GROUP(
-        f"`{inside.name}`: every callback is in a mutually exclusive group ({listed(active)}). In such a group a "
-        "callback never runs beside itself, however many threads there are.",
+        f"`{inside.name}`: every callback is in a mutually exclusive group ({listed(active)}). In such a group, a "
+        "callback never overlaps itself, no matter how many threads there are.",
         "A callback may overlap itself only in a ReentrantCallbackGroup.",
     )
 
@@ -224,11 +227,11 @@ def waits_for_its_group(scene: Scene) -> Reason | None:
                 continue
             timers = [other for other in inside.callbacks if other.kind == "timer" and other.node == thing.node]
             if timers and all(timer.group_id == thing.group_id and timer.id != thing.id for timer in timers):
-                group = "the node's default group" if thing.default_group else "one group"
+                group = " (the node's default group)" * thing.default_group
                 return TIMER_SAME_GROUP(
-                    f"`{inside.name}`: {called(thing)} holds its group while it waits for the answer, and "
-                    f"{listed(timers)} {'is' if len(timers) == 1 else 'are'} in the same one ({group}, mutually "
-                    "exclusive): no tick until the answer is there.",
+                    f"`{inside.name}`: {called(thing)} occupies its group while it waits for the response, and "
+                    f"{listed(timers)} {'is' if len(timers) == 1 else 'are'} in the same mutually exclusive "
+                    f"group{group}. Therefore no timer of the node runs until the response has arrived.",
                     "Give the timer a callback group of its own.",
                 )
     return None
@@ -258,10 +261,10 @@ def _starved(inside: Inside, timer: Thing) -> Reason | None:
         return None
     others = [other for other in inside.group(timer) if other.id != timer.id and other.has_callback and other.runs]
     if timer.exclusive and _taken(inside, others) > MOST_OF_THE_TIME * lasted:
-        group = "the node's default group" if timer.default_group else "one mutually exclusive group"
+        group = "the node's default group" if timer.default_group else "a mutually exclusive group"
         return STARVED(
-            f"`{inside.name}`: {called(timer)} {_ran(timer.runs)}. It is in {group} with {listed(others)}; while "
-            "one of a mutually exclusive group runs, the others wait, and these took most of the time.",
+            f"`{inside.name}`: {called(timer)} {_ran(timer.runs)}. It shares {group} with {listed(others)}, "
+            "which ran most of the time. While one callback of a mutually exclusive group runs, the others wait.",
             "Callbacks that must not wait for each other need different groups.",
         )
     others = [other for other in _active(inside) if other.id != timer.id]
@@ -273,7 +276,7 @@ def _starved(inside: Inside, timer: Thing) -> Reason | None:
             f"{executor.type} busy most of the time.",
             "Callbacks that must not wait for each other need threads of their own."
             if executor.threads is not None
-            else "Spin the node with a MultiThreadedExecutor(num_threads=...), and give these callbacks own groups.",
+            else "Spin the node with a MultiThreadedExecutor(num_threads=...), and give each of them its own group.",
         )
     return None
 
@@ -325,8 +328,8 @@ def _group(inside: Inside, answers: Thing, works: Thing) -> Reason | None:
         return None
     group = "the node's default group" if works.default_group else "one group"
     return ONE_GROUP(
-        f"`{inside.name}`: {called(answers)} and {called(works)} are in {group}, which is mutually exclusive: the "
-        "answer waits until the other callback has ended.",
+        f"`{inside.name}`: {called(answers)} and {called(works)} are in {group}, which is mutually exclusive, so "
+        "the response waits until the other callback has ended.",
         "Callbacks that may overlap need different groups.",
     )
 
@@ -350,8 +353,8 @@ def _lock(inside: Inside, answers: Thing, works: Thing) -> Reason | None:
     for lock, line in mine.items():
         if lock in others:
             return WAITS_FOR_LOCK(
-                f"`{inside.name}`: {called(answers)} takes `{lock}` in line {line}, and {called(works)} holds that "
-                f"while it works (from line {others[lock]} on): the answer waits for it.",
+                f"`{inside.name}`: {called(answers)} takes `{lock}` in line {line}, but {called(works)} holds this "
+                f"lock while it works (from line {others[lock]} on), so the response is delayed.",
                 ONE_LOCK,
             )
     return None
@@ -370,8 +373,8 @@ def one_lock(inside: Inside, at_once: int) -> Reason | None:
         for lock in [lock for lock in mine if lock in others and (one.takes_time or other.takes_time)]:
             lines = f"line {mine[lock]}" if mine[lock] == others[lock] else f"lines {mine[lock]} and {others[lock]}"
             return WAITS_FOR_LOCK(
-                f"`{inside.name}`: up to {most} callbacks were on threads at once, but {called(one)} and "
-                f"{called(other)} take the same `{lock}` ({lines}): one waits while the other holds it.",
-                f"{ONE_LOCK} One that waits keeps its thread.",
+                f"`{inside.name}`: up to {most} callbacks had a thread at the same time, but {called(one)} "
+                f"and {called(other)} take the same `{lock}` ({lines}): one waits while the other holds it.",
+                f"{ONE_LOCK} A callback that waits for a lock occupies its thread.",
             )
     return None

@@ -69,8 +69,8 @@ KNOWN_ERRORS = (
     (
         "Logger severity cannot be changed between calls",
         CRASHED,
-        "rclpy remembers for each place in the code at which level it logs, and allows no other one there: give `info` "
-        "a call of its own and `warning` one of its own, with `if` and `else`.",
+        "rclpy allows only one log level for each place in the code. Use `if` and `else`, with a separate call of "
+        "`info` and of `warning`.",
     ),
     (
         "generator already executing",
@@ -81,8 +81,9 @@ KNOWN_ERRORS = (
     (
         "coroutine raised StopIteration",
         CRASHED,
-        "A callback let a StopIteration out, its own or that of a `next()` that found nothing more. rclpy runs "
-        "callbacks in a coroutine, where Python makes a RuntimeError of it: raise another error, or end without one.",
+        "A callback raised StopIteration, itself or through a `next()` that found no further element. rclpy runs "
+        "callbacks in a coroutine, in which Python turns StopIteration into a RuntimeError. Raise another error, or "
+        "catch this one.",
     ),
     *(
         (
@@ -111,8 +112,8 @@ KNOWN_ERRORS = (
     (
         "PermissionError: [Errno 1]",
         REFUSED_CALL,
-        "A program may not ask this of the system. New processes (`fork`, `subprocess`, `multiprocessing`) are among "
-        "what it may not ask for: use threads, or one more program in the launch.",
+        "The sandbox does not allow this system call. For example, a program may not start new processes (`fork`, "
+        "`subprocess`, `multiprocessing`). Use threads, or another program in the launch.",
     ),
     (
         "no signature found for builtin",
@@ -123,8 +124,8 @@ KNOWN_ERRORS = (
     (
         "'NoneType' object is not callable",
         CRASHED,
-        "What is called there is None. A callback is handed over without brackets: with brackets it is called at once, "
-        "and what it returns, often None, is handed over.",
+        "This line calls None. Pass a callback without brackets: with brackets it is called immediately, and its "
+        "return value, which is often None, is passed.",
     ),
     (
         "cannot pickle 'rclpy.",
@@ -135,10 +136,10 @@ KNOWN_ERRORS = (
     (
         "InvalidHandle",
         USED_AFTER_DESTROY,
-        "It used something that had been destroyed. What a node made is destroyed by the node, as with "
-        "`self.destroy_publisher(…)`: after a `destroy()` of its own it stays in the node's list, and `spin` uses it. "
-        "Under a MultiThreadedExecutor the executor uses it, now and then, while a callback destroys it (rclpy issue "
-        "1355): spin such a node with a SingleThreadedExecutor.",
+        "The program used an object that had been destroyed. Let the node destroy what it created, for example with "
+        "`self.destroy_publisher(…)`. If you call the object's own `destroy()`, it stays in the node's list, and "
+        "`spin` still uses it. A MultiThreadedExecutor sometimes uses an object while a callback destroys it (rclpy "
+        "issue 1355), so spin such a node with a SingleThreadedExecutor.",
     ),
     (
         "timer argument is null",

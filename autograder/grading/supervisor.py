@@ -21,7 +21,7 @@ from autograder.graph.patience import ALONE
 from autograder.reasons import KINDS, Group, Kind
 from autograder.sandbox.grading_sandbox import SandboxRun, run_in_sandbox
 
-STUCK = Kind("stuck", "the grader did not come on at this check; an instructor decides", Group.GRADER)
+STUCK = Kind("stuck", "the grader made no progress at this check; an instructor decides", Group.GRADER)
 DIED = Kind("died", "the grader died at this check, twice; an instructor decides", Group.GRADER)
 
 

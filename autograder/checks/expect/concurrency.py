@@ -19,7 +19,7 @@ from autograder.reasons import Group, Kind, Reason
 
 TOO_FEW_RUNS = Kind(
     "too-few-runs",
-    "a callback told of fewer runs than asked for; no other reason was established",
+    "a callback reported fewer runs than required; no other reason was established",
     Group.MESSAGES,
     "timeline",
 )

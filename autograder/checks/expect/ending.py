@@ -21,7 +21,7 @@ from autograder.sandbox.running_program import RunningProgram
 EXIT_STATUS = Kind("exit-status", "the program ended with another status", Group.OUTPUT)
 SIGNAL_IGNORED = Kind(
     "signal-ignored",
-    "the program was told to end by a signal, and still ran when the time for that was over",
+    "a signal told the program to end, but it was still running when the time for this was over",
     Group.OUTPUT,
 )
 UNCLEAN_END = Kind(

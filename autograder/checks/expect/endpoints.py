@@ -14,7 +14,7 @@ from autograder.checks.expect.graph import GONE_WITHIN, GraphExpectations
 from autograder.graph.names import node_of, type_name
 from autograder.reasons import Group, Kind
 
-COUNT = Kind("count", "a topic has another number of such ends than asked for", Group.ENDS)
+COUNT = Kind("count", "a topic does not have the required number of publishers or subscriptions", Group.ENDS)
 PUBLISHER_PRESENT = Kind("publisher-present", "a publisher is still on a topic that should have none", Group.ENDS)
 SUBSCRIPTION_PRESENT = Kind(
     "subscription-present", "a subscription is still on a topic that should have none", Group.ENDS

@@ -24,7 +24,7 @@ PARAMS_FILE_MISSING = Kind(
     "params-file-missing", "the launch file names a parameter file that is not there", Group.STATES
 )
 PARAMETER_AS_RULE = Kind(
-    "parameter-as-rule", "the value was given with `-r`, which renames topics and services only", Group.STATES
+    "parameter-as-rule", "the value was given with `-r`, which only renames topics and services", Group.STATES
 )
 PARAMETER_FOR_OTHERS = Kind("parameter-for-others", "the value was given to a node of another name", Group.STATES)
 PARAMS_FILE_KEY = Kind("params-file-key", "no key of the parameter file is this node's name", Group.STATES)

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from autograder.graph.recording import Received
 from autograder.reasons import Group, Kind
 
-RATE = Kind("rate", "the median gap between messages is not that of the asked rate", Group.MESSAGES)
+RATE = Kind("rate", "the median time between messages does not fit the required rate", Group.MESSAGES)
 
 _SHORT = 0.5
 """The share of a period below which a gap is short: a timer that was held up makes one, two timers make many."""
