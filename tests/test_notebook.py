@@ -695,7 +695,7 @@ def test_a_check_that_fails_where_others_have_the_cpus_says_so(notebook: Noteboo
     )
 
     def told(check: str) -> bool:
-        return "for 3.2 s of the time in which this was decided." in " ".join(notebook.run(check).text.split())
+        return "for 3.2 s while this check was running." in " ".join(notebook.run(check).text.split())
 
     fails = CHECK.replace("at_least=2", "at_least=2, at_most=0")
     assert told(fails) and not told(CHECK)
