@@ -169,7 +169,7 @@ def test_a_right_node_earns_the_points_under_names_and_values_that_vary(grade: G
         ('"period", 0.05)', '"period", 0.05)\n        self.declare_parameter("unset", rclpy.Parameter.Type.DOUBLE)',
          'ros.expect_parameter("/talker", "unset", 1.0)', "parameter-value", "without a default"),
         ("", "", 'ros.publish("/topic", String())', "no-topic", ""),
-        ("", "", 'ros.expect_exit("talker", within=4)', "still-running", "still runs"),
+        ("", "", 'ros.expect_exit("talker", within=4)', "still-running", "is still running"),
         ("    rclpy.spin(Talker())",
          "    from rclpy.action import ActionClient\n    from test_msgs.action import Fibonacci\n"
          "    ActionClient(Talker(), Fibonacci, 'far').send_goal(Fibonacci.Goal())",
@@ -214,7 +214,7 @@ node.create_timer(0.1, lambda: publisher.publish(Float64(data=5)))
 rclpy.spin(node)
 """,
     )
-    assert "what becomes of an `int`" in failure(result).because
+    assert "because an `int` was assigned" in failure(result).because
 
 
 CAREFUL = TALKER.replace(
@@ -244,12 +244,12 @@ def test_a_program_that_is_told_to_end_may_end_cleanly(grade: Grade, by: str) ->
 @pytest.mark.parametrize(
     ("old", "new", "by", "code", "because"),
     [
-        ("KeyboardInterrupt, ", "", "SIGINT", "unclean-end", "KeyboardInterrupt. That was at Ctrl-C"),
-        (", ExternalShutdownException)", ",)", "SIGTERM", "unclean-end", "ExternalShutdownException. That was at"),
+        ("KeyboardInterrupt, ", "", "SIGINT", "unclean-end", "KeyboardInterrupt. This happened after Ctrl-C"),
+        (", ExternalShutdownException)", ",)", "SIGTERM", "unclean-end", "ExternalShutdownException. This happened"),
         ("try_shutdown()", "shutdown()", "SIGINT", "unclean-end", "already called"),
         ("    rclpy.try_shutdown()", "    raise SystemExit(4)", "SIGTERM", "unclean-end", "with exit status 4."),
-        ("        pass", "        import time; time.sleep(60)", "SIGTERM", "signal-ignored", "still runs; it is in"),
-        ("rclpy.init()", SIGNALS_NOT_TAKEN, "SIGTERM", "unclean-end", "Nothing in the program took the signal"),
+        ("        pass", "        import time; time.sleep(60)", "SIGTERM", "signal-ignored", "still running; it is in"),
+        ("rclpy.init()", SIGNALS_NOT_TAKEN, "SIGTERM", "unclean-end", "The program did not handle the signal"),
         ("    rclpy.try_", THREAD_LEFT, "SIGTERM", "signal-ignored", "except daemon threads"),
         ('super().__init__("talker")', 'raise ValueError("no")', "SIGINT", "crashed", "ValueError: no"),
     ],
@@ -387,7 +387,7 @@ while not future.done():
 """,
     )
     assert failure(result).code == "still-running" and "while not future.done()" in failure(result).because
-    assert "Nobody spins the node" in failure(result).hint
+    assert "Nothing spins the node" in failure(result).hint
 
 
 def test_what_follows_a_failure_is_listed_as_not_checked_and_hidden_lines_stay_marked(grade: Grade) -> None:

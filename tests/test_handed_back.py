@@ -254,7 +254,7 @@ def test_the_class_page_shows_what_needs_a_person(graded: Graded) -> None:
 def test_who_is_gone_from_the_source_leaves_the_class_until_they_are_back(graded: Graded, tmp_path: Path) -> None:
     gone = (graded.source / FILES["cem"]).rename(graded.root / "cem.ipynb")
     run = grade(graded.root, graded.source)
-    assert any(note.startswith("cem is not among the submissions any more") for note in run.collected.notes)
+    assert any(note.startswith("cem is no longer among the submissions") for note in run.collected.notes)
     assert "cem" not in run.grades.read_text() and not list(
         (graded.root / "build" / "feedback" / "cem").rglob("*.html")
     )

@@ -120,7 +120,7 @@ def test_a_configuration_as_a_new_course_gets_it_is_passed_over_in_a_submission(
     folder = toy.hand_in(tmp_path, "eve", toy.CELLS).parent
     shutil.copy(TEMPLATE, folder / "nbgrader_config.py")
     _, told = nbgrader(folder, "validate", "toy.ipynb")
-    assert f"{folder / 'nbgrader_config.py'} is passed over" in told and "was not checked" in told
+    assert f"{folder / 'nbgrader_config.py'} is ignored" in told and "was not checked" in told
 
 
 @pytest.mark.parametrize(
@@ -140,7 +140,7 @@ def test_nothing_that_lies_in_an_unpacked_submission_is_run(tmp_path: Path, comm
         [str(nbgrader), *command], cwd=folder, env=environment(folder), capture_output=True, text=True, check=False
     )
     assert not mark.exists(), done.stderr
-    assert command[0] != "validate" or f"{folder / 'nbgrader_config.py'} is passed over" in done.stderr
+    assert command[0] != "validate" or f"{folder / 'nbgrader_config.py'} is ignored" in done.stderr
 
 
 def test_no_setting_leads_to_nbgraders_execution(root: Path, mark: Path) -> None:
@@ -150,7 +150,7 @@ def test_no_setting_leads_to_nbgraders_execution(root: Path, mark: Path) -> None
         '--Autograde.sanitize_preprocessors=["nbgrader.preprocessors.ClearOutput"]',
         '--Autograde.autograde_preprocessors=["nbgrader.preprocessors.Execute"]',
     )  # fmt: skip
-    assert status != 0 and "execution is closed in this course" in told
+    assert status != 0 and "execution is disabled in this course" in told
     assert not mark.exists()
 
 

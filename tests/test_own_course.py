@@ -317,8 +317,8 @@ def test_a_course_that_lists_a_lab_or_a_code_that_there_is_not_is_told_so(course
     (root / "course.toml").write_text(f'labs = ["lab1_greeting", "{LAB}"]\n{sections}')
     lint = [Path(sys.executable).with_name("autograder"), "lint", "--static", "--course", root]
     done = subprocess.run(lint, capture_output=True, text=True)
-    assert "error: course.toml lists a lab that there is not, `lab1_greeting`." in done.stdout.splitlines()
-    assert "error: course.toml explains a reason that nothing gives, `topic-nam`." in done.stdout.splitlines()
+    assert "error: course.toml lists the lab `lab1_greeting`, which does not exist." in done.stdout.splitlines()
+    assert "error: course.toml explains the reason `topic-nam`, which no check gives." in done.stdout.splitlines()
     assert "`topic-name`" not in done.stdout
     assert done.returncode == 1 and done.stderr == ""
     assert subprocess.run([*lint, LAB], capture_output=True).returncode == 0

@@ -176,7 +176,7 @@ TWICE = {
 def test_nobody_is_replaced_by_an_entry_of_which_nothing_says_that_it_is_later(
     tmp_path: Path, files: dict[str, bytes]
 ) -> None:
-    with pytest.raises(KitError, match="mean the same student, 'ann'; nothing says which one counts"):
+    with pytest.raises(KitError, match="belong to the same student, 'ann', and it is not clear which"):
         taken_from(files, tmp_path)
     assert not (tmp_path / "course").exists()
     taken, collected = taken_from(files, tmp_path, Accepted.REPLACED)
@@ -248,7 +248,7 @@ def test_the_notebook_of_another_lab_is_never_the_only_one(tmp_path: Path) -> No
     files = {"ann/lab1.ipynb": b"lab 1", "cem/labs/lab1/lab1-1.ipynb": b"lab 1", "bob/mine.ipynb": b"bob"}
     taken, collected = taken_from(files | {"dan_1/toy.ipynb": b"dan"}, tmp_path)
     assert taken == {"bob": "bob", "dan_1": "dan"} and len(collected.refused) == 2
-    assert "'ann' handed in 'lab1.ipynb' only, the notebook of lab1" in collected.refused[0]
+    assert "'ann' handed in only 'lab1.ipynb', which is the notebook of lab1" in collected.refused[0]
 
 
 def test_of_what_the_course_has_taken_in_only_the_labs_folder_is_read(tmp_path: Path) -> None:
@@ -285,7 +285,7 @@ def test_a_record_that_nobody_understands_stops_the_next_class(tmp_path: Path) -
     record.write_text('{"ann": ')
     (tmp_path / "in" / "ann" / "toy.ipynb").unlink()
     (tmp_path / "in" / "ann").rmdir()
-    with pytest.raises(KitError, match="says who was in the class the last time, cannot be read"):
+    with pytest.raises(KitError, match="records who was in the class in the last run, cannot be read"):
         taken_from({}, tmp_path)
 
 
@@ -308,7 +308,7 @@ def test_a_class_of_one_is_asked_about_by_its_names_and_the_advice_holds(
     try:
         collected = collect(source, class_forms.LAB, tmp_path / "unasked")
     except KitError as stopped:
-        assert f"holds only {outer!r}" in stopped.what and f"a class of 1: {owner!r}" in stopped.what
+        assert f"contains only {outer!r}" in stopped.what and f"a class of 1: {owner!r}" in stopped.what
         assert f"If {owner!r} is a student, add --format plain. If {outer!r} is a student" in stopped.do
     else:
         assert list(collected.notebooks) == [owner]  # the name around it is a platform's

@@ -216,12 +216,12 @@ def test_an_answer_counts_however_it_is_spelt(grade: Grade, text: str) -> None: 
 @pytest.mark.parametrize(
     ("text", "lost", "code", "because"),
     [
-        ("reliability: reliable\nlate: 5\nheard: yes", "reliability", "wrong-answer", "`reliable` is not what happens"),
+        ("reliability: reliable\nlate: 5\nheard: yes", "reliability", "wrong-answer", "`reliable` is not the right"),
         ("reliability: best_effort\nlate: five\nheard: yes", "late", "answer-form", "a whole number from 0 to 98"),
         ("reliability: best_effort\nlate: 5\nheard: maybe", "heard", "answer-form", "yes or no"),
         ("reliability: best_effort\nlate: 5\nheard: '?'", "heard", "unanswered", "has no answer yet"),
         ("reliability: best_effort\nlate: 5\nherd: yes", "heard", "unanswered", "did you mean `heard`?"),
-        ("reliability: best_effort\nlate: 5\nheard: no", "heard", "wrong-answer", "`no` is not what happens"),
+        ("reliability: best_effort\nlate: 5\nheard: no", "heard", "wrong-answer", "`no` is not the right answer"),
         ("reliability: best_effort\nlate: 5\nheard: 1", "heard", "answer-form", "yes or no"),
         ("reliability: best_effort\nlate: yes\nheard: yes", "late", "answer-form", "a whole number"),
     ],
@@ -283,9 +283,9 @@ table.score(2)
         ("/rear/image", "none", "", ""),
         ("rear/image/", "None", "", ""),
         ("'`/rear/image`'", "'None.'", "", ""),
-        ("/front/image", "none", "wrong-answer", "is not what happens"),
+        ("/front/image", "none", "wrong-answer", "is not the right answer"),
         ("the program ends", "none", "answer-form", "a full name, such as `/front/points` or none"),
-        ("/rear/image", "error", "answer-form", "neither a full name, which begins with `/`, nor `none`"),
+        ("/rear/image", "error", "answer-form", "must be a full name, which begins with `/`, or `none`"),
         ("/rear/image", "[none]", "answer-form", "a full name"),
     ],
 )

@@ -338,7 +338,7 @@ INCOMPLETE: dict[str, tuple[dict[str, str], dict[str, str], list[str]]] = {
 submission_2:
   :submitters: [{":name": Cem}]
 """, "submission_1/toy.ipynb": "ab", "submission_2/a.pdf": "", "submission_3/toy.ipynb": "?"},
-        {"Ann": "ab", "Bob": "ab"}, ["'Cem' holds 'a.pdf' and no notebook", "submission_3 is of nobody"],
+        {"Ann": "ab", "Bob": "ab"}, ["'Cem' holds 'a.pdf' and no notebook", "to whom submission_3 belongs"],
     ),
     "repositories without a notebook": (
         {"toy-ann/labs/toy/toy.ipynb": "a", "toy-bob/labs/toy/toy.ipynb": "b", "toy-cem/README.md": "",
@@ -352,7 +352,7 @@ submission_2:
     ),
     "files": (
         {"ann.ipynb": "a", "bob.pdf": "", "toy.ipynb": "", "roster.csv": "id"},
-        {"ann": "a"}, ["'bob.pdf' is no student's", "Nothing says whose 'toy.ipynb' is"],
+        {"ann": "a"}, ["'bob.pdf' is no student's", "It is not clear to whom 'toy.ipynb' belongs"],
     ),
 }  # fmt: skip
 
@@ -430,7 +430,7 @@ def test_two_folders_of_one_student_in_the_roster_do_not_replace_each_other_unsa
     files = {"janedoe/toy.ipynb": "by GitHub", "jd01/toy.ipynb": "by number"}
     collected = collect(lay_out(files, tmp_path, False), toy.LAB, course)
     assert texts(collected) == {"jd01": "by GitHub"}
-    assert "'janedoe' and 'jd01' mean the same student; the second was left out" in collected.refused[0]
+    assert "'janedoe' and 'jd01' belong to the same student; the second was left out" in collected.refused[0]
 
 
 @pytest.mark.parametrize("zipped", [False, True], ids=["folder", "zip"])
@@ -497,4 +497,4 @@ def test_a_gradebook_that_another_program_holds_is_a_sentence(tmp_path: Path) ->
             )  # fmt: skip
             other.execute("ROLLBACK")
             assert done.returncode == 2 and "Traceback" not in done.stderr, done.stderr
-            assert "database is locked" in done.stderr and "no other program holds it" in done.stderr
+            assert "database is locked" in done.stderr and "no other program uses the gradebook" in done.stderr

@@ -138,14 +138,14 @@ def test_a_verdict_is_told_by_word_symbol_and_border(word: str) -> None:
 def test_points_that_are_decided_at_grading_are_not_claimed() -> None:
     shown = VERDICTS["holds so far"]
     for view in (Page(check_html(shown)).text, text_of(check_view(shown))):
-        assert "up to 3 points, decided at grading" in view and "3 of 3" not in view
+        assert "up to 3 points, decided when the lab is graded" in view and "3 of 3" not in view
 
 
 def test_what_was_not_looked_at_is_a_count_and_never_source() -> None:
     left = [outcome(Status.NOT_CHECKED, title="expect_node('/talker')") for _ in range(4)]
     for view in (Page(check_html(check(0, FAILED, *left))).text, text_of(check_view(check(0, FAILED, *left)))):
         assert "expect_node" not in view
-        assert "4 more expectations were not looked at because of that." in view
+        assert "Because of this, 4 more expectations were not checked." in view
 
 
 def test_the_finding_comes_first_and_what_holds_is_folded() -> None:

@@ -359,7 +359,7 @@ def notebook(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Notebook]:
 
 
 def test_a_robot_goes_on_from_cell_to_cell(notebook: Notebook) -> None:
-    assert "No program runs" in notebook.run("%ros2 node list").text
+    assert "No program is running" in notebook.run("%ros2 node list").text
     assert "running: talker (nodes: /talker)" in notebook.run('robot = launch("talker").start()').text
     assert notebook.run("%ros2 node list").text == "/talker\n"
     assert notebook.run("%ros2 topic echo /chatter -n 2").text == "data: hello\n---\n" * 2
@@ -419,7 +419,7 @@ def test_what_runs_is_not_what_its_cell_says_now(notebook: Notebook) -> None:
 def test_a_robot_is_no_check(notebook: Notebook) -> None:
     shown = notebook.run('ros = launch("talker").start()\nros.score(1)')
     assert "a check is a block" in shown.error
-    assert "No program runs" in notebook.run("%ros2 node list").text
+    assert "No program is running" in notebook.run("%ros2 node list").text
 
 
 def test_nothing_is_left_running_when_the_kernel_ends(tmp_path: Path) -> None:

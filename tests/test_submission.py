@@ -286,7 +286,7 @@ def test_an_answer_that_is_no_code_cell_any_more_is_no_program(lab: Lab, tmp_pat
     by_id(cells, "talker")["cell_type"] = "markdown"
     submission = read(lab, tmp_path, cells)
     assert codes(submission) == ["missing-cell"]
-    assert "no code cell any more" in submission.problems[0].because
+    assert "is no longer a code cell" in submission.problems[0].because
     assert submission.sources["talker"] == lab.answers["talker"].blank
 
 
@@ -294,7 +294,7 @@ def test_the_piece_of_an_answer_that_was_split_off_is_told(lab: Lab, tmp_path: P
     cells = json.loads(json.dumps(solved(lab)))
     cells.append({**by_id(cells, "talker"), "id": "piece", "source": "print('the second half')"})
     submission = read(lab, tmp_path, cells)
-    assert codes(submission) == ["split-cell"] and "Merge them" in submission.problems[0].because
+    assert codes(submission) == ["split-cell"] and "merge the pieces" in submission.problems[0].because
     cells[-1]["source"] = "\n"
     assert codes(read(lab, tmp_path, cells)) == []
 

@@ -312,7 +312,8 @@ def _of_parameter(name: str) -> Reason:
     if ":" in name and (name.startswith("/") or name.count(":") > 1):
         return RULE_COLON(
             "before the `:` stands the name of a node, without slashes.",
-            "Leave the node out: the value is for every node of the process then. A parameter file can name one node.",
+            "Remove the node name; the value then applies to every node of the process. A parameter file can name one"
+            " node.",
         )
     if "*" in name:
         return WILDCARD("`*` is not implemented there.", "Write one rule for each parameter.")

@@ -152,7 +152,7 @@ def write_kit(root: Path, book: Path | None, into: Path) -> Path:
     if not names:
         raise KitError(f"There are no labs in {paths.labs}.", "Make them from the solutions: autograder release")
     if not lock.is_file() or not (ROOT / "pyproject.toml").is_file():
-        raise KitError("The students' kit is built from a checkout of the kit, and this is none.", "Use a checkout.")
+        raise KitError("The students' kit can be built only from a checkout of the kit.", "Use a checkout.")
     folder = into / NAME
     shutil.rmtree(folder, ignore_errors=True)
     labs = folder / KIT_FOLDER / "labs"
@@ -178,7 +178,8 @@ def write_kit(root: Path, book: Path | None, into: Path) -> Path:
     found = leaks(folder, secrets_of(root, names))
     if found:
         shutil.rmtree(folder)
-        raise KitError("Students would get what they may not:\n  " + "\n  ".join(found[:10]), "Nothing was written.")
+        what = "The students' kit would contain something that students must not see:"
+        raise KitError("\n  ".join([what, *found[:10]]), "Nothing was written.")
     return _zipped(folder)
 
 

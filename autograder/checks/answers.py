@@ -32,8 +32,11 @@ def _no_table(read: Any) -> str:
     if read in (None, {}):
         return "It has no answers yet."
     if isinstance(read, list):
-        return "It is a list for YAML, because its lines begin with dashes. A table's lines begin with the question."
-    return f"It is no table for YAML, but a single value, which begins with `{str(read)[:30]}`."
+        return (
+            "YAML reads this file as a list, because its lines begin with dashes. Each line of a table begins with its"
+            " question."
+        )
+    return f"YAML reads this file as a single value, which begins with `{str(read)[:30]}`, and not as a table."
 
 
 class Answers:
@@ -105,7 +108,7 @@ class Answers:
         """A sentence about a question that stands below another line of the table; empty if it does not."""
         for above, below in self._table.items():
             if isinstance(below, dict) and question in below:
-                return f"`{question}` stands below `{above[:60]}`: each question has to begin at the left margin."
+                return f"`{question}` is indented below `{above[:60]}`. Each question has to begin at the left margin."
         return ""
 
     def _misspelt(self, question: str) -> str:
@@ -115,7 +118,7 @@ class Answers:
         line = nearest(question, self._table.keys() - self._questions.keys())
         if line is None or nearest(line, self._questions.keys() - self._table.keys()) != question:
             return ""
-        return f" `{line[:60]}` is no question of this table; did you mean `{question}`?"
+        return f" This table has no question `{line[:60]}`; did you mean `{question}`?"
 
     def expect_answer(self, question: str, *right: Any, hint: str = "") -> None:
         """The answer to one question says the same as one of the right ones."""
@@ -149,12 +152,12 @@ class Answers:
             outcomes.passed(title, observed=_spelt(answer))
             return
         if self._forms.get(question) is NAME_OR_NONE and not begins_with_slash(answer) and not same(answer, "none"):
-            because = f"`{_spelt(answer)}` is neither a full name, which begins with `/`, nor `none`."
+            because = f"The answer is `{_spelt(answer)}`, but it must be a full name, which begins with `/`, or `none`."
             outcomes.failed(title, ANSWER_FORM(because), observed=_spelt(answer))
         outcomes.failed(
             title,
             WRONG_ANSWER(
-                f"`{_spelt(answer)}` is not what happens.",
+                f"`{_spelt(answer)}` is not the right answer.",
                 hint or "Run the experiment again and look at what it prints.",
             ),
             observed=_spelt(answer),

@@ -83,9 +83,9 @@ def misses(answer: Any, form: Sequence[Any]) -> str:
         return f", which is none of the allowed answers: {one_of(form)}"
     wanted = len(form[0])
     if isinstance(answer, str):
-        return f", a text; a list of {wanted} words stands in brackets, `[…, …]`"
+        return f", a text. Write a list of {wanted} words in brackets: `[…, …]`"
     if isinstance(answer, list) and len(answer) != wanted:
-        return f", a list of {len(answer)}; {wanted} words are asked for"
+        return f", a list of {len(answer)} word{'s' * (len(answer) != 1)}, but the question asks for {wanted}"
     if isinstance(answer, list):
         words = {str(word): word for value in form for word in value}
         other = next((one for one in answer if not any(same(one, word) for word in words.values())), answer)

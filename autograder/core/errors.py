@@ -18,7 +18,7 @@ class KitError(Exception):
 
 
 GRADEBOOK_REFUSED = (
-    "See that no other program holds it, that the disk has room and that you may write there, and run again: what is"
-    " finished is kept."
+    "Check that no other program uses the gradebook, that the disk has space and that you may write there. Then run the"
+    " command again: what is finished is kept."
 )
 """What to do when the database says no."""

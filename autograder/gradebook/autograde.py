@@ -39,7 +39,7 @@ from autograder.report.html import check_html, render
 from autograder.sandbox.isolation import choose
 from autograder.submission.reader import read_submission
 
-UNDECIDED = "The grader could not find out. No points are taken: an instructor decides."
+UNDECIDED = "The grader could not decide this check. No points are lost, because an instructor decides."
 """What stands in the output of a check without a verdict."""
 
 

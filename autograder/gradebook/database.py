@@ -60,8 +60,8 @@ def damage_told(root: Path) -> Iterator[None]:
         assert file is not None
         raise KitError(
             f"The gradebook {file} is damaged: {inner}.",
-            f"Put a copy of it in its place: earlier ones are in {file.parent / BACKUPS}. If you have none, move it"
-            " away; a new one lacks the points that people gave.",
+            f"Replace it with one of the earlier copies in {file.parent / BACKUPS}. If there is none, move it away;"
+            " a new one does not contain the points that people gave.",
         ) from error
 
 
@@ -136,7 +136,7 @@ def bring_up_to_date(root: Path) -> None:
     if version == scripts.get_current_head():
         return
     place, file = gradebook_place(root), gradebook_file(root)
-    copies = f" If it held grades, put one of {file.parent / BACKUPS} in its place." if file is not None else ""
+    copies = f" If it held grades, replace it with a copy from {file.parent / BACKUPS}." if file is not None else ""
     if version is None:
         raise KitError(
             f"The gradebook {place} does not say which version it has: it was left unfinished when it was made.",
@@ -154,6 +154,6 @@ def bring_up_to_date(root: Path) -> None:
     except Exception as error:  # it runs a program, which has said what is wrong
         kept = f" A copy of it as it was is {copy}." if copy else ""
         raise KitError(
-            f"The gradebook, which an older nbgrader made, cannot be brought to the form of this one.{kept}",
+            f"The gradebook was made by an older nbgrader, and it could not be upgraded to this version.{kept}",
             "Read what is said above; nbgrader's own command for it is: nbgrader db upgrade",
         ) from error

@@ -32,7 +32,7 @@ def difference_view(tried: Tried) -> RenderableType:
     same = len(tried.after) - new - more - less
     said = f"{more} of {len(tried.after)} students would have more points, {less} fewer, {same} as many"
     said += f"; {new} have no result yet." if new else "."
-    end = Text(f"{said} Nothing was recorded: the same command without --diff does that, and takes what was run now.")
+    end = Text(f"{said} Nothing was recorded. To record these results, run the same command without --diff.")
     left_out: list[RenderableType] = [Text(plain(sentence)) for sentence in tried.collected.refused]
     above: list[RenderableType] = [table, Text()] if table.row_count else []
     return Group(*above, end, *left_out)
@@ -53,7 +53,7 @@ def _rows(after: SubmissionResult, before: SubmissionResult, tried: Tried) -> li
         passed = "no longer in the lab" if new is None else "it is passed"
         why = plain(reason(failure)) if failure is not None else passed
         if name in by_hand:
-            why = f"{by_hand[name]:g} by hand stays, and is to be looked at again; {why}"
+            why = f"{by_hand[name]:g} points given by hand stay, but somebody should check them again; {why}"
         rows.append((Text(plain(title)), Text(f"{_points(old)} → {_points(new)}"), Text(why)))
     return rows
 

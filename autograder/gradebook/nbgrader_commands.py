@@ -42,7 +42,7 @@ def install(root: Path) -> None:
     replace_execution(
         lambda notebook, invert: verdicts(root, notebook, invert),
         lambda: KitError(
-            "nbgrader's own execution is closed in this course: it would run students' code in your session.",
+            "nbgrader's own execution is disabled in this course, because it would run students' code in your session.",
             "Use `autograder grade`, or nbgrader's commands without settings for their stages.",
         ),
     )

@@ -94,9 +94,9 @@ def _refuse(loader: Any, refusal: type[Exception]) -> None:
         return
     if file not in _told:
         _told.add(file)
-        told = f"{file} is passed over: it is not known to be yours. If this folder is your course, say:"
+        told = f"{file} is ignored, because it is not known to be yours. If this folder is your course, run:"
         print(f"{told} autograder trust {file.parent}", file=sys.stderr)
-    raise refusal(f"{file} is passed over")
+    raise refusal(f"{file} is ignored")
 
 
 def prepare_nbgrader() -> None:

@@ -105,7 +105,7 @@ def _says_more(root: Path) -> bool:
         return False
     if not may_run(own):
         raise KitError(
-            f"{own} is a program, and it is not known to be yours. Nothing of it was run.",
-            f"If this folder is your course, and not what somebody handed in, say once: autograder trust {root}",
+            f"{own} is a program that is not known to be yours, so it was not run.",
+            f"If this folder is your course, and not something that was handed in, run once: autograder trust {root}",
         )
     return True

@@ -131,7 +131,7 @@ def _in_entry(claim: Claim, lab: str, others: Collection[str]) -> Chosen:
     companions = sum(not is_notebook(path[-1]) and not is_hidden(path) for path in files.values())
     if not notebooks:
         if any(is_notebook(path[-1]) for path in files.values()):
-            raise NotUnderstoodError("holds no notebook but a hidden one, such as a checkpoint of JupyterLab's")
+            raise NotUnderstoodError("holds only a hidden notebook, such as a checkpoint of JupyterLab")
         return Chosen(claim, None, companions=companions)
     member, doubtful = _of_notebooks(notebooks, lab)
     _refuse_other_lab(member.name, lab, others)
@@ -142,7 +142,7 @@ def _in_entry(claim: Claim, lab: str, others: Collection[str]) -> Chosen:
 def _refuse_other_lab(name: str, lab: str, others: Collection[str]) -> None:
     other = next((other for other in others if is_of_lab(name, other)), None)
     if other is not None and not is_of_lab(name, lab):
-        raise NotUnderstoodError(f"handed in {name[:80]!r} only, the notebook of {other}")
+        raise NotUnderstoodError(f"handed in only {name[:80]!r}, which is the notebook of {other}")
 
 
 def _unwrapped(files: dict[Member, tuple[str, ...]], lab: str) -> dict[Member, tuple[str, ...]]:

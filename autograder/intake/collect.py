@@ -100,18 +100,18 @@ def stop(
     if not open_ones:
         return
     options = " ".join(f"--accept {kind.value}" for kind in open_ones)
-    how = f"what {reading.format.title} gives out" if reading.format.title else "a class without a platform"
+    how = f"a class from {reading.format.title}" if reading.format.title else "a class without a platform"
     inside = f", inside {'/'.join(reading.around)[:100]!r}" if reading.around else ""
     raise KitError(
-        f"{' '.join(open_ones.values())} It was read as {how}{inside}, with {count(len(students), 'student')}."
-        " Nothing was graded.",
-        f"Look at the submissions and at who is meant. If this is right, go on with {options}.",
+        f"{' '.join(open_ones.values())} The submissions were read as {how}{inside}, with"
+        f" {count(len(students), 'student')}. Nothing was graded.",
+        f"Check the submissions and to whom they belong. If all is right, run the command again with {options}.",
     )
 
 
 def _strangers(names: Sequence[str]) -> str:
-    fits = "fits" if len(names) == 1 else "fit"
-    return f"{some(names, ', ')} {fits} no student of the roster, or several." if names else ""
+    matches = "matches" if len(names) == 1 else "match"
+    return f"{some(names, ', ')} {matches} no student in the roster, or more than one." if names else ""
 
 
 def _missing(source: Path, lost: Sequence[str]) -> str:
@@ -119,7 +119,7 @@ def _missing(source: Path, lost: Sequence[str]) -> str:
         return ""
     are = "is" if len(lost) == 1 else "are"
     return (
-        f"{count(len(lost), 'student')} of the roster or of the last time {are} not in {source}:"
+        f"{count(len(lost), 'student')} from the roster or from the last run {are} missing in {source}:"
         f" {some([repr(name[:100]) for name in lost], ', ')}."
     )
 
@@ -132,12 +132,15 @@ def _replaced(students: Sequence[Student], before: Mapping[str, Taken]) -> list[
         name = file_name(student.name)
         if name in first:
             one, other = (given.claims[0].entry.name[:80] for given in (first[name], student))
-            told.append(f"{one!r} and {other!r} mean the same student, {name[:80]!r}; nothing says which one counts.")
+            told.append(
+                f"{one!r} and {other!r} belong to the same student, {name[:80]!r}, and it is not clear which of them"
+                " counts."
+            )
         first.setdefault(name, student)
         was = person(before[name].owner) if name in before and not before[name].left else None
         now = person(student.claims[0].owner)
         if was is not None and now is not None and was[0] == now[0] and was != now:
-            told.append(f"{name[:80]!r} was {was[1][:80]!r} the last time, and is {now[1][:80]!r} now.")
+            told.append(f"In the last run, {name[:80]!r} was {was[1][:80]!r}, but now it is {now[1][:80]!r}.")
     return told
 
 
@@ -181,7 +184,7 @@ class Collected:
     @property
     def line(self) -> str:
         """How many files were seen, how many students they are, and which files were not used and why."""
-        given = f", as {self.format} gives them out" if self.format else ""
+        given = f", from {self.format}" if self.format else ""
         inside = f", inside {'/'.join(self.around)[:100]!r}" if self.around else ""
         told = f"{count(self.files, 'file')} of {count(self.students, 'student')}{given}{inside}."
         unused = [*self.unused]
@@ -300,17 +303,17 @@ def _one_each(students: Sequence[Student], reading: Reading, collected: Collecte
             collected.refused.append("A submission without a student's name was left out.")
         elif not student.listed and reading.format is not PLAIN and not student.claims[0].by_hand:
             who = ", ".join(student.claims[0].owner.values())[:100]
-            collected.refused.append(f"{who!r} fits no student of the roster, or several; it was left out.")
+            collected.refused.append(f"{who!r} matches no student in the roster, or more than one; it was left out.")
         elif name in found:
             # What somebody has added beside a platform's files is the later one.
             kept, left = (here, found[name]) if student.claims[0].by_hand else (found[name], here)
             one, other = (given.claims[0].entry.name[:80] for given in (kept, left))
-            collected.refused.append(f"{one!r} and {other!r} mean the same student; the second was left out.")
+            collected.refused.append(f"{one!r} and {other!r} belong to the same student; the second was left out.")
             found[name] = kept
         else:
             found[name] = here
             if not student.listed:
-                collected.notes.append(f"{name[:100]!r} is no student of the roster, and keeps this name.")
+                collected.notes.append(f"{name[:100]!r} is not in the roster, so the student keeps this name.")
             if name != unicodedata.normalize("NFC", student.name):
                 collected.notes.append(
                     f"{student.name[:80]!r} cannot be a file's name here; the student is called {name!r}."
@@ -378,14 +381,14 @@ def _write(paths: CoursePaths, student: str, lab: str, chosen: Chosen, notebook:
 def _farewells(missing: Gone, before: Mapping[str, Taken]) -> list[str]:
     """Sentences about who has left the class."""
     left = [
-        f"{student} is not among the submissions any more, and has left grades.csv, the class page and the exports."
+        f"{student} is no longer among the submissions and was removed from grades.csv, the class page and the exports."
         " The gradebook keeps the grades."
         for student in missing.lost
         if student in before
     ]
     return left + [
-        f"{student} has another name now, and has left grades.csv, the class page and the exports. Points that somebody"
-        " gave by hand stay in the gradebook under the old name."
+        f"{student} has a different name now, so the old name was removed from grades.csv, the class page and the"
+        " exports. Points that somebody gave by hand stay in the gradebook under the old name."
         for student in missing.renamed
     ]
 

@@ -135,11 +135,11 @@ def gradescope(entries: Sequence[Entry], lab: str) -> Recognised:
     found.aside.append(metadata)
     told = _gradescope_metadata(metadata)
     if told is None:
-        found.strange.append(f"{_METADATA} cannot be read, and it alone says whose the folders are.")
+        found.strange.append(f"{_METADATA} cannot be read, but only this file says to whom the folders belong.")
     for entry, match in _forms(entries, _SUBMISSION):
         owners, when = (told or {}).get(entry.stem, ([], ""))
         if not owners:
-            found.strange.append(f"{entry.name} is of nobody in {_METADATA}.")
+            found.strange.append(f"{_METADATA} does not say to whom {entry.name} belongs.")
             found.aside.append(entry)
         attempt = (when, int(match["number"]))
         found.claims += [Claim(entry, owner, "", attempt, handed_in=moment(when.encode()) or "") for owner in owners]
@@ -257,7 +257,8 @@ def plain(entries: Sequence[Entry], lab: str) -> Recognised:
         elif student is not None:
             found.claims.append(Claim(entry, {"id": student}, entry.name))
         elif entry.is_work:
-            found.strange.append(f"Nothing says whose {entry.name[:80]!r} is: it is called as the lab is.")
+            because = "because it has the name of the lab"
+            found.strange.append(f"It is not clear to whom {entry.name[:80]!r} belongs, {because}.")
         elif entry.name != ROSTER:
             found.strange.append(f"{entry.name[:80]!r} is no student's folder, notebook or zip.")
     return found

@@ -96,7 +96,7 @@ def _read(entries: Sequence[Entry], around: tuple[str, ...], asked: _Asked) -> R
             return inner
     if asked.format not in (None, PLAIN):
         raise KitError(
-            f"Nothing in {asked.source} has a name as {asked.format.title} gives it.",
+            f"No name in {asked.source} has the form that {asked.format.title} uses.",
             "Leave --format out, or name another.",
         )
     return Reading(PLAIN, PLAIN.read(entries, asked.lab), around)
@@ -136,17 +136,17 @@ def _of_platform(entries: Sequence[Entry], around: tuple[str, ...], asked: _Aske
     told.claims += [replace(claim, by_hand=True) for claim in added.claims]
     told.strange += added.strange
     notes = [
-        f"{claim.entry.name[:100]!r} has no name as {chosen.title} gives it: somebody has added it, and it is taken as"
-        f" the work of {claim.owner['id'][:100]!r}."
+        f"The name {claim.entry.name[:100]!r} does not have the form that {chosen.title} uses, so somebody has added"
+        f" it. It is taken as the work of {claim.owner['id'][:100]!r}."
         for claim in added.claims
     ]
     return Reading(chosen, told, around, notes)
 
 
 def _two_ways(asked: _Asked, titles: Sequence[str], others: Sequence[str]) -> KitError:
-    ways = " or ".join(f"as what {title} gives out" for title in titles)
-    names = f" {some([repr(name[:80]) for name in others], ', ')} {_have(others)} no such name." if others else ""
-    plain = "" if len(titles) > 1 else ", or as a class whose folders and files have the students' names"
+    ways = " or ".join(f"as a class from {title}" for title in titles)
+    names = f" {some([repr(name[:80]) for name in others], ', ')} {_do(others)} not have such a name." if others else ""
+    plain = "" if len(titles) > 1 else ", or as a class in which folders and files have the names of students"
     return KitError(
         f"{asked.source} can be read {ways}{plain}.{names} Nothing was graded.",
         f"Say which it is: --format {' or --format '.join(_named(titles))} or --format plain.",
@@ -157,8 +157,8 @@ def _named(titles: Sequence[str]) -> list[str]:
     return [one.name for one in PLATFORMS.values() if one.title in titles]
 
 
-def _have(names: Sequence[str]) -> str:
-    return "has" if len(names) == 1 else "have"
+def _do(names: Sequence[str]) -> str:
+    return "does" if len(names) == 1 else "do"
 
 
 def _inside(only: Entry, around: tuple[str, ...], asked: _Asked) -> Reading | None:
@@ -193,8 +193,8 @@ def _inside(only: Entry, around: tuple[str, ...], asked: _Asked) -> Reading | No
     names = some([repr(name[:80]) for name in owners], ", ")
     are = "is a student" if len(owners) == 1 else "are students"
     raise KitError(
-        f"{asked.source} holds only {only.name[:80]!r}. That may be the work of a student of this name, or a class of"
-        f" {len(owners)}: {names}. Nothing was graded.",
+        f"{asked.source} contains only {only.name[:80]!r}. This may be the work of a student with this name, or a class"
+        f" of {len(owners)}: {names}. Nothing was graded.",
         f"If {names} {are}, add --format {inner.format.name}. If {student[:80]!r} is a student, put the name into"
         " roster.csv, or put the work beside that of others.",
     )

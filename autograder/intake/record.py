@@ -54,9 +54,9 @@ def read_class(root: Path, lab: str) -> dict[str, Taken]:
     except (OSError, ValidationError) as error:
         why = error.strerror if isinstance(error, OSError) else "it is not as this version of the kit writes it"
         raise KitError(
-            f"{path}, which says who was in the class the last time, cannot be read: {why}.",
-            "Put an earlier copy in its place. If you have none, move it away: the next run then cannot say who is"
-            " missing or was replaced.",
+            f"{path}, which records who was in the class in the last run, cannot be read: {why}.",
+            "Replace it with an earlier copy. If you have none, move the file away; the next run then cannot tell who"
+            " is missing or was replaced.",
         ) from error
 
 

@@ -120,7 +120,7 @@ def read_roster(path: Path) -> Roster:
             continue
         student = known.get("id", "")
         if not student:
-            raise KitError(f"Line {number} of the roster {path} has no `id`.", "Give each student one, or none a line.")
+            raise KitError(f"Line {number} of the roster {path} has no `id`.", "Add an `id`, or remove this line.")
         if student in students:
             raise KitError(
                 f"The roster {path} names {student!r} twice, the second time in line {number}.", "Keep one of the two."

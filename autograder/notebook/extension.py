@@ -27,9 +27,10 @@ _NODE_HELP = """Write the rest of the cell to a node program, which `launch` and
     import rclpy
     ...
 
-The name has small letters, digits and underscores, and no `.py`. The cell is not run here: the program runs as a
-process of its own, like one that you start in a terminal. It lies in the folder `nodes` beside the notebook. After a
-change run the cell again, and then its check. Other programs can import it: `import talker`.
+The name consists of lower-case letters, digits and underscores, without `.py`. The cell itself is not run. Instead, the
+program runs as a separate process, like a program that you start in a terminal. Its file is in the folder `nodes`
+beside the notebook. After you have changed the cell, run the cell again, and then its check. Other programs can import
+it: `import talker`.
 """
 
 _FILE_HELP = """Write the rest of the cell to a file: parameters, a launch file, or a table of answers.
@@ -39,12 +40,12 @@ _FILE_HELP = """Write the rest of the cell to a file: parameters, a launch file,
       ros__parameters:
         rate: 10.0
 
-The name has no folder and ends in .yaml, .yml, .json or .csv; a file of a package begins with the package's folder, as
-in `%%file src/car_sensors/package.xml`. The file lies in the folder `nodes` beside the notebook. After a change run the
-cell again, and then its check.
+The name contains no folder and ends with .yaml, .yml, .json or .csv; the name of a file in a package begins with the
+package's folder, as in `%%file src/car_sensors/package.xml`. The file is in the folder `nodes` beside the notebook.
+After you have changed the cell, run the cell again, and then its check.
 """
 
-_ANEW = "Once that is mended, run this cell again; until then what it wrote before still runs."
+_ANEW = "Correct this and run the cell again. Until then, the checks use what the cell wrote before."
 
 
 def register(shell: Any) -> None:

@@ -94,8 +94,8 @@ def _look_at_answer(
             )
         else:
             found.outdated.append(
-                f"The cell {name} has been changed since it was run at {clock}: what you saw of it is about the earlier"
-                " text. The saved text is handed in."
+                f"The cell {name} has been changed since it was run at {clock}, so the results that you saw belong to"
+                " the earlier text. The saved text is handed in."
             )
 
 
@@ -131,5 +131,6 @@ def _older_checks(lab: Lab, cells: dict[str, dict[str, Any]]) -> list[str]:
         return []
     named = ", ".join(dict.fromkeys(older))
     return [
-        f"A cell above was run again after the check of {named}: the report in the notebook is about an earlier text."
+        f"A cell above the check of {named} was run again after the check, so the report in the notebook is about an"
+        " earlier text."
     ]

@@ -217,19 +217,22 @@ class Kernel:
         used = self.used(file_names)
         if saved is not None and not saved.path.is_file():
             return [
-                f"{shown(saved.path)} is not there any more, so nobody can say whether this is what would be graded. If"
-                " the notebook has another name now, shut its kernel down and open it again."
+                f"{shown(saved.path)} no longer exists, so the kit cannot tell whether this is what would be graded. If"
+                " you renamed the notebook, shut down its kernel and open it again."
             ]
         told = [remark for written in used if saved and (remark := saved.remark(written))]
         for written in used:
             if self.folder.changed_by_hand(written.file.file_name):
                 path = shown(self.folder.path / written.file.file_name)
-                told.append(f"{path} is no longer what its cell wrote. Grading takes the cell: run it again.")
+                told.append(f"{path} differs from what its cell wrote. Grading uses the cell, so run the cell again.")
         for name in self.folder.foreign():
             if any(_imports(written, name) or _names(written, name) for written in used):
                 path = shown(self.folder.path / name)
                 first = f"%%node {name.removesuffix('.py')}" if name.endswith(".py") else f"%%file {name}"
-                told.append(f"{path} was written by no cell: grading does not have it. Put it into a cell `{first}`.")
+                told.append(
+                    f"No cell wrote {path}, so it is missing when the notebook is graded. Put its text into a cell that"
+                    f" begins with `{first}`."
+                )
         return told
 
 

@@ -118,7 +118,7 @@ class LabState:
 
 def _points(rows: Sequence[Row]) -> str:
     sure, later, possible = (sum(getattr(row, name) for row in rows) for name in ("sure", "later", "possible"))
-    more = f", up to {later:g} more decided at grading" if later else ""
+    more = f", and up to {later:g} more, decided when the lab is graded" if later else ""
     return f"{sure:g} of {possible:g} point{'' if possible == 1 else 's'}{more}"
 
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from autograder.graph.observer import Observer
     from autograder.notebook.kernel import Kernel
 
-_ROS2_HELP = """Look at the running programs, and speak to them, as with `ros2` in a terminal.
+_ROS2_HELP = """Look at the running programs and call them, as with `ros2` in a terminal.
 
     robot = launch("talker").start()
     %ros2 node list
@@ -29,8 +29,8 @@ _ROS2_HELP = """Look at the running programs, and speak to them, as with `ros2` 
     %ros2 service call /switch std_srvs/srv/SetBool "{data: true}"
     robot.stop()
 
-Inside `with launch(…) as ros:` it looks at that launch. `%ros2 topic --help` names the verbs of a command. What
-would go on until Ctrl-C ends after 10 seconds. The exit status is in `_exit_code` afterwards.
+Inside `with launch(…) as ros:` it looks at that launch. `%ros2 topic --help` lists the verbs of a command. A verb that
+would run until Ctrl-C is stopped after 10 seconds. Afterwards, the exit status is in `_exit_code`.
 """
 
 _ENDLESS = 10.0
@@ -59,7 +59,7 @@ def _run_ros2(kernel: Kernel, line: str) -> int:
     try:
         words = shlex.split(line)
     except ValueError as error:
-        print(f"The line cannot be read: {error}. A quotation mark is missing.")
+        print(f"The line cannot be parsed: {error}. Probably a quotation mark is missing.")
         return 2
     kernel.ready()
     from autograder.checks.runtime import current
@@ -69,7 +69,7 @@ def _run_ros2(kernel: Kernel, line: str) -> int:
     looks = bool(words) and words[0] != "interface" and "--help" not in words and "-h" not in words
     if running is None:
         if looks:
-            print('No program runs that could be looked at. Start one: robot = launch("NAME").start()')
+            print('No program is running. Start one: robot = launch("NAME").start()')
             return 1
         with redirect_stderr(sys.stdout):
             return run(words)
@@ -109,11 +109,12 @@ def _is_endless(words: list[str]) -> bool:
     return goes_on and not any(word.startswith(_COUNTED) for word in words)
 
 
-_LAB_HELP = """Show what of this lab is done and what is open: points by part, and predictions against measurements.
+_LAB_HELP = """Show which parts of this lab are done and which are open, with their points, and compare predictions and
+measurements.
 
     %lab
 
-It runs nothing: it shows what the checks said last in this kernel, and says where a cell was run again since.
+It runs nothing. It shows the last report of each check in this kernel, and says if a cell was run again after it.
 """
 
 
@@ -123,7 +124,7 @@ def lab_magic(kernel: Kernel) -> Any:
     def lab(line: str) -> None:
         notebook = kernel.folder.notebook
         if notebook is None:
-            print("Nobody says here which notebook this is. In a terminal: autograder check NOTEBOOK")
+            print("This front end does not say which notebook this is. Run in a terminal: autograder check NOTEBOOK")
             return
         numbers = {name: written.number for name, written in kernel.folder.written.items()}
         try:

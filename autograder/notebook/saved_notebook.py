@@ -103,7 +103,7 @@ class SavedNotebook:
             return self._why_ungraded(written, answer, first) if self.readable else ""
         copied = self._copied(graded, first)
         if _same(graded.source, written.source):
-            theirs = f"The cell `{first}` is the lab's own and has been changed. Grading takes it as you received it."
+            theirs = f"The cell `{first}` belongs to the lab and has been changed. Grading uses it as you received it."
             return theirs if graded.altered else copied
         known = written.cell_id and graded.cell_id
         ours = answer is not None or graded.given
@@ -112,18 +112,18 @@ class SavedNotebook:
             return f"{copied} This report is about another one, cell [{written.number}]."
         if known and ours and written.cell_id not in self._ids and self.saved_at > written.at:
             return (
-                f"This `{written.file.name}` comes from a cell that is no longer in the notebook. Grading takes the"
-                f" lab's cell that begins with `{first}`: run that one, then this check."
+                f"`{written.file.name}` was written by a cell that is no longer in the notebook. Grading uses the lab's"
+                f" cell that begins with `{first}`. Run that cell, and then this check."
             )
         if known and ours and written.cell_id not in self._ids:
             return (
-                f"This `{written.file.name}` comes from cell [{written.number}], which is not in the saved notebook, so"
-                " nobody can say whether grading takes that cell. Save the notebook, and run this cell again."
+                f"`{written.file.name}` was written by cell [{written.number}], which is not in the saved notebook, so"
+                " the kit cannot tell whether grading uses that cell. Save the notebook, and run this cell again."
             )
         if known and graded.cell_id != written.cell_id and ours:
             return (
-                f"This `{written.file.name}` comes from a cell of your own, cell [{written.number}]. Grading ignores"
-                f" that cell: it takes the lab's cell that begins with `{first}`. Move your text there."
+                f"`{written.file.name}` was written by a cell of your own, cell [{written.number}]. Grading ignores"
+                f" that cell and uses the lab's cell that begins with `{first}`. Move your text there."
             )
         if self.saved_at > written.at:
             return (
@@ -145,14 +145,14 @@ class SavedNotebook:
             )
         if not answer.copies:
             return (
-                f"The cell for this answer, `{answer.grade_id}`, is no code cell any more, {none} Select the cell and"
+                f"The cell for this answer, `{answer.grade_id}`, is no longer a code cell, {none} Select the cell and"
                 " make it a code cell again (key Y)."
             )
         if self.saved_at <= written.at and written.cell_id in {cell.get("id") for cell in answer.copies}:
             return ""  # it has its first line again, and is not saved yet
         return (
             f"The cell for this answer, `{answer.grade_id}`, no longer begins with `{first}`, {none} Grading ignores"
-            " every other cell: move your text into that one, below this line."
+            f" all other cells. Begin the cell `{answer.grade_id}` with this line again, and put your text below it."
         )
 
     def lacks(self, written: Written) -> bool:

@@ -190,7 +190,7 @@ def _graded(cell: CellGrade, check: CheckResult | None, task: Task, fold: bool) 
     report = Markup(check_html(check, title=title, fold_pictures=fold) if check is not None else "")
     remark = ""
     if cell.is_check and check is None:
-        remark = "What the check found is not stored any more."
+        remark = "The report of this check is no longer stored."
     elif cell.is_check and cell.by_hand:
         remark = f"Your instructor has looked at this check and gives {_number(cell.points or 0.0)} points."
     return _Graded(

@@ -256,10 +256,10 @@ def undecided_view(results: Sequence[SubmissionResult]) -> RenderableType | None
     flagged = [Text(f"  {plain(result.student)}: {plain(flag)}") for result in results for flag in result.flags]
     found = []
     if lines:
-        head = "The grader could not find out; these wait for manual grading (--force runs them again):"
+        head = "The grader could not decide these checks. They wait for manual grading (--force runs them again):"
         found += [Text(head, "bold magenta"), *lines]
     if flagged:
-        found += [Text("The points of these stand, and a person should look at them:", "bold magenta"), *flagged]
+        found += [Text("These checks keep their points, but a person should look at them:", "bold magenta"), *flagged]
     return Group(*found) if found else None
 
 
@@ -298,7 +298,7 @@ def similar_view(pairs: Sequence[Pair], count: int) -> RenderableType:
             lines.append(Text(f"       {number} that only these two have, letter for letter:"))
             lines += [Text(f"         {plain(line[:90])}", "dim") for line in pair.lines[:_LINES]]
     end = "A task has few solutions, and people may work together: read both before you ask anybody."
-    lines.append(Text(end if pairs else "No pair is alike beyond that.", "dim"))
+    lines.append(Text(end if pairs else "No other pair of submissions has that much in common.", "dim"))
     return Group(*lines)
 
 

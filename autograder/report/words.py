@@ -51,7 +51,7 @@ def points(check: CellResult) -> str:
         return f"{check.points:g} of {full}"
     sure, possible = check.sure_points or 0.0, check.possible_points
     upto = "" if possible == check.max_points else f"{possible:g} of "
-    return f"{f'{sure:g} sure, ' if sure else ''}up to {upto}{full}, decided at grading"
+    return f"{f'{sure:g} sure, ' if sure else ''}up to {upto}{full}, decided when the lab is graded"
 
 
 def total(result: SubmissionResult) -> str:
@@ -60,7 +60,7 @@ def total(result: SubmissionResult) -> str:
     undecided = sum(check.status is Status.UNKNOWN for check in result.checks)
     later = sum(one.possible_points - (one.sure_points or 0.0) for one in result.checks if one.more_at_grading)
     if later:
-        told += f", up to {later:g} more decided at grading"
+        told += f", and up to {later:g} more, decided when the lab is graded"
     if undecided:
         told += f", {undecided} check{'s' if undecided > 1 else ''} undecided: your instructor decides"
     return told
@@ -69,7 +69,9 @@ def total(result: SubmissionResult) -> str:
 def part_points(part: Part) -> str:
     """Return a part's points in words."""
     full = f"{round(part.max_points, 2):g} point{'' if part.max_points == 1 else 's'}"
-    return f"up to {full}, decided at grading" if part.more_at_grading else f"{round(part.points, 2):g} of {full}"
+    if part.more_at_grading:
+        return f"up to {full}, decided when the lab is graded"
+    return f"{round(part.points, 2):g} of {full}"
 
 
 def part_verdict(part: Part) -> Verdict:
@@ -119,7 +121,7 @@ def findings(check: CellResult) -> Findings:
     by_status = {status: [o for o in check.outcomes if o.status is status] for status in Status}
     left = len(by_status[Status.NOT_CHECKED])
     sentence = (
-        f"{left} more expectation{' was' if left == 1 else 's were'} not looked at because of that." if left else ""
+        f"Because of this, {left} more expectation{' was' if left == 1 else 's were'} not checked." if left else ""
     )
     bad = [o for o in check.outcomes if o.status in (Status.FAILED, Status.UNKNOWN)]
     parts = [

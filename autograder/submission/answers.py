@@ -96,8 +96,8 @@ def take_answers(cells: list[dict[str, Any]], lab: Lab, submission: Submission) 
             problem(
                 f"the notebook is {lab.name}",
                 WRONG_NOTEBOOK(
-                    f"Hardly a cell of it belongs to {lab.name}: it is another notebook, or the graded cells were"
-                    " deleted.",
+                    f"Almost none of its cells belongs to {lab.name}: this is a different notebook, or the graded cells"
+                    " were deleted.",
                     f"Start from labs/{lab.name}/{lab.name}.ipynb and submit that notebook.",
                 ),
             )
@@ -109,7 +109,7 @@ def take_answers(cells: list[dict[str, Any]], lab: Lab, submission: Submission) 
             problem(
                 "every graded cell belongs to the lab",
                 FORGED_CELL(
-                    f"The lab has no graded cell {listed}: ignored.",
+                    f"The lab has no graded cell {listed}, so it is ignored.",
                     "Use ordinary cells for your own notes and experiments.",
                 ),
             )
@@ -150,10 +150,10 @@ def _take_cell(
         _compare(grade_id, copies, lab, submission)
         return
     if not copies:
-        because = f"The answer cell `{grade_id}` was deleted: there is no answer to grade."
+        because = f"The answer cell `{grade_id}` was deleted, so there is no answer to grade."
         hint = f"Copy the cell from a fresh labs/{lab.name}/{lab.name}.ipynb."
         if marked:
-            because = f"The answer cell `{grade_id}` is no code cell any more: there is no answer to grade."
+            because = f"The answer cell `{grade_id}` is no longer a code cell, so there is no answer to grade."
             hint = "Select the cell and make it a code cell again (key Y)."
         submission.problems.append(problem(f"the answer cell `{grade_id}` is there", MISSING_CELL(because, hint)))
         return
@@ -223,7 +223,7 @@ def take_files(lab: Lab, submission: Submission) -> None:
             submission.problems.append(problem(title, BAD_FILE_NAME(str(error), f"Begin the cell with `{wanted}`.")))
             continue
         if file is None:
-            because = f"The cell `{grade_id}` does not begin with `{wanted}`, so it is no file."
+            because = f"The cell `{grade_id}` does not begin with `{wanted}`, so it does not write a file."
             submission.problems.append(problem(title, NO_FILE_NAME(because, f"Begin the cell with `{wanted}`.")))
             continue
         if file.file_name in lab.given:
@@ -241,7 +241,8 @@ def take_files(lab: Lab, submission: Submission) -> None:
             submission.problems.append(problem(title, RENAMED_FILE(because, f"Begin the cell with `{wanted}`.")))
         if file.file_name in owners:
             because = (
-                f"The cells `{owners[file.file_name]}` and `{grade_id}` both name {file.file_name}: the later counts."
+                f"The cells `{owners[file.file_name]}` and `{grade_id}` both write {file.file_name}; only the later"
+                " cell counts."
             )
             submission.problems.append(problem(title, SAME_FILE(because, f"Begin the cell with `{wanted}`.")))
         if places.taken(file.file_name):
@@ -290,7 +291,7 @@ def take_own_files(cells: list[dict[str, Any]], lab: Lab, submission: Submission
         places.add(file.file_name)
         own[file.file_name] = file.text
     if len(own) > OWN_FILES:
-        because = f"There are {len(own)} cells of your own that name files; the first {OWN_FILES} are taken along."
+        because = f"{len(own)} cells of your own write files; only the first {OWN_FILES} of them are used."
         submission.problems.append(problem("the notebook's files are few", TOO_MANY_FILES(because)))
         own = dict(list(own.items())[:OWN_FILES])
     submission.files.update(own)

@@ -122,6 +122,6 @@ def told_of_given_copies(grade_id: str, count: int) -> str:
 DELETE_COPIES = "Delete the copies that should not count: a copied cell keeps its grading mark."
 """What to do about copies."""
 SPLIT = (
-    "The cell `{0}` has been split, and grading leaves out the piece that does not begin with this line. Merge them."
+    "The cell `{0}` has been split. Grading ignores the piece that does not begin with this line, so merge the pieces."
 )
 """What is said of a cell that was split, with its first line."""

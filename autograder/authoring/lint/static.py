@@ -89,11 +89,11 @@ def _marks(marks: dict[str, Any], kind: str) -> Iterator[str]:
         if kind == "code" and not marks.get("solution") and not marks.get("locked"):
             yield "a check must be locked, or students could change it."
         if kind == "code" and marks.get("solution"):
-            yield "code that students write gets its points from a check below it, and none of its own."
+            yield "it must not have points of its own, because students' code gets its points from a check below it."
     elif "points" in marks:
         yield "it has points, but is not graded."
     if marks.get("solution") and marks.get("locked"):
-        yield "it is to be filled in, and locked at the same time."
+        yield "students have to fill it in, but it is locked."
 
 
 def _answer(cell: dict[str, Any]) -> Iterator[str]:
@@ -111,7 +111,7 @@ def _outside(cell: dict[str, Any]) -> Iterator[str]:
     marks = nbgrader_of(cell)
     found = {match[2] for match in MARK.finditer(source_of(cell))}
     if "SOLUTION" in found and not marks.get("solution"):
-        yield "a solution stands in a cell that is not to be filled in; students would receive it."
+        yield "it contains a solution, but students do not fill it in, so they would receive the solution."
     if "HIDDEN TESTS" in found and not _is_check(cell):
         yield "hidden tests stand in a cell that is no check."
 
@@ -292,13 +292,13 @@ def course_findings(root: Path) -> list[Finding]:
     """Say what is wrong with the course's own settings: labs and codes that they list and that are not there."""
     names = lab_names(root)
     missing = [name for name in read_settings(root).labs if name not in names]
-    found = [Finding("", f"{SETTINGS_FILE} lists a lab that there is not, `{name}`.") for name in missing]
+    found = [Finding("", f"{SETTINGS_FILE} lists the lab `{name}`, which does not exist.") for name in missing]
     explained = read_book(root).sections
     if explained:
         checks = "".join(cell.source for name in names for cell in load_lab(root, name).cells)
         known = all_kinds().keys() | set(re.findall(r"""code=["']([a-z-]+)""", checks))
-        unknown = [code for code in explained if code not in known]
-        found += [Finding("", f"{SETTINGS_FILE} explains a reason that nothing gives, `{code}`.") for code in unknown]
+        unknown = [f"explains the reason `{code}`, which no check gives" for code in explained if code not in known]
+        found += [Finding("", f"{SETTINGS_FILE} {sentence}.") for sentence in unknown]
     return found
 
 

@@ -132,14 +132,7 @@ class ActionExpectations(Meeting):
             return goal.result
         scene = self._scene()
         if goal.result is None:
-            because, advice = f"The goal is `{state_of(goal)}`; it has not ended within {within:g} s.", ""
-            if state_of(goal) in ("succeeded", "canceled", "aborted"):
-                because = f"The goal is `{state_of(goal)}`, but its execute callback has not returned a result."
-                advice = "When its goal has ended, the execute callback has to `return`."
-            elif state_of(goal) == "accepted":
-                advice = "Nothing has called `execute()` of its handle so far: the status would be `executing`."
-            elif goal.agreed:
-                advice = "It agreed to cancel: now the execute callback has to look at `is_cancel_requested`."
+            because, advice = _unfinished(goal, within)
             reason = (
                 diagnosis.why_not_finished(scene, goal.name, status)
                 or diagnosis.program_trouble(scene)
@@ -150,8 +143,8 @@ class ActionExpectations(Meeting):
         found = diagnosis.why_not_finished(scene, goal.name, status) if goal.status == "aborted" else None
         because, advice = f"It ended as `{goal.status}`.", ""
         if goal.agreed:
-            because = f"The server had agreed to cancel the goal, and it ended as `{goal.status}` all the same."
-            advice = "While `is_cancel_requested` is true, call `canceled()` and no other end."
+            because = f"The server had accepted the request to cancel, but the goal ended as `{goal.status}`."
+            advice = "While `is_cancel_requested` is true, end the goal only with `canceled()`."
         found = found or GOAL_STATUS(because, advice)
         self._fail(title, found, expected=status, observed=goal.status, hint=hint)
 
@@ -198,7 +191,8 @@ class ActionExpectations(Meeting):
         began, ended = when.get("canceling"), when.get("canceled")
         after = [heard for heard in goal.heard if began is not None and heard.stamp > began]
         taken = f" ({ended - began:.2f} s)" if began is not None and ended is not None else ""
-        because = f"After it had agreed, the server went on for {len(after)} feedback messages{taken}."
+        because = f"After the server had accepted the request to cancel, it sent {len(after)} more feedback messages"
+        because += f"{taken}."
         self._expect_that(
             len(after) <= _STEPS,
             f"`{goal.name}` ends a goal soon after it has agreed to cancel it",
@@ -234,6 +228,20 @@ class ActionExpectations(Meeting):
             observed=str(most),
             hint=hint,
         )
+
+
+def _unfinished(goal: Goal, within: float) -> tuple[str, str]:
+    """Say of a goal without a result how far it has got, and what to do."""
+    state = state_of(goal)
+    because = f"The goal is `{state}`, and it has not ended within {within:g} s."
+    if state in ("succeeded", "canceled", "aborted"):
+        because = f"The status of the goal is `{state}`, but its execute callback has not returned a result."
+        return because, "When its goal has ended, the execute callback has to `return`."
+    if state == "accepted":
+        hint = "`execute()` of its goal handle has not been called yet: otherwise, the status would be `executing`."
+        return because, hint
+    hint = "The server accepted the request to cancel. Now the execute callback has to check `is_cancel_requested`."
+    return because, hint if goal.agreed else ""
 
 
 def state_of(goal: Goal) -> str:

@@ -37,10 +37,11 @@ _SAID = {"SIGINT": "Ctrl-C (SIGINT)", "SIGTERM": "SIGTERM"}
 _STAMP = re.compile(r" \[\d+\.\d+\]")
 """The time in a line of the log."""
 
-_ENDED = "`main` has to catch what spinning raises then: `KeyboardInterrupt` and `ExternalShutdownException`. "
-_ENDED += "After that `rclpy.try_shutdown()` is right, which does nothing where the signal has shut rclpy down already."
-_UNTAKEN = "Nothing in the program took the signal, so the signal ended it at once. `rclpy.init()` takes both signals, "
-_UNTAKEN += "but not for a context of your own and not with `SignalHandlerOptions.NO`."
+_ENDED = "`main` has to catch the exceptions that spinning then raises: `KeyboardInterrupt` and "
+_ENDED += "`ExternalShutdownException`. After that, call `rclpy.try_shutdown()`, which does nothing if the signal has "
+_ENDED += "already shut down rclpy."
+_UNTAKEN = "The program did not handle the signal, so the signal ended it immediately. `rclpy.init()` handles both "
+_UNTAKEN += "signals, but not for a context of your own and not with `SignalHandlerOptions.NO`."
 
 _SPINS_WITHIN = 3.0
 """Seconds for which a program is let alone until it spins: before that it has not reached what catches the signal."""
@@ -60,17 +61,18 @@ def _comes_back(where: str, never_spun: bool) -> str:
     if "spin_until_future_complete(" in where:
         over = " or its `timeout_sec` is over" if "timeout_sec" in where else ""
         return (
-            f"`spin_until_future_complete` comes back once its future is done{over}: that of `call_async` when the "
-            "answer comes, one of your own by `set_result` of that very object."
+            f"`spin_until_future_complete` returns as soon as its future is done{over}. The future of `call_async` is "
+            "done when the response arrives; a future of your own is done when you call `set_result` on this same "
+            "object."
         )
     if any(call in where for call in (".send_goal(", ".cancel_goal(", ".get_result(")):
         return (
-            "This call comes back only if another thread spins the node meanwhile. Without one call its `_async` twin, "
-            "and spin until the future is done."
+            "This call returns only if another thread spins the node meanwhile. If no other thread does, call the "
+            "`_async` variant and spin until the future is done."
         )
     if never_spun and (".call(" in where or ".done()" in where):
-        return "Nobody spins the node while it waits here, and only spinning takes an answer that has come."
-    return "`spin` does not come back by itself." if ".spin(" in where else ""
+        return "Nothing spins the node while it waits here, but a response is processed only while the node is spun."
+    return "`spin` does not return by itself." if ".spin(" in where else ""
 
 
 class EndingExpectations(ProgramExpectations):
@@ -103,7 +105,7 @@ class EndingExpectations(ProgramExpectations):
                 reason = None
             self._fail(
                 title,
-                reason or STILL_RUNNING(f"It still runs after {within:g} s{where}."),
+                reason or STILL_RUNNING(f"It is still running after {within:g} s{where}."),
                 expected="ended",
                 observed="still running",
                 hint=hint,
@@ -173,7 +175,7 @@ class EndingExpectations(ProgramExpectations):
             program.signal(getattr(signal, by))
             self._observer.wait(lambda: not program.running(), within)
         if program.running():
-            because, advice = f"{within:g} s after {_SAID[by]} it still runs{self._place_of(program)}.", ""
+            because, advice = f"{within:g} s after {_SAID[by]}, it is still running{self._place_of(program)}.", ""
             if left := self._thread_left(program):
                 because, advice = f"{because} {left.because}", left.hint
             reason = SIGNAL_IGNORED(because, advice)
@@ -183,9 +185,9 @@ class EndingExpectations(ProgramExpectations):
         error = last_traceback(said, name) if status or "Traceback (most recent call last)" in said else None
         if error is not None and _CONTEXT_GONE in error.because and _RACE_OF_RCLPY.search(said):
             return True
-        because = f"Told to end by {_SAID[by]}, it ended with exit status {status}."
+        because = f"After {_SAID[by]}, it ended with exit status {status}."
         if error is not None:
-            because = f"{error.because}. That was at {_SAID[by]}; the exit status is {status}."
+            because = f"{error.because}. This happened after {_SAID[by]}; the exit status is {status}."
         advice = _ENDED if error is not None else _UNTAKEN if status == -getattr(signal, by) else ""
         self._expect_that(
             status == 0 and error is None,

@@ -38,11 +38,14 @@ def _other_way(seen: Sequence[tuple[str, str]], wanted: Sequence[tuple[str, str]
     during, goal = seen[at]
     callback = {"configuring": "on_configure", "activating": "on_activate", "deactivating": "on_deactivate"}.get(during)
     if during == "errorprocessing" and goal == "finalized":
-        return "`on_error` did not return SUCCESS: that is the end of the node, which is finalized now."
+        return "`on_error` did not return SUCCESS, so the node is now finalized and cannot be used again."
     if callback and goal == "errorprocessing":
-        return f"`{callback}` returned ERROR, or raised. What is not possible now is FAILURE: that leads straight back."
+        return (
+            f"`{callback}` returned ERROR or raised an exception. Return FAILURE if something is not possible now: the "
+            "node then goes back to its previous state."
+        )
     if callback and goal == {"configuring": "unconfigured", "activating": "inactive", "deactivating": "active"}[during]:
-        return f"`{callback}` returned FAILURE: the node is as it was, and `on_error` is not called."
+        return f"`{callback}` returned FAILURE. The node is in its previous state, and `on_error` is not called."
     return f"`{callback}` returned SUCCESS." if callback else ""
 
 
@@ -199,7 +202,7 @@ class LifecycleExpectations(Meeting):
             self._fail(
                 title,
                 STATE(
-                    f"`{node}` is {done.before}; from there it offers {', '.join(done.available) or 'nothing'}.",
+                    f"`{node}` is {done.before}; in this state, it offers {', '.join(done.available) or 'nothing'}.",
                 ),
                 expected=label,
                 observed=done.before,
@@ -210,7 +213,7 @@ class LifecycleExpectations(Meeting):
                 title,
                 self._what_they_say()
                 or TRANSITION_FAILED(
-                    f"The callback of {label} did not return SUCCESS; the node is {done.after} now."
+                    f"The callback for `{label}` did not return SUCCESS; the node is now {done.after}."
                     + self._last_line(node),
                 ),
                 expected="success",
@@ -220,7 +223,7 @@ class LifecycleExpectations(Meeting):
         if expect == "failure" and done.success:
             self._fail(
                 title,
-                TRANSITION_SUCCEEDED(f"It succeeded; the node is {done.after} now."),
+                TRANSITION_SUCCEEDED(f"The transition succeeded, but it should not; the node is now {done.after}."),
                 expected="no success",
                 observed=f"success, {done.after}",
                 hint=hint,

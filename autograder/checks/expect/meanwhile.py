@@ -133,8 +133,8 @@ class MeanwhileExpectations(ConcurrencyExpectations, SourceExpectations, Offerin
             self._fail(
                 title,
                 PAUSED(
-                    f"The longest run of `{callback}` took {max(spans):.2f} s, and a message comes on `{topic}` every "
-                    f"{gap:.2f} s: too short for {at_least} of them.",
+                    f"The longest run of `{callback}` took {max(spans):.2f} s, and a message arrives on `{topic}` "
+                    f"every {gap:.2f} s. Such a run is too short for {at_least} messages.",
                 ),
                 expected=f"at least {at_least} messages in one run",
                 observed=f"runs of at most {max(spans):.2f} s",
@@ -145,7 +145,7 @@ class MeanwhileExpectations(ConcurrencyExpectations, SourceExpectations, Offerin
         self, title: str, topic: str, activity: str, seen: Sequence[int], at_least: int, goal: Goal | None, hint: str
     ) -> None:
         scene = self._scene()
-        most = f"The most that came on `{topic}` in one run is {max(seen, default=0)}."
+        most = f"At most {max(seen, default=0)} messages arrived on `{topic}` during one run."
         self._fail(
             title,
             diagnosis.program_trouble(scene)

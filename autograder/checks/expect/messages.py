@@ -96,7 +96,8 @@ def _numbers(at_least: int, at_most: int | None, exactly: int | None, rate: floa
 def _an_int(message: Any) -> Reason | None:
     """Whether a message has an `int` in a field of floats."""
     field = int_in_float(message)
-    because = f"Messages came, and `{field}` in them is what becomes of an `int` where a `float` belongs."
+    because = f"Messages arrived, but one of their fields contains a wrong number, `{field}`, because an `int` was"
+    because += " assigned where a `float` is required."
     hint = "Write `5.0` for `5`."
     return MESSAGE_FIELD(because, hint) if field else None
 
@@ -193,12 +194,12 @@ class MessageExpectations(SourceExpectations):
                 or diagnosis.inside_reason(scene)
                 or diagnosis.lifecycle_silence(scene)
                 or _an_int(recording.messages[-1].msg)
-                or CONTENT(f"Messages came, but none {which}; the last of them is `{last}`.")
+                or CONTENT(f"Messages arrived, but none {which}; the last of them is `{last}`.")
             )
         else:
             reason = diagnosis.why_silent(scene, recording.topic, recording.msg_type, qos)
             if got and reason.kind is diagnosis.SILENT:
-                came = f"Only {got} of {wanted.need} messages came in {within:g} s."
+                came = f"Only {got} of {wanted.need} messages arrived within {within:g} s."
                 reason = TOO_FEW(f"{came} {reason.because}")
         expected, observed = _number(wanted.need), _number(got)
         self._fail(wanted.title, reason, expected=expected, observed=observed, hint=wanted.hint)
@@ -213,7 +214,7 @@ class MessageExpectations(SourceExpectations):
             asked = f"at most {most}" if most else "none"
             self._fail(
                 wanted.title,
-                TOO_MANY(f"{_number(came)} came where {asked} {'were' if most > 1 else 'was'} expected."),
+                TOO_MANY(f"{_number(came)} arrived, but {asked} {'were' if most > 1 else 'was'} expected."),
                 expected=asked,
                 observed=f"{came}",
                 hint=wanted.hint,
@@ -245,7 +246,7 @@ class MessageExpectations(SourceExpectations):
             self._fail(
                 wanted.title,
                 RATE(
-                    f"The messages come at {measured} instead of {rate:g} Hz. "
+                    f"The messages arrive at {measured} instead of {rate:g} Hz. "
                     + diagnosis.paces(self._scene(), wanted.recording.topic),
                 ),
                 expected=f"{rate:g} Hz within {tolerance:.0%}",
@@ -301,7 +302,7 @@ class MessageExpectations(SourceExpectations):
             not came,
             f"Nothing is published on `{topic}`",
             lambda: (kind_of_lab(code) if code else NOT_SILENT)(
-                because or f"Messages came on `{topic}` that should not."
+                because or f"Messages arrived on `{topic}`, but there should be none."
             ),
             expected="no message",
             observed=_number(published()),

@@ -31,7 +31,7 @@ PARAMS_FILE_KEY = Kind("params-file-key", "no key of the parameter file is this 
 
 _EVERY_NODE = ("use_sim_time", "start_type_description_service")
 """Parameters that rclpy declares for every node."""
-_KINDS = {bool: "a bool", int: "an integer", float: "a double", str: "a text", type(None): "without a value"}
+_KINDS = {bool: "a bool", int: "an integer", float: "a double", str: "a string", type(None): "without a value"}
 _WITHIN = 2.0
 
 
@@ -48,7 +48,7 @@ def undeclared(node: str, name: str, declared: Collection[str]) -> Reason:
         return PARAMETER_VALUE(because, "The second argument of `declare_parameter` is the default.")
     return PARAMETER_UNDECLARED(
         f"`{node}` has not declared a parameter `{name}`" + (f"; it has {', '.join(has)}." if has else "."),
-        "A value given at the start reaches declared parameters only.",
+        "A value that is given when the node starts only reaches parameters that the node has declared.",
     )
 
 
@@ -82,8 +82,8 @@ def _given_to_another(running: Running, node: str, name: str) -> Reason | None:
         for text in launched.parameter_rules():
             meant, _, parameter = text.partition(":=")[0].rpartition(":")
             if parameter == name and meant and f"/{meant}" != node:
-                because = f"`-p {text}` is for the node `/{meant}`, and this one is `{node}`."
-                hint = "Leave the node out: the value is for every node of the process then."
+                because = f"`-p {text}` is for the node `/{meant}`, but this node is `{node}`."
+                hint = "Remove the node name; the value then applies to every node of the process."
                 return PARAMETER_FOR_OTHERS(because, hint)
     return None
 
@@ -105,7 +105,7 @@ def _given_by_another_name(running: Running, node: str, name: str, found: Any) -
     return PARAMETER_UNDECLARED(
         f"It is {found!r}. A value was given for `{one}`, which `{node}` has not declared; it has "
         f"{', '.join(declared)}.",
-        "A value for a name that is not declared is passed over without a word.",
+        "ROS 2 silently ignores values for parameters that are not declared.",
     )
 
 
@@ -138,7 +138,7 @@ def _no_such_argument(running: Running, found: Any) -> Reason | None:
     given = ", ".join(f"`{name}`" for name in unused)
     return LAUNCH_ARGUMENT(
         f"It is {found!r}. The launch was given {given}, and the launch file has no argument of that name.",
-        "`- arg:` with a `name` declares one; `ros2 launch` passes over the others without a word.",
+        "Declare it with `- arg:` and a `name`; `ros2 launch` silently ignores arguments that are not declared.",
     )
 
 
@@ -148,7 +148,7 @@ def _file_for_others(running: Running, node: str) -> Reason | None:
         if launched.warnings:
             hint = "Write `$(dirname)/NAME.yaml`; NAME is a cell's `%%file`."
             if "the build installs no" in launched.warnings[0]:
-                hint = "Compare the path with `data_files` in setup.py: only what stands there is installed."
+                hint = "Compare the path with `data_files` in setup.py: only the files listed there are installed."
             return PARAMS_FILE_MISSING(f"{launched.warnings[0]} The node started without it.", hint)
         for option, file in itertools.pairwise(launched.arguments()):
             if option != "--params-file":
@@ -167,5 +167,6 @@ def _other_value(found: Any, wanted: Any) -> Reason:
         return PARAMETER_VALUE(f"It is {found!r}.")
     return PARAMETER_VALUE(
         f"It is {found!r}, {kind}, and not {asked}.",
-        "40 is an integer, 40.0 a double, '40' a text. Given another type than it declares, a node ends at its start.",
+        "40 is an integer, 40.0 a double, '40' a string. A node ends when it starts if a value has another type "
+        "than the declared one.",
     )

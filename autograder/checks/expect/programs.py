@@ -206,8 +206,8 @@ class ProgramExpectations(Expectations, ABC):
         found = diagnosis.program_trouble(scene) or diagnosis.inside_reason(scene)
         if not found and node and not times and not instead:
             found = diagnosis.nothing_due(scene, "/" + node.replace(".", "/"))
-        came = {0: instead or "No such message was logged.", 1: "It came once."}.get(times, f"It came {times} times.")
-        return found or NO_LOG(came)
+        often = {0: instead or "No such message was logged.", 1: "It was logged once."}
+        return found or NO_LOG(often.get(times, f"It was logged {times} times."))
 
     def _said_instead(self, text: str, level: str, node: str) -> str:
         """The same words at another level, by another node or only printed, where a message did not come."""
@@ -222,12 +222,12 @@ class ProgramExpectations(Expectations, ABC):
         printed = [line for line in lines if text and re.search(text, line)]
         for line in printed:
             if "] [" not in line:
-                return f"`{line[:80]}` was printed, not logged. What `self.get_logger()` is given is logged."
+                return f"`{line[:80]}` was printed, not logged. Use `self.get_logger()` to log it."
             logger = _LOGGER.match(line)
             if node and logger and logger[1] != node:
                 return (
-                    f"`{line[logger.end() :][:80]}` was logged by a logger called `{logger[1]}`. That of the node is "
-                    f"called `{node}`, with its namespace, and `self.get_logger()` returns it."
+                    f"`{line[logger.end() :][:80]}` was logged by a logger called `{logger[1]}`. The node's own logger "
+                    f"is called `{node}`, with its namespace, and `self.get_logger()` returns it."
                 )
         return ""
 

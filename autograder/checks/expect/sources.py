@@ -39,9 +39,10 @@ class SourceExpectations(EndExpectations):
             self._fail(
                 title,
                 EXTRA_PUBLISHER(
-                    f"`{topic}` has {len(owners)} publishers ({named}): it cannot be told whose messages these are.",
+                    f"`{topic}` has {len(owners)} publishers ({named}), so the check cannot tell which of them sent"
+                    " these messages.",
                     "Publish on this topic from one place only."
-                    + " Make the publisher once, in the constructor, and send each message with it."
+                    + " Create the publisher once, in the constructor, and send each message with it."
                     * (len(set(owners)) == 1),
                 ),
                 expected=f"{publishers} publisher",
