@@ -14,7 +14,7 @@ WAITS_FOR_SERVICE = Kind(
     Group.BLOCKED,
 )
 AWAIT_SAME_GROUP = Kind(
-    "await-same-group", "a callback awaits a client's answer; both are in one exclusive group", Group.BLOCKED
+    "await-same-group", "a callback awaits a client's response; both are in one exclusive group", Group.BLOCKED
 )
 STUCK_CALLBACK = Kind(
     "stuck-callback",
@@ -23,25 +23,27 @@ STUCK_CALLBACK = Kind(
 )
 CALL_SAME_GROUP = Kind(
     "call-same-group",
-    "call() in a callback has not come back; client and callback share an exclusive group",
+    "call() in a callback has not returned; client and callback share an exclusive group",
     Group.BLOCKED,
 )
 CALL_IN_CALLBACK = Kind(
-    "call-in-callback", "call() in a callback has not come back; every thread of the executor is taken", Group.BLOCKED
+    "call-in-callback", "call() in a callback has not returned; every thread of the executor is occupied", Group.BLOCKED
 )
 NESTED_SPIN = Kind(
     "nested-spin",
-    "a callback spins, and has not ended since, or its node is in no spinning executor now",
+    "a callback spins, and has not returned since, or its node is in no spinning executor now",
     Group.BLOCKED,
 )
 RATE_IN_CALLBACK = Kind(
     "rate-in-callback",
-    "rate.sleep() in a callback has not come back; every thread of the executor is taken",
+    "rate.sleep() in a callback has not returned; every thread of the executor is occupied",
     Group.BLOCKED,
 )
-RATE_UNSPUN = Kind("rate-unspun", "rate.sleep() has not come back; no executor spins", Group.BLOCKED)
+RATE_UNSPUN = Kind("rate-unspun", "rate.sleep() has not returned; no executor spins", Group.BLOCKED)
 BUSY_WAIT = Kind(
-    "busy-wait", "a callback stays in a loop that asks a future; its answer cannot be taken meanwhile", Group.BLOCKED
+    "busy-wait",
+    "a callback stays in a loop that checks a future; meanwhile the response cannot be processed",
+    Group.BLOCKED,
 )
 WRONG_TYPE = Kind("wrong-type", "the end, or the service that is asked, is there with another type", Group.NAMES)
 WAITS_FOR_LOCK = Kind(

@@ -50,7 +50,7 @@ MACHINE_THREADS = Kind(
 )
 TIMER_SAME_GROUP = Kind(
     "timer-same-group",
-    "a callback waits for an answer, and all timers of its node are in its exclusive group",
+    "a callback waits for a response, and all timers of its node are in its exclusive group",
     Group.TOGETHER,
     "timeline",
 )
