@@ -53,7 +53,7 @@ def _rows(after: SubmissionResult, before: SubmissionResult, tried: Tried) -> li
         passed = "no longer in the lab" if new is None else "it is passed"
         why = plain(reason(failure)) if failure is not None else passed
         if name in by_hand:
-            why = f"{by_hand[name]:g} points given by hand stay, but somebody should check them again; {why}"
+            why = f"the points given by hand ({by_hand[name]:g}) stay, but somebody should check them again; {why}"
         rows.append((Text(plain(title)), Text(f"{_points(old)} → {_points(new)}"), Text(why)))
     return rows
 

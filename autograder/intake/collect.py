@@ -140,7 +140,7 @@ def _replaced(students: Sequence[Student], before: Mapping[str, Taken]) -> list[
         was = person(before[name].owner) if name in before and not before[name].left else None
         now = person(student.claims[0].owner)
         if was is not None and now is not None and was[0] == now[0] and was != now:
-            told.append(f"In the last run, {name[:80]!r} was {was[1][:80]!r}, but now it is {now[1][:80]!r}.")
+            told.append(f"{name[:80]!r} was {was[1][:80]!r} in the last run, but is {now[1][:80]!r} now.")
     return told
 
 

@@ -298,7 +298,7 @@ def similar_view(pairs: Sequence[Pair], count: int) -> RenderableType:
             lines.append(Text(f"       {number} that only these two have, letter for letter:"))
             lines += [Text(f"         {plain(line[:90])}", "dim") for line in pair.lines[:_LINES]]
     end = "A task has few solutions, and people may work together: read both before you ask anybody."
-    lines.append(Text(end if pairs else "No other pair of submissions has that much in common.", "dim"))
+    lines.append(Text(end if pairs else "No pair reaches the smallest similarity that is shown (--at-least).", "dim"))
     return Group(*lines)
 
 

@@ -109,7 +109,7 @@ def take_answers(cells: list[dict[str, Any]], lab: Lab, submission: Submission) 
             problem(
                 "every graded cell belongs to the lab",
                 FORGED_CELL(
-                    f"The lab has no graded cell {listed}, so it is ignored.",
+                    f"The lab has no graded cell {listed}, so {'it is' if len(forged) == 1 else 'they are'} ignored.",
                     "Use ordinary cells for your own notes and experiments.",
                 ),
             )

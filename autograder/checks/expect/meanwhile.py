@@ -145,7 +145,8 @@ class MeanwhileExpectations(ConcurrencyExpectations, SourceExpectations, Offerin
         self, title: str, topic: str, activity: str, seen: Sequence[int], at_least: int, goal: Goal | None, hint: str
     ) -> None:
         scene = self._scene()
-        most = f"At most {max(seen, default=0)} messages arrived on `{topic}` during one run."
+        most = max(seen, default=0)
+        number = f"At most {most} message{'s' * (most != 1)}" if most else "No message"
         self._fail(
             title,
             diagnosis.program_trouble(scene)
@@ -154,7 +155,7 @@ class MeanwhileExpectations(ConcurrencyExpectations, SourceExpectations, Offerin
             or (diagnosis.why_waits_for_a_goal(scene, goal.name) if goal else None)
             or diagnosis.waits_for_its_group(scene)
             or diagnosis.why_not_together(scene, activity)
-            or PAUSED(f"{most} {diagnosis.layout(scene, activity)}"),
+            or PAUSED(f"{number} arrived on `{topic}` during one run. {diagnosis.layout(scene, activity)}"),
             expected=f"at least {at_least} messages in one run",
             observed=", ".join(str(count) for count in seen) or "no complete run",
             hint=hint,

@@ -167,6 +167,6 @@ def _other_value(found: Any, wanted: Any) -> Reason:
         return PARAMETER_VALUE(f"It is {found!r}.")
     return PARAMETER_VALUE(
         f"It is {found!r}, {kind}, and not {asked}.",
-        "40 is an integer, 40.0 a double, '40' a string. A node ends when it starts if a value has another type "
-        "than the declared one.",
+        "40 is an integer, 40.0 a double, '40' a string. If a value does not have the declared type, the "
+        "node ends when it starts.",
     )
