@@ -112,7 +112,7 @@ NAME = "ros2-labs"
 INSTRUCTORS = ("authoring", "gradebook", "report/class_page.py", "report/templates/class.html")
 """What of the package `autograder` students do without."""
 STUDENTS = {
-    "cli": ("__init__", "app", "check", "doctor", "jupyter", "machine", "main", "package", "ros2", "submit"),
+    "cli": ("__init__", "app", "check", "doctor", "machine", "main", "package", "ros2", "submit"),
     "intake": ("__init__", "record"),
 }
 """The modules of a folder that students need; the others are an instructor's."""
