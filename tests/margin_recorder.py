@@ -15,8 +15,10 @@ import time
 import types
 
 from autograder.checks import findings
-from autograder.checks.expect import feedback, messages
-from autograder.checks.launch import Launch
+from autograder.checks.expect import rates
+from autograder.checks.expect.activity import Activity
+from autograder.checks.expect.goal import SentGoal
+from autograder.checks.expect.topic import Topic
 from autograder.graph.observer import Observer
 
 NOTE = "margin "
@@ -98,7 +100,7 @@ def _noting_waits(wait):
         came = wait(self, ready, within, give_up)
         took = time.monotonic() - began
         if within > 0:
-            what = "" if asked in ("wait", "<lambda>") else asked
+            what = "" if asked in ("wait", "_wait", "<lambda>") else asked
             _, text = _line()
             _note(f"{text} ({what})" if what else text, "wait", came, took if came else None, within)
         return came
@@ -118,36 +120,36 @@ def _noting_rates(method):
             method(self, wanted, tolerance, within)
         finally:
             if wanted.rate is not None:
-                gaps = messages.rates._gaps(wanted.counted()[-wanted.need :], wanted.where is None)
+                gaps = rates._gaps(wanted.counted()[-wanted.need :], wanted.where is None)
                 _note_pace(gaps, 1 / wanted.rate, tolerance)
 
     return noted
 
 
 def _noting_feedback(method):
-    def noted(self, goal, rate, tolerance, hint):
+    def noted(self, rate, tolerance, hint):
         if rate is not None:
-            _note_pace(feedback.rates._gaps(goal.heard, True), 1 / rate, tolerance)
-        method(self, goal, rate, tolerance, hint)
+            _note_pace(rates._gaps(self.heard, True), 1 / rate, tolerance)
+        method(self, rate, tolerance, hint)
 
     return noted
 
 
 def _noting_periods(method):
-    def noted(self, topic, names, period, *, tolerance=0.2, **rest):
+    def noted(self, names, period, *, tolerance=0.2, **rest):
         try:
-            method(self, topic, names, period, tolerance=tolerance, **rest)
+            method(self, names, period, tolerance=tolerance, **rest)
         finally:
             for name in names:
-                _note_pace(self.concurrency(topic).gaps(name), period, tolerance)
+                _note_pace(self.seen().gaps(name), period, tolerance)
 
     return noted
 
 
 Observer.wait = _noting_waits(Observer.wait)
-messages.MessageExpectations._at_rate = _noting_rates(messages.MessageExpectations._at_rate)
-feedback.FeedbackExpectations._keep_their_rate = _noting_feedback(feedback.FeedbackExpectations._keep_their_rate)
-Launch.expect_period = _noting_periods(Launch.expect_period)
+Topic._at_rate = _noting_rates(Topic._at_rate)
+SentGoal._keep_their_rate = _noting_feedback(SentGoal._keep_their_rate)
+Activity.expect_period = _noting_periods(Activity.expect_period)
 for _worker in ("autograder.grading.worker", "__main__"):  # as it was forked, and as it was started
     if hasattr(sys.modules.get(_worker), "_run_cell"):
         vars(sys.modules[_worker])["ast"] = types.SimpleNamespace(**{**vars(ast), "parse": _parse})

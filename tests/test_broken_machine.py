@@ -37,7 +37,7 @@ FILES = {
 }
 LAUNCH = """from autograder.checks import launch
 with launch("talk") as ros:
-    ros.expect_exit("talk", status=0, within=60)
+    ros.program("talk").expect_exit(status=0, within=60)
 ros.score(1)"""
 BUILD = """from autograder.checks import build
 with build("NAME") as package:

@@ -238,25 +238,25 @@ rclpy.init()
 rclpy.spin(Talker())
 ----
 with launch("talker") as ros:
-    ros.expect_node("/talker")
-    ros.expect_messages("/a_topic_with_a_name_that_is_too_wide_for_windows/chater", String)
-    ros.expect_node("/talker")
+    ros.node("/talker").expect()
+    ros.topic("/a_topic_with_a_name_that_is_too_wide_for_windows/chater", String).expect_messages()
+    ros.node("/talker").expect()
 ros.score(2)
 ----
 with launch("talker") as ros:
-    ros.expect_node("/talker")
+    ros.node("/talker").expect()
     # More is checked here when the lab is graded.
 ros.score(2)
 ----
 with launch("talker") as ros:
     with ros.part("the node has its name"):
-        ros.expect_node("/talker")
+        ros.node("/talker").expect()
     with ros.part("it publishes"):
-        ros.expect_publisher("/chatter", String)
+        ros.topic("/chatter", String).expect_publisher()
 ros.score({"the node has its name": 1, "it publishes": 2})
 ----
 with launch("talker") as ros:
-    heard = ros.listen("/a_topic_with_a_name_that_is_too_wide_for_windows/chatter", String)
+    heard = ros.topic("/a_topic_with_a_name_that_is_too_wide_for_windows/chatter", String).listen()
     ros.wait(lambda: heard.count > 2, within=60)
 ----
 launch("talkr")"""

@@ -335,19 +335,19 @@ GOOD = {
     package.expect_executable("speed_sensor")
     package.expect_installed("share/good_sensors/package.xml")
 with launch(Program("speed_sensor", package="good_sensors"), listen=[("/speed", Int64)]) as ros:
-    ros.expect_node("/sensor")
-    ros.expect_messages("/speed", Int64, at_least=3)
+    ros.node("/sensor").expect()
+    ros.topic("/speed", Int64).expect_messages(at_least=3)
 with launch_file("car.launch.yaml", package="good_sensors") as ros:
-    ros.expect_node("/front")
+    ros.node("/front").expect()
 ros.score(1)""",
     "interfaces": """with build("good_interfaces") as package:
     package.expect_interface("msg/Things", {"header": "std_msgs/Header", "things": "Thing[]"})
     package.expect_interface("srv/Count", {"label": "string"}, {"count": "int32"})
 with launch("counter", packages=["good_interfaces"], listen=[("/counted", String)]) as ros:
-    ros.expect_messages("/counted", String, at_least=1, where=lambda m: m.data == "2 of car")
+    ros.topic("/counted", String).expect_messages(at_least=1, where=lambda m: m.data == "2 of car")
 ros.score(1)""",
     "float for int": """with launch("halves", packages=["good_interfaces"], listen=[("/counted", String)]) as ros:
-    ros.expect_messages("/counted", String, at_least=1, where=lambda m: m.data == "2 of car", within=5)
+    ros.topic("/counted", String).expect_messages(at_least=1, where=lambda m: m.data == "2 of car", within=5)
 ros.score(1)""",
     "fields": """with build("good_interfaces") as package:
     package.expect_interface("msg/Thing", {"label": "string", "x": "float64"})

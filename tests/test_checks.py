@@ -101,17 +101,17 @@ def test_a_right_node_earns_the_points_under_names_and_values_that_vary(grade: G
         """\
         name = vary.name("robot")
         with launch("talker", namespace=f"/{name}", parameters={"word": name}, remappings=[("chatter", "talk")]) as ros:
-            ros.expect_node(f"/{name}/talker")
-            ros.expect_publisher(f"/{name}/talk", String, node=f"/{name}/talker")
-            ros.expect_no_topic(f"/{name}/chatter")
-            ros.expect_qos(f"/{name}/talk", reliability="reliable", durability="volatile", deadline=None)
-            ros.expect_messages(f"/{name}/talk", String, at_least=10, rate=20,
+            ros.node(f"/{name}/talker").expect()
+            ros.topic(f"/{name}/talk", String).expect_publisher(node=f"/{name}/talker")
+            ros.topic(f"/{name}/chatter").expect_unused()
+            ros.qos(f"/{name}/talk").expect(reliability="reliable", durability="volatile", deadline=None)
+            ros.topic(f"/{name}/talk", String).expect_messages(at_least=10, rate=20,
                                 values=lambda heard: all(m.data.startswith(name) for m in heard))
-            ros.expect_parameter(f"/{name}/talker", "word", name)
-            ros.expect_service(f"/{name}/how_many", Trigger)
-            ros.require(ros.call(f"/{name}/how_many", Trigger, Trigger.Request()).success, "It counts")
-            ros.set_parameter(f"/{name}/talker", "word", "changed")
-            ros.expect_messages(f"/{name}/talk", String, where=lambda m: m.data.startswith("changed"))
+            ros.node(f"/{name}/talker").expect_parameter("word", name)
+            ros.service(f"/{name}/how_many", Trigger).expect()
+            ros.require(ros.service(f"/{name}/how_many", Trigger).call(Trigger.Request()).success, "It counts")
+            ros.node(f"/{name}/talker").set_parameter("word", "changed")
+            ros.topic(f"/{name}/talk", String).expect_messages(where=lambda m: m.data.startswith("changed"))
         ros.score(2)
         """,
         talker__py=TALKER,
@@ -123,57 +123,57 @@ def test_a_right_node_earns_the_points_under_names_and_values_that_vary(grade: G
 @pytest.mark.parametrize(
     ("old", "new", "expectation", "code", "because"),
     [
-        ('"talker"', '"talkr"', 'ros.expect_node("/talker")', "node-name", "/talkr"),
-        ('"chatter"', '"chattr"', 'ros.expect_publisher("/chatter", String)', "topic-name", "/chattr"),
+        ('"talker"', '"talkr"', 'ros.node("/talker").expect()', "node-name", "/talkr"),
+        ('"chatter"', '"chattr"', 'ros.topic("/chatter", String).expect_publisher()', "topic-name", "/chattr"),
         ("rclpy.spin(Talker())", "node = Talker(); import threading; threading.Event().wait()",
-         'ros.expect_messages("/chatter", String, within=6)', "not-spinning", "nothing spins"),
-        ("        self.count = 0", "        self.count = nothing", 'ros.expect_node("/talker")', "crashed",
+         'ros.topic("/chatter", String).expect_messages(within=6)', "not-spinning", "nothing spins"),
+        ("        self.count = 0", "        self.count = nothing", 'ros.node("/talker").expect()', "crashed",
          "self.count = nothing"),
-        ("        self.count = 0", "        self.handle = 0", 'ros.expect_node("/talker")', "crashed", "another name"),
-        ("        self.count = 0", "        self.timers = []", 'ros.expect_node("/talker")', "crashed",
+        ("        self.count = 0", "        self.handle = 0", 'ros.node("/talker").expect()', "crashed", "another name"),
+        ("        self.count = 0", "        self.timers = []", 'ros.node("/talker").expect()', "crashed",
          "needs another name"),
         ("def tick(self):", "def tick(self):\n        self.handle = 0",
-         'ros.expect_messages("/chatter", String, within=6)', "callback-exception", "another name"),
+         'ros.topic("/chatter", String).expect_messages(within=6)', "callback-exception", "another name"),
         ("def main():", "class NoWord(Exception): pass\n\n\ndef main():\n    raise NoWord(1)",
-         'ros.expect_node("/talker")', "crashed", "line 32: NoWord: 1"),
+         'ros.node("/talker").expect()', "crashed", "line 32: NoWord: 1"),
         ("rclpy.spin(Talker())", "node = Talker(); node.destroy_publisher(node.publisher); node.tick()",
-         'ros.expect_messages("/chatter", String, within=6)', "used-after-destroy", "InvalidHandle"),
+         'ros.topic("/chatter", String).expect_messages(within=6)', "used-after-destroy", "InvalidHandle"),
         ("rclpy.spin(Talker())",
          "node = Talker(); node.create_publisher(String, 'other', 1).destroy(); rclpy.spin(node)",
-         'ros.expect_messages("/chatter", String, at_least=9, within=6)', "used-after-destroy",
+         'ros.topic("/chatter", String).expect_messages(at_least=9, within=6)', "used-after-destroy",
          "stays in the node's list"),
-        ("def tick(self):", "def handle(self):\n        pass\n\n    def tick(self):", 'ros.expect_node("/talker")',
+        ("def tick(self):", "def handle(self):\n        pass\n\n    def tick(self):", 'ros.node("/talker").expect()',
          "crashed", "a method of yours is called `handle`"),
-        ("def main():", "def main()", 'ros.expect_node("/talker")', "syntax-error", "line"),
-        ("        return response", "        return", 'ros.call("/how_many", Trigger, Trigger.Request())',
+        ("def main():", "def main()", 'ros.node("/talker").expect()', "syntax-error", "line"),
+        ("        return response", "        return", 'ros.service("/how_many", Trigger).call(Trigger.Request())',
          "service-no-return",
          "did not return the response"),
-        ("response.success = True", "raise ValueError('no')", 'ros.call("/how_many", Trigger, Trigger.Request())',
+        ("response.success = True", "raise ValueError('no')", 'ros.service("/how_many", Trigger).call(Trigger.Request())',
          "service-exception", "ValueError: no"),
         ("self.count += 1", "self.count += 1; self.count == 60 and self.get_logger().info('tick')",
-         'ros.expect_messages("/rosout", Log, at_least=3, within=6)', "too-few",
+         'ros.topic("/rosout", Log).expect_messages(at_least=3, within=6)', "too-few",
          "the timer of `tick` (line 16, every 0.05 s) fired "),
         ("self.count += 1", "self.count += 1; print('tick', self.count)",
-         'ros.expect_log("tick", node="talker", within=6)', "no-log", "was printed, not logged"),
+         'ros.node("/talker").expect_log("tick", within=6)', "no-log", "was printed, not logged"),
         ("self.count += 1", "self.count += 1; self.get_logger().info('tick')",
-         'ros.expect_log("tick", node="talker", level="WARN", within=6)', "no-log", "at level INFO, not at WARN"),
+         'ros.node("/talker").expect_log("tick", level="WARN", within=6)', "no-log", "at level INFO, not at WARN"),
         ("self.count += 1", "self.count += 1; rclpy.logging.get_logger('mine').info('tick')",
-         'ros.expect_log("tick", node="talker", within=6)', "no-log", "by a logger called `mine`"),
+         'ros.node("/talker").expect_log("tick", within=6)', "no-log", "by a logger called `mine`"),
         ('"chatter", 10', '"chatter", rclpy.qos.qos_profile_sensor_data',
-         'ros.expect_messages("/chatter", String, qos=QoSProfile(depth=10), within=6)',
+         'ros.topic("/chatter", String).expect_messages(qos=QoSProfile(depth=10), within=6)',
          "qos-reliability", "best effort"),
-        ("", "", 'ros.expect_messages("/chatter", Int32, within=6)', "wrong-type", "std_msgs/msg/String"),
-        ("", "", 'ros.expect_messages("/chatter", String, rate=5)', "rate", "instead of 5 Hz"),
-        ("", "", 'ros.expect_parameter("/talker", "wrd", 1)', "parameter-undeclared", "; it has period, word."),
-        ("", "", 'ros.expect_parameter("/talker", "period", 1.0)', "parameter-value", "0.05"),
+        ("", "", 'ros.topic("/chatter", Int32).expect_messages(within=6)', "wrong-type", "std_msgs/msg/String"),
+        ("", "", 'ros.topic("/chatter", String).expect_messages(rate=5)', "rate", "instead of 5 Hz"),
+        ("", "", 'ros.node("/talker").expect_parameter("wrd", 1)', "parameter-undeclared", "; it has period, word."),
+        ("", "", 'ros.node("/talker").expect_parameter("period", 1.0)', "parameter-value", "0.05"),
         ('"period", 0.05)', '"period", 0.05)\n        self.declare_parameter("unset", rclpy.Parameter.Type.DOUBLE)',
-         'ros.expect_parameter("/talker", "unset", 1.0)', "parameter-value", "without a default"),
-        ("", "", 'ros.publish("/topic", String())', "no-topic", ""),
-        ("", "", 'ros.expect_exit("talker", within=4)', "still-running", "is still running"),
+         'ros.node("/talker").expect_parameter("unset", 1.0)', "parameter-value", "without a default"),
+        ("", "", 'ros.publisher("/topic", String).publish(String())', "no-topic", ""),
+        ("", "", 'ros.program("talker").expect_exit(within=4)', "still-running", "is still running"),
         ("    rclpy.spin(Talker())",
          "    from rclpy.action import ActionClient\n    from test_msgs.action import Fibonacci\n"
          "    ActionClient(Talker(), Fibonacci, 'far').send_goal(Fibonacci.Goal())",
-         'ros.expect_exit("talker", within=4)', "still-running", "only if another thread spins"),
+         'ros.program("talker").expect_exit(within=4)', "still-running", "only if another thread spins"),
     ],
 )  # fmt: skip
 def test_a_wrong_node_loses_the_points_for_its_own_reason(
@@ -201,7 +201,7 @@ def test_an_int_where_a_float_belongs_is_told(grade: Grade) -> None:
         """\
         from std_msgs.msg import Float64
         with launch("speed") as ros:
-            ros.expect_messages("/speed", Float64, where=lambda m: m.data == 5.0, within=6)
+            ros.topic("/speed", Float64).expect_messages(where=lambda m: m.data == 5.0, within=6)
         ros.score(2)
         """,
         speed__py="""\
@@ -232,8 +232,8 @@ def test_a_program_that_is_told_to_end_may_end_cleanly(grade: Grade, by: str) ->
     result = grade(
         f"""\
         with launch("talker", parameters={{"period": 60.0}}) as ros:
-            ros.expect_node("/talker")
-            ros.expect_clean_end("talker", by={by!r})
+            ros.node("/talker").expect()
+            ros.program("talker").expect_clean_end(by={by!r})
         ros.score(2)
         """,
         talker__py=CAREFUL,
@@ -261,8 +261,8 @@ def test_a_program_that_does_not_end_cleanly_is_told_what_it_did(
     result = grade(
         f"""\
         with launch("talker", parameters={{"period": 60.0}}) as ros:
-            ros.wait_for_graph(lambda: "/talker" in ros.nodes())
-            ros.expect_clean_end("talker", by={by!r})
+            ros.graph.wait(lambda: "/talker" in ros.graph.nodes())
+            ros.program("talker").expect_clean_end(by={by!r})
         ros.score(2)
         """,
         talker__py=CAREFUL.replace(old, new),
@@ -286,8 +286,8 @@ def test_what_rclpy_raises_by_chance_at_a_signal_is_no_mistake_of_the_program(
     result = grade(
         """\
         with launch("talker", parameters={"period": 60.0}) as ros:
-            ros.expect_node("/talker")
-            ros.expect_clean_end("talker", by="SIGTERM")
+            ros.node("/talker").expect()
+            ros.program("talker").expect_clean_end(by="SIGTERM")
         ros.score(2)
         """,
         talker__py=fails + "\n\n\n" + CAREFUL.replace("        pass", f"        {where}()"),
@@ -317,8 +317,8 @@ def _wait_for_ready_callbacks():
     result = grade(
         """\
         with launch("talker", parameters={"period": 60.0}) as ros:
-            ros.expect_node("/talker")
-            ros.expect_clean_end("talker", by="SIGTERM")
+            ros.node("/talker").expect()
+            ros.program("talker").expect_clean_end(by="SIGTERM")
         ros.score(2)
         """,
         talker__py=raced + TALKER.replace(spins, catches + "        _wait_for_ready_callbacks()\n"),
@@ -340,8 +340,8 @@ def test_ctrl_c_finds_rclpy_shut_down_each_time(grade: Grade, shuts_down: str, p
         result = grade(
             """\
             with launch("talker") as ros:
-                ros.expect_messages("/chatter", String, at_least=2)
-                ros.expect_clean_end("talker")
+                ros.topic("/chatter", String).expect_messages(at_least=2)
+                ros.program("talker").expect_clean_end()
             ros.score(2)
             """,
             talker__py=program,
@@ -353,7 +353,7 @@ def test_a_status_is_asked_of_a_program_that_need_not_spin(grade: Grade) -> None
     result = grade(
         """\
         with launch("asker") as ros:
-            ros.expect_exit("asker", status=1)
+            ros.program("asker").expect_exit(status=1)
         ros.score(2)
         """,
         asker__py="import rclpy\nfrom rclpy.node import Node\nrclpy.init()\nNode('asker')\nrclpy.shutdown()\n",
@@ -365,12 +365,12 @@ def test_of_two_runs_of_a_program_the_reason_is_that_of_the_one_that_is_meant(gr
     result = grade(
         """\
         with launch(Program("asker", namespace="/other")) as ros:
-            ros.expect_node("/other/asker", within=30)
+            ros.node("/other/asker").expect(within=30)
             ros.start(Program("asker", namespace="/meant"))
-            ros.expect_node("/meant/asker", within=30)
-            ros.serve("/meant/gate", Trigger, lambda request, response: response)
-            ros.wait(lambda: ros.requests("/meant/gate"), 30)
-            ros.expect_exit("asker", within=1)
+            ros.node("/meant/asker").expect(within=30)
+            ros.server("/meant/gate", Trigger, lambda request, response: response)
+            ros.wait(lambda: ros.server("/meant/gate").requests(), 30)
+            ros.program("asker").expect_exit(within=1)
         ros.score(2)
         """,
         asker__py="""\
@@ -394,10 +394,10 @@ def test_what_follows_a_failure_is_listed_as_not_checked_and_hidden_lines_stay_m
     result = grade(
         """\
         with launch("talker") as ros:
-            ros.expect_messages("/chatter", String, where=lambda m: False, within=1)
-            ros.expect_service("/how_many", Trigger)
+            ros.topic("/chatter", String).expect_messages(where=lambda m: False, within=1)
+            ros.service("/how_many", Trigger).expect()
             ### BEGIN HIDDEN TESTS
-            ros.expect_no_node("/secret")
+            ros.require("/secret" not in ros.graph.nodes(), "Nobody is called /secret")
             ### END HIDDEN TESTS
         ros.score(2)
         """,
@@ -416,9 +416,9 @@ def test_how_much_was_seen_of_a_program_that_fails_makes_no_difference(grade: Gr
     result = grade(
         """\
         with launch("talker") as ros:
-            ros.expect_publisher("/chatter", String)
-            ros.expect_messages("/chatter", String, at_least=2)
-            ros.expect_messages("/chatter", String, at_least=100)
+            ros.topic("/chatter", String).expect_publisher()
+            ros.topic("/chatter", String).expect_messages(at_least=2)
+            ros.topic("/chatter", String).expect_messages(at_least=100)
         ros.score(2)
         """,
         talker__py=fails,
@@ -433,7 +433,7 @@ def test_a_new_program_has_time_to_fail_before_something_else_is_held_against_it
     result = grade(
         """\
         with launch("talker") as ros:
-            ros.expect_parameter("/talker", "word", "goodbye")
+            ros.node("/talker").expect_parameter("word", "goodbye")
         ros.score(2)
         """,
         talker__py=late,
@@ -448,9 +448,9 @@ def test_when_an_executor_notices_an_error_makes_no_difference(grade: Grade) -> 
     result = grade(
         """\
         with launch("talker", parameters={"period": 600.0}) as ros:
-            ros.expect_node("/talker")
-            ros.call("/how_many", Trigger, Trigger.Request())
-            ros.expect_messages("/chatter", String)
+            ros.node("/talker").expect()
+            ros.service("/how_many", Trigger).call(Trigger.Request())
+            ros.topic("/chatter", String).expect_messages()
         ros.score(2)
         """,
         talker__py=lingers.replace("response.success = True", "raise ValueError('no')"),
@@ -461,20 +461,22 @@ def test_when_an_executor_notices_an_error_makes_no_difference(grade: Grade) -> 
 
 def test_a_program_that_starts_processes_is_told_why_it_may_not(grade: Grade) -> None:
     source = "import subprocess\nsubprocess.run(['true'])\n"
-    result = grade('with launch("starter") as ros:\n    ros.expect_node("/starter")\nros.score(2)', starter__py=source)
+    result = grade(
+        'with launch("starter") as ros:\n    ros.node("/starter").expect()\nros.score(2)', starter__py=source
+    )
     assert failure(result).code == "refused-call" and "subprocess.run" in failure(result).because
 
 
 def test_a_missing_program_is_the_students_failure(grade: Grade) -> None:
-    result = grade('with launch("talker") as ros:\n    ros.expect_node("/talker")\nros.score(2)')
+    result = grade('with launch("talker") as ros:\n    ros.node("/talker").expect()\nros.score(2)')
     assert failure(result).code == "program-missing"
 
 
 @pytest.mark.parametrize(
     "check",
     [
-        'with launch("talker") as ros:\n    ros.expect_node("/talker")\n    1 / 0\nros.score(2)',
-        'with launch("talker") as ros:\n    ros.expect_node("/talker")',
+        'with launch("talker") as ros:\n    ros.node("/talker").expect()\n    1 / 0\nros.score(2)',
+        'with launch("talker") as ros:\n    ros.node("/talker").expect()',
         "ros_is_not_defined.score(2)",
         'with launch("talker") as ros:\n    pass\nros.score(2)',
     ],
@@ -496,7 +498,7 @@ def test_a_second_publisher_on_a_counted_topic_is_told(grade: Grade, more: str) 
     result = grade(
         """\
         with launch("talker") as ros:
-            ros.expect_messages("/chatter", String, at_least=3)
+            ros.topic("/chatter", String).expect_messages(at_least=3)
         ros.score(2)
         """,
         talker__py=twice,
@@ -508,7 +510,7 @@ def test_a_publisher_that_its_node_makes_once_more_and_never_uses_is_no_mistake(
     result = grade(
         """\
         with launch("talker") as ros:
-            ros.expect_messages("/chatter", String, at_least=3, publisher="/talker")
+            ros.topic("/chatter", String).expect_messages(at_least=3, publisher="/talker")
         ros.score(2)
         """,
         talker__py=TALKER.replace("        self.count = 0\n", "        self.count = 0\n" + MADE_TWICE),
@@ -544,10 +546,10 @@ def test_the_observers_own_name_hides_nothing(grade: Grade) -> None:
             ros.{expectation}
         ros.score(2)
         """
-    result = grade(check.format(expectation='expect_messages("/chatter", String, at_least=40)'), talker__py=both)
+    result = grade(check.format(expectation='topic("/chatter", String).expect_messages(at_least=40)'), talker__py=both)
     assert failure(result).code == "extra-publisher" and "grading_observer" in failure(result).because
     result = grade(
-        check.format(expectation='expect_publisher("/chatter", String, node="/talker")'),
+        check.format(expectation='topic("/chatter", String).expect_publisher(node="/talker")'),
         talker__py=twin("    rclpy.spin(Twin())"),
     )
     assert "grading_observer" in failure(result).because, result
@@ -631,7 +633,7 @@ def test_an_answer_to_an_action_client_is_not_lost_by_chance(grade: Grade) -> No
     result = grade(
         """\
         with launch("counter", "asks") as ros:
-            ros.expect_exit("asks", within=30)
+            ros.program("asks").expect_exit(within=30)
         ros.score(2)
         """,
         counter__py=COUNTER,
@@ -645,13 +647,13 @@ def test_an_action_is_followed_from_the_goal_to_its_end(grade: Grade) -> None:
         """\
         from test_msgs.action import Fibonacci
         with launch("counter") as ros:
-            short = ros.send_goal("/count", Fibonacci, Fibonacci.Goal(order=30))
+            short = ros.action("/count", Fibonacci).send_goal(Fibonacci.Goal(order=30))
             ended = short.wait_for_result(within=10)
             ros._expect_that(ended and short.status == "succeeded", "it succeeds", observed=short.status)
             ros._expect_that(list(short.result.sequence) == list(range(30)), "its result", observed=short.result)
             lengths = [len(feedback.sequence) for feedback in short.feedback]
             ros._expect_that(lengths == list(range(1, 31)), "all feedback, in order", observed=lengths)
-            endless = ros.send_goal("/count", Fibonacci, Fibonacci.Goal(order=100_000))
+            endless = ros.action("/count", Fibonacci).send_goal(Fibonacci.Goal(order=100_000))
             ros._expect_that(endless.wait_for_feedback(3, within=10), "feedback while it runs")
             ros._expect_that(endless.result is None, "no result while it runs")
             ros._expect_that(endless.cancel() and endless.wait_for_result(within=10), "cancelling is agreed to")
@@ -659,7 +661,7 @@ def test_an_action_is_followed_from_the_goal_to_its_end(grade: Grade) -> None:
             ros._expect_that(len(endless.result.sequence) >= 3, "with what was counted", observed=endless.result)
             groups = {run.group for run in ros.runs().of("count")}
             ros._expect_that(groups == {"outside of all groups"}, "rclpy runs it in no group", observed=groups)
-            refused = ros.send_goal("/count", Fibonacci, Fibonacci.Goal(order=-1))
+            refused = ros.action("/count", Fibonacci).send_goal(Fibonacci.Goal(order=-1))
             ros._expect_that(refused.accepted is False, "a goal below zero is rejected")
             ros._expect_that(not refused.cancel(), "and cannot be cancelled")
         ros.score(2)
@@ -681,7 +683,7 @@ def test_a_missing_action_and_a_silent_one_are_told_apart(grade: Grade, old: str
         """\
         from test_msgs.action import Fibonacci
         with launch("counter") as ros:
-            ros.send_goal("/count", Fibonacci, Fibonacci.Goal(order=1), within=4)
+            ros.action("/count", Fibonacci).send_goal(Fibonacci.Goal(order=1), within=4)
         ros.score(2)
         """,
         counter__py=COUNTER.replace(old, new),
@@ -700,7 +702,7 @@ def test_the_qos_of_every_endpoint_counts_whichever_was_made_first(grade: Grade,
     program = PAIR.replace('"chatter", 10)', '"chatter", "x")').replace('"chatter", BEST)', '"chatter", 10)')
     program = program.replace('"chatter", "x")', '"chatter", BEST)') if swapped else PAIR
     result = grade(
-        'with launch("talker") as ros:\n    ros.expect_qos("/chatter", reliability="reliable")\nros.score(2)',
+        'with launch("talker") as ros:\n    ros.qos("/chatter").expect(reliability="reliable")\nros.score(2)',
         talker__py=program,
     )
     assert failure(result).code == "qos-reliability"
@@ -712,8 +714,8 @@ def test_names_keep_their_capitals_and_an_end_that_is_not_there_has_its_nearest_
     result = grade(
         """\
         with launch("talker") as ros:
-            ros.expect_messages("/camRaw/Image", String, at_least=1)
-            ros.expect_qos("/CamRaw/Image", reliability="reliable", within=4)
+            ros.topic("/camRaw/Image", String).expect_messages(at_least=1)
+            ros.qos("/CamRaw/Image").expect(reliability="reliable", within=4)
         ros.score(2)
         """,
         talker__py=program,
@@ -725,27 +727,27 @@ def test_names_keep_their_capitals_and_an_end_that_is_not_there_has_its_nearest_
 @pytest.mark.parametrize(
     ("line", "said"),
     [
-        ('ros.expect_qos("/chatter", reliabilty="reliable")', "no policy called reliabilty"),
-        ('ros.expect_qos("/chatter", depth=10)', "no policy called depth"),
-        ('ros.expect_qos("/chatter", reliability="relaible")', "'relaible' is neither 'reliable' nor 'best_effort'"),
-        ('ros.expect_qos("/chatter", deadline="0.2")', "a number of seconds"),
-        ('ros.expect_node("/talker", wihtin=3)', "wihtin"),
-        ('ros.expect_node("/talker", within=-1)', "within=-1 is no time"),
+        ('ros.qos("/chatter").expect(reliabilty="reliable")', "no policy called reliabilty"),
+        ('ros.qos("/chatter").expect(depth=10)', "no policy called depth"),
+        ('ros.qos("/chatter").expect(reliability="relaible")', "'relaible' is neither 'reliable' nor 'best_effort'"),
+        ('ros.qos("/chatter").expect(deadline="0.2")', "a number of seconds"),
+        ('ros.node("/talker").expect(wihtin=3)', "wihtin"),
+        ('ros.node("/talker").expect(within=-1)', "within=-1 is no time"),
         ("ros.wait(lambda: True, -1)", "within=-1 is no time"),
-        ('ros.expect_silence("/chatter", String, for_seconds=-0.5)', "for_seconds=-0.5 is no time"),
+        ('ros.topic("/chatter", String).expect_silence(for_seconds=-0.5)', "for_seconds=-0.5 is no time"),
         ("ros.pause(-1)", "-1 is no time"),
-        ('ros.expect_messages("/chatter", String, exactly=3, at_most=4)', "exactly"),
-        ('ros.expect_messages("/chatter", String, at_least=-1)', "not negative"),
-        ('ros.expect_overlap("/activity", "tick", itself=True)', "no list"),
-        ('ros.expect_period("/activity", ["tick"], 0.5, runs=2)', "begins late"),
-        ('ros.expect_log("x", level="WARNING")', "none of DEBUG"),
+        ('ros.topic("/chatter", String).expect_messages(exactly=3, at_most=4)', "exactly"),
+        ('ros.topic("/chatter", String).expect_messages(at_least=-1)', "not negative"),
+        ('ros.activity("/activity").expect_overlap("tick", itself=True)', "no list"),
+        ('ros.activity("/activity").expect_period(["tick"], 0.5, runs=2)', "begins late"),
+        ('ros.node("/talker").expect_log("x", level="WARNING")', "none of DEBUG"),
         ('with launch("talker") as second: pass', "inside another one"),
         ("with ros: pass", "inside another one"),
         ('launch("talker", ros_arguments="-r a:=b")', "ros_arguments='-r a:=b' is one text"),
         ('launch("talker", lifecycle="/talker")', "lifecycle='/talker' is one text"),
-        ("ros.require(ros.nodes, 'There is a node')", "call it"),
-        ('ros.expect_publisher("/chatter", "std_msgs/String")', "is no message class"),
-        ('ros.open_publisher("/chatter", "std_msgs/String")', "line 2"),  # raised far inside of rclpy
+        ("ros.require(ros.graph.nodes, 'There is a node')", "call it"),
+        ('ros.topic("/chatter", "std_msgs/String").expect_publisher()', "is no message class"),
+        ('ros.publisher("/chatter", "std_msgs/String").open()', "line 2"),  # raised far inside of rclpy
     ],
 )
 def test_what_a_lab_author_gets_wrong_is_refused_with_its_line_and_is_no_students_failure(
@@ -761,7 +763,7 @@ def test_a_launch_that_ran_is_refused_a_second_time_and_the_next_one_runs(grade:
     again = grade("ros = launch()\nwith ros: pass\nwith ros: pass\nros.score(2)")
     assert "has run already" in again.outcomes[0].because and "line 3" in again.outcomes[0].because
     assert grade(
-        'with launch("talker") as ros:\n    ros.expect_node("/talker")\nros.score(2)', talker__py=TALKER
+        'with launch("talker") as ros:\n    ros.node("/talker").expect()\nros.score(2)', talker__py=TALKER
     ).points
 
 
@@ -795,11 +797,11 @@ def test_what_is_true_in_another_form_holds_and_none_at_all_means_silence(grade:
         import re
         import numpy as np
         with launch("talker") as ros:
-            ros.expect_messages("/chatter", String, where=lambda m: re.match("hello", m.data),
+            ros.topic("/chatter", String).expect_messages(where=lambda m: re.match("hello", m.data),
                                 values=lambda heard: np.all([m.data for m in heard]))
-            ros.expect_messages("/chatter", String, values=lambda heard: re.match("hello", heard[0].data))
-            ros.expect_messages("/nothing", String, at_most=0, for_seconds=0.2)
-            ros.expect_messages("/chatter", String, at_most=0, for_seconds=2)
+            ros.topic("/chatter", String).expect_messages(values=lambda heard: re.match("hello", heard[0].data))
+            ros.topic("/nothing", String).expect_messages(at_most=0, for_seconds=0.2)
+            ros.topic("/chatter", String).expect_messages(at_most=0, for_seconds=2)
         ros.score(2)
         """,
         talker__py=TALKER,
@@ -845,8 +847,8 @@ rclpy.spin(node)
 
         with launch("last_words", listen=[("/chatter", String)], serve=[("/hold", Trigger, hold)]) as ros:
             ros.require(ros.wait(lambda: "published" in ros.program("last_words").output()), "It has published")
-            ros.expect_silence("/chatter", String, for_seconds=3.0)
-            ros.require_equal("It came all the same", ros.listen("/chatter", String).count, 1)
+            ros.topic("/chatter", String).expect_silence(for_seconds=3.0)
+            ros.require_equal("It came all the same", ros.topic("/chatter", String).listen().count, 1)
         ros.score(2)
         """,
         last_words__py=program,
@@ -862,8 +864,8 @@ def test_the_fields_that_a_check_looked_at_stand_first_in_what_was_observed(grad
         """\
         from sensor_msgs.msg import Range
         with launch("talker") as ros:
-            ros.expect_messages("/chatter", Range)
-            ros.expect_messages("/chatter", Range, where=lambda m: m.range > 3 and m.header.frame_id == "x", within=2)
+            ros.topic("/chatter", Range).expect_messages()
+            ros.topic("/chatter", Range).expect_messages(where=lambda m: m.range > 3 and m.header.frame_id == "x", within=2)
         ros.score(2)
         """,
         talker__py=program,
@@ -883,8 +885,8 @@ def test_a_launch_file_starts_the_course_s_program_in_place_of_a_student_s(grade
         from autograder.checks import launch_file
         course = Program("talker", arguments_of_its_own=("first",))
         with launch_file("a.launch.yaml", {"side": "left"}, package="lab", programs={"robot": course}) as ros:
-            ros.expect_node("/left_robot")
-            ros.require(ros.descriptions()[0].arguments()[:2] == ["first", "word"], "Both have their words")
+            ros.node("/left_robot").expect()
+            ros.require(ros.programs()[0].arguments()[:2] == ["first", "word"], "Both have their words")
         ros.score(2)
         """
     result = grade(check, talker__py=TALKER, robot__py="raise ValueError(1)\n", a__launch__yaml=LAUNCHED % "")
@@ -909,8 +911,8 @@ def test_an_argument_without_a_default_is_needed(grade: Grade, default: str, poi
 def test_a_parameter_file_that_is_no_yaml_is_named_with_its_line(grade: Grade) -> None:
     check = """\
         with launch("talker", params_file="p.yaml") as ros:
-            ros.expect_node("/talker")
-            ros.expect_parameter("/talker", "word", "hi")
+            ros.node("/talker").expect()
+            ros.node("/talker").expect_parameter("word", "hi")
         ros.score(2)
         """
     found = failure(grade(check, talker__py=TALKER, p__yaml="talker:\n  ros__parameters:\n    word: [hi\n"))
@@ -924,8 +926,8 @@ def test_a_launch_files_own_value_wins_over_the_file_before_it_and_its_variables
     check = """\
         from autograder.checks import launch_file
         with launch_file("a.launch.yaml", package="lab") as ros:
-            ros.expect_parameter("/veh/robot", "word", "inline")
-            ros.expect_parameter("/veh/robot", "mode", "fast")
+            ros.node("/veh/robot").expect_parameter("word", "inline")
+            ros.node("/veh/robot").expect_parameter("mode", "fast")
         ros.score(2)
         """
     program = TALKER.replace(
@@ -947,8 +949,8 @@ def test_a_parameter_file_that_ros2_launch_would_not_find_is_the_reason(grade: G
     check = """\
         from autograder.checks import launch_file
         with launch_file("a.launch.yaml", package="lab") as ros:
-            ros.expect_node("/talker")
-            ros.expect_parameter("/talker", "word", "hi")
+            ros.node("/talker").expect()
+            ros.node("/talker").expect_parameter("word", "hi")
         ros.score(2)
         """
     launched = "launch:\n- node: {pkg: lab, exec: robot, param: [{from: p.yaml}]}\n"
@@ -961,7 +963,7 @@ def test_a_parameter_file_that_ros2_launch_would_not_find_is_the_reason(grade: G
 def test_a_parameter_rule_that_rcl_refuses_is_explained(grade: Grade) -> None:
     check = """\
         with launch("talker", ros_arguments=["-p", "my-word:=hi"]) as ros:
-            ros.expect_node("/talker")
+            ros.node("/talker").expect()
         ros.score(2)
         """
     found = failure(grade(check, talker__py=TALKER))
@@ -1002,15 +1004,15 @@ spinning.join()
 @pytest.mark.parametrize(
     ("expectation", "code"),
     [
-        ('ros.expect_node("/talkr", within=300)', "node-name"),
-        ('ros.expect_publisher("/chater", String, within=300)', "topic-name"),
-        ('ros.expect_subscription("/chatter", String, within=300)', "wrong-end"),
-        ('ros.expect_messages("/chater", String, within=300)', "topic-name"),
-        ('ros.publish("/words", String(), within=300)', "no-topic"),
-        ('ros.expect_service("/how_mny", Trigger, within=300)', "service-name"),
-        ('ros.call("/how_mny", Trigger, Trigger.Request(), within=300)', "service-name"),
-        ('ros.expect_parameter("/talkr", "word", "hello", within=300)', "node-name"),
-        ('ros.expect_state("/talkr", "active", within=300)', "node-name"),
+        ('ros.node("/talkr").expect(within=300)', "node-name"),
+        ('ros.topic("/chater", String).expect_publisher(within=300)', "topic-name"),
+        ('ros.topic("/chatter", String).expect_subscription(within=300)', "wrong-end"),
+        ('ros.topic("/chater", String).expect_messages(within=300)', "topic-name"),
+        ('ros.publisher("/words", String).publish(String(), within=300)', "no-topic"),
+        ('ros.service("/how_mny", Trigger).expect(within=300)', "service-name"),
+        ('ros.service("/how_mny", Trigger).call(Trigger.Request(), within=300)', "service-name"),
+        ('ros.node("/talkr").expect_parameter("word", "hello", within=300)', "node-name"),
+        ('ros.lifecycle("/talkr").expect_state("active", within=300)', "node-name"),
     ],
 )
 def test_a_decided_verdict_does_not_wait_for_its_deadline(grade: Grade, expectation: str, code: str) -> None:
@@ -1023,12 +1025,12 @@ def test_a_decided_verdict_does_not_wait_for_its_deadline(grade: Grade, expectat
 @pytest.mark.parametrize(
     ("body", "expectation"),
     [
-        ("rclpy.spin(Late())", 'ros.expect_publisher("/chatter", String, node="/late")'),
-        (SLOW_MAIN, 'ros.expect_node("/second")'),
+        ("rclpy.spin(Late())", 'ros.topic("/chatter", String).expect_publisher(node="/late")'),
+        (SLOW_MAIN, 'ros.node("/second").expect()'),
     ],
 )
 def test_what_comes_late_is_waited_for(grade: Grade, body: str, expectation: str) -> None:
-    check = f'with launch("late") as ros:\n    ros.expect_node("/late")\n    {expectation}\nros.score(2)'
+    check = f'with launch("late") as ros:\n    ros.node("/late").expect()\n    {expectation}\nros.score(2)'
     result = grade(check, late__py=LATE.replace("BODY", body))
     assert result.points == 2, result.first_failure
 
@@ -1076,14 +1078,14 @@ rclpy.spin(HeldUp())
 def test_a_program_that_is_held_up_is_silent_from_when_it_has_taken_what_was_sent(grade: Grade) -> None:
     check = """
     with launch("held_up", listen=[("/chatter", String)]) as ros:
-        heard = ros.listen("/chatter", String)
-        stop = ros.open_publisher("/stop", String)
+        heard = ros.topic("/chatter", String).listen()
+        stop = ros.publisher("/stop", String).open()
         ros.wait(lambda: stop.get_subscription_count(), 30)
-        ros.expect_node("/held_up")
+        ros.node("/held_up").expect()
         before = heard.count
         ros.wait(lambda: heard.count > before, 30)  # it sleeps now
         stop.publish(String())
-        ros.expect_silence("/chatter", String)
+        ros.topic("/chatter", String).expect_silence()
     ros.score(2)"""
     result = grade(textwrap.dedent(check), held_up__py=HELD_UP)
     assert result.points == 2, result.first_failure
@@ -1121,8 +1123,8 @@ def test_what_a_message_sets_off_is_heard_from_the_first_one_on(grade: Grade, ec
         """\
         for _ in range(4):
             with launch("echo", listen=[("/heard", String)]) as ros:
-                ros.publish("/say", String(data="once"))
-                ros.expect_messages("/heard", String, exactly=1, for_seconds=0.05)
+                ros.publisher("/say", String).publish(String(data="once"))
+                ros.topic("/heard", String).expect_messages(exactly=1, for_seconds=0.05)
         ros.score(2)
         """,
         echo__py=echo,
@@ -1159,9 +1161,9 @@ def test_a_program_that_comes_up_after_the_first_message_is_asked_before_the_nex
     result = grade(
         """\
         with launch("echo", "latecomer", listen=[("/late", String)]) as ros:
-            ros.publish("/say", String(data="to the other one"))
-            ros.publish("/again", String(data="to it"))
-            ros.expect_messages("/late", String)
+            ros.publisher("/say", String).publish(String(data="to the other one"))
+            ros.publisher("/again", String).publish(String(data="to it"))
+            ros.topic("/late", String).expect_messages()
             ros.require("asked" in ros.log("latecomer"), "It was asked whether it knows who listens", code="content")
         ros.score(2)
         """,
@@ -1180,13 +1182,13 @@ def test_one_run_of_a_program_is_killed_and_started_again_with_the_same_words(gr
 
         with launch(talker("left"), talker("right")) as ros:
             for side in ("left", "right"):
-                ros.expect_messages(f"/{side}/chatter", String, at_least=3)
-            ros.stop("left", kill=True)
+                ros.topic(f"/{side}/chatter", String).expect_messages(at_least=3)
+            ros.program("left").stop(kill=True)
             ros.require(not ros.program("left").running(), "The left one has ended")
-            ros.expect_running("right")
-            before = ros.listen("/left/chatter", String).count
-            ros.restart("left")
-            again = ros.expect_messages("/left/chatter", String, at_least=3, skip=before, publishers=2)
+            ros.program("right").expect_running()
+            before = ros.topic("/left/chatter", String).listen().count
+            ros.program("left").restart()
+            again = ros.topic("/left/chatter", String).expect_messages(at_least=3, skip=before, publishers=2)
             ros.require_equal("It has its word again", again[-1].data.split()[0], "left")
         ros.score(2)
         """,
@@ -1199,7 +1201,7 @@ def test_what_still_runs_is_not_started_again(grade: Grade) -> None:
     result = grade(
         """\
         with launch("talker") as ros:
-            ros.restart("talker")
+            ros.program("talker").restart()
         ros.score(2)
         """,
         talker__py=TALKER,
@@ -1213,9 +1215,9 @@ def test_programs_of_one_launch_in_two_domains_do_not_see_each_other(grade: Grad
         """\
         with launch(Program("talker", name="stranger", environment={"ROS_DOMAIN_ID": "0"}),
                     Program("talker", name="neighbour")) as ros:
-            ros.expect_messages("/chatter", String, at_least=10, publisher="/neighbour")
-            ros.expect_running("stranger")
-            ros.expect_no_node("/stranger")
+            ros.topic("/chatter", String).expect_messages(at_least=10, publisher="/neighbour")
+            ros.program("stranger").expect_running()
+            ros.require("/stranger" not in ros.graph.nodes(), "Its node is not seen")
         ros.score(2)
         """,
         talker__py=TALKER,
@@ -1244,7 +1246,7 @@ def test_a_check_that_leaves_a_service_out_on_purpose_gives_its_own_reason(
     result = grade(
         f"""\
         with launch("asker") as ros:
-            ros.expect_node("/asker")
+            ros.node("/asker").expect()
             ros.wait(lambda: "waits" in ros.log("asker"))
             ros.require(False, "The layers come in order", because="They did not.", code="order"{evident})
         ros.score(2)
@@ -1259,8 +1261,8 @@ def test_what_another_program_waits_for_is_no_reason_for_what_a_node_does(grade:
     result = grade(
         f"""\
         with launch("asker", "talker") as ros:
-            ros.expect_node("/asker")
-            ros.expect_node("/talker")
+            ros.node("/asker").expect()
+            ros.node("/talker").expect()
             ros.wait(lambda: "waits" in ros.log("asker"))
             ros.require(False, "The layers come in order", because="They did not.", code="order", node="{node}")
         ros.score(2)
@@ -1287,9 +1289,9 @@ def test_a_parameter_reaches_the_program_as_what_it_is(grade: Grade) -> None:
         f"""\
         given = {given!r}
         with launch("holder", parameters=given) as ros:
-            ros.expect_node("/holder")
+            ros.node("/holder").expect()
             held = {{name: list(v) if isinstance(given[name], list) else v
-                    for name, v in ros.get_parameters("/holder", list(given)).items()}}
+                    for name, v in ros.node("/holder").parameters(list(given)).items()}}
             ros.require_equal("What it holds", repr(held), repr(given))
         ros.score(2)
         """,
@@ -1322,7 +1324,7 @@ def test_a_first_call_that_is_late_makes_no_other_period_right(grade: Grade) -> 
     result = grade(
         """\
         with launch("worker", listen=[("/activity", String)]) as ros:
-            ros.expect_period("/activity", ["tick"], 0.3, runs=3, within=5)
+            ros.activity("/activity").expect_period(["tick"], 0.3, runs=3, within=5)
         ros.score(2)
         """,
         worker__py=LATE_FIRST,
@@ -1345,10 +1347,10 @@ def test_a_node_that_goes_on_after_the_expected_transitions_fails(grade: Grade) 
         up = [("unconfigured", "configuring"), ("configuring", "inactive")]
         on = [("inactive", "activating"), ("activating", "active")]
         with launch("camera", lifecycle=["/camera"]) as ros:
-            ros.transition("/camera", "configure")
-            ros.transition("/camera", "activate")
-            ros.expect_transitions("/camera", up + on)
-            ros.expect_transitions("/camera", up)
+            ros.lifecycle("/camera").transition("configure")
+            ros.lifecycle("/camera").transition("activate")
+            ros.lifecycle("/camera").expect_transitions(up + on)
+            ros.lifecycle("/camera").expect_transitions(up)
         ros.score(2)
         """,
         camera__py=CAMERA,

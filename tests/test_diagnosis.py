@@ -117,7 +117,7 @@ def test_where_a_program_runs_twice_the_node_of_one_is_not_the_misplaced_node_of
     (tmp_path / "twin.py").write_text(LATE)
     runtime.current.configure(tmp_path, Isolation.NONE, 7)
     with launch(Program("twin", namespace="/first"), Program("twin", namespace="/late"), Program("twin")) as ros:
-        ros.wait(lambda: {"/first/twin", "/twin"} <= set(ros.nodes()), 20.0)
+        ros.wait(lambda: {"/first/twin", "/twin"} <= set(ros.graph.nodes()), 20.0)
         ros.wait(lambda: all(inside.attached for inside in ros._running.scene().insides), 20.0)
         scene = ros._running.scene()
         late, astray = [autograder.diagnosis.why_no_node(scene, f"/{where}/twin") for where in ("late", "astray")]
@@ -140,7 +140,7 @@ def test_a_node_that_lies_a_namespace_too_deep_is_found_beside_another_run_of_it
     right = Program("camera", namespace="/car", arguments_of_its_own=("right",))
     left = Program("camera", namespace="/car/car", arguments_of_its_own=("left",))  # two `push_ros_namespace`
     with launch(right, left) as ros:
-        ros.wait(lambda: {"/car/right", "/car/car/left"} <= set(ros.nodes()), 30.0)
+        ros.wait(lambda: {"/car/right", "/car/car/left"} <= set(ros.graph.nodes()), 30.0)
         ros.wait(lambda: all(inside.nodes for inside in ros._running.scene().insides), 30.0)
         found = autograder.diagnosis.why_no_node(ros._running.scene(), "/car/left")
     runtime.current.close()

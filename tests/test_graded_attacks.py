@@ -22,11 +22,14 @@ PROGRAMS = {path.stem: path.read_text(encoding="utf-8") for path in sorted(FOLDE
 SET_UP = "from autograder.checks import launch\nfrom std_msgs.msg import String\n"
 CHECK = """
 with launch("p") as ros:
-    ros.expect_node("/talker")
+    ros.node("/talker").expect()
     {}
 ros.score(1)
 """
-TALKS, HAS_A_PARAMETER = 'ros.expect_messages("/talk", String, within=4)', 'ros.expect_parameter("/talker", "x", 3)'
+TALKS, HAS_A_PARAMETER = (
+    'ros.topic("/talk", String).expect_messages(within=4)',
+    'ros.node("/talker").expect_parameter("x", 3)',
+)
 
 
 SOON_STUCK = """

@@ -14,7 +14,7 @@ from autograder.course.lab import load_lab
 
 PRINTED = """\
 with launch("talker") as ros:
-    ros.expect_exit("talker", within=60)
+    ros.program("talker").expect_exit(within=60)
     ros.require("hello" in ros.program("talker").output(), "It says hello")
 ros.score(3)"""
 
@@ -35,11 +35,11 @@ def found(folder: Path, check_talker: str) -> list[str]:
     [
         (PRINTED, []),
         (  # it ends well, whatever it says
-            'with launch("talker") as ros:\n    ros.expect_exit("talker", within=60)\nros.score(3)',
+            'with launch("talker") as ros:\n    ros.program("talker").expect_exit(within=60)\nros.score(3)',
             ["error: cell `check_talker`: none of 2 solutions with one mistake each loses points in it."],
         ),
         (  # it looks at a program of the lab's own
-            'with launch("helper") as ros:\n    ros.expect_exit("helper", within=60)\nros.score(3)',
+            'with launch("helper") as ros:\n    ros.program("helper").expect_exit(within=60)\nros.score(3)',
             [
                 "error: cell `check_talker`: the notebook as students receive it gets 3 points.",
                 "error: cell `check_talker`: none of 0 solutions with one mistake each loses points in it.",

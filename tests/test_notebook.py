@@ -49,7 +49,7 @@ rclpy.init()
 rclpy.spin(Talker())
 """
 SET_UP = "%load_ext autograder\nfrom autograder.checks import launch\nfrom std_msgs.msg import String"
-CHECK = 'with launch("talker") as ros:\n    ros.expect_messages("/chatter", String, at_least=2)\nros.score(2)'
+CHECK = 'with launch("talker") as ros:\n    ros.topic("/chatter", String).expect_messages(at_least=2)\nros.score(2)'
 
 
 # The magics, in a shell of this process.
@@ -537,7 +537,7 @@ def test_an_untouched_answer_earns_nothing_and_is_no_failure(notebook: Notebook)
     blank = "%%node talker\nprint('# YOUR CODE HERE')"
     notebook.save(answer(blank, blank=blank))
     notebook.run(blank, "talker")
-    shown = notebook.run('with launch("talker") as ros:\n    ros.expect_exit("talker")\nros.score(2)').result
+    shown = notebook.run('with launch("talker") as ros:\n    ros.program("talker").expect_exit()\nros.score(2)').result
     assert shown.startswith("○ not attempted yet  0 of 2 points\n")
     assert "The cell `%%node talker` is still as you received it." in shown
 
@@ -547,7 +547,7 @@ def test_a_missing_program_is_said_at_once(notebook: Notebook) -> None:
     check = notebook.run(CHECK.replace('"talker"', '"sleeper"')).text
     assert "The cell `%%node sleeper` has not been run since the kernel started" in check
     assert "Run the cell `%%node sleeper` first" in check
-    listening = 'with launch("sleeper") as ros:\n    print(ros.listen("/chatter", String))'
+    listening = 'with launch("sleeper") as ros:\n    print(ros.topic("/chatter", String).listen())'
     assert "Run the cell `%%node sleeper` first" in notebook.run(listening).error
     unknown = notebook.run(listening.replace("sleeper", "sleper"))
     assert "no cell of the saved notebook begins with `%%node sleper`" in unknown.error
@@ -577,9 +577,9 @@ def test_an_exception_reaches_the_student_as_python_shows_it(notebook: Notebook,
 
 def test_what_a_cell_without_a_score_expected_is_shown(notebook: Notebook) -> None:
     write(notebook)
-    shown = notebook.run('with launch("talker") as ros:\n    ros.expect_publisher("/chatter", String)')
+    shown = notebook.run('with launch("talker") as ros:\n    ros.topic("/chatter", String).expect_publisher()')
     assert "✓ passed" in shown.text and "points" not in shown.text
-    shown = notebook.run('with launch("talker") as ros:\n    ros.expect_publisher("/chater", String, within=20)')
+    shown = notebook.run('with launch("talker") as ros:\n    ros.topic("/chater", String).expect_publisher(within=20)')
     assert "✗ failed" in shown.text and "/chatter" in shown.text
     assert not notebook.run("1 + 1").html
 
@@ -587,7 +587,7 @@ def test_what_a_cell_without_a_score_expected_is_shown(notebook: Notebook) -> No
 def test_a_nodes_output_streams_while_a_cell_explores(notebook: Notebook) -> None:
     write(notebook)
     shown = notebook.run(
-        'with launch("talker") as ros:\n    heard = ros.listen("/chatter", String)\n'
+        'with launch("talker") as ros:\n    heard = ros.topic("/chatter", String).listen()\n'
         "    ros.wait(lambda: heard.count >= 3)"
     )
     assert shown.text.count("talker | tick <b>\n") >= 3 and "\x1b" not in shown.text
@@ -604,8 +604,8 @@ def test_a_nodes_output_streams_while_a_cell_explores(notebook: Notebook) -> Non
 
 def test_a_cell_that_only_looks_has_no_verdict_but_for_what_failed(notebook: Notebook) -> None:
     write(notebook)
-    looks = 'with launch("talker", "talker") as ros:\n    ros.call("/nothing", Trigger, Trigger.Request(), within=1)'
-    assert "passed" not in notebook.run('with launch("talker") as ros:\n    ros.wait_for_graph(ros.nodes)').text
+    looks = 'with launch("talker", "talker") as ros:\n    ros.service("/nothing", Trigger).call(Trigger.Request(), within=1)'
+    assert "passed" not in notebook.run('with launch("talker") as ros:\n    ros.graph.wait(ros.graph.nodes)').text
     shown = notebook.run(f"from std_srvs.srv import Trigger\n{looks}")
     assert "✗ failed" in shown.text
     # Two programs of one name are two folds that can be told apart.
@@ -614,12 +614,12 @@ def test_a_cell_that_only_looks_has_no_verdict_but_for_what_failed(notebook: Not
 
 def test_what_cannot_be_started_or_drawn_is_a_sentence_and_what_runs_goes_on(notebook: Notebook) -> None:
     write(notebook)
-    notebook.run('robot = launch("talker").start()\nrobot.wait(lambda: robot.publishers("/chatter"), within=150)')
+    notebook.run('robot = launch("talker").start()\nrobot.wait(lambda: robot.graph.publishers("/chatter"), within=150)')
     for typo, sentence in (
         ('launch("taker").start()', "There is no `taker`"),
-        ("robot.qos()", 'qos: it is about one topic, such as ros.qos("/chatter"). Topics here: "/chatter".'),
-        ("robot.arrivals()", 'Topics here: "/chatter".'),
-        ('robot.lifecycle("/talker")', "`/talker` is no lifecycle node"),
+        ("robot.draw.qos()", 'qos: it is about one topic, such as ros.draw.qos("/chatter"). Topics here: "/chatter".'),
+        ("robot.draw.arrivals()", 'Topics here: "/chatter".'),
+        ('robot.draw.lifecycle("/talker")', "`/talker` is no lifecycle node"),
     ):
         shown = notebook.run(typo)
         assert sentence in shown.error and "autograder/checks" not in shown.error
@@ -647,7 +647,7 @@ finally:
     write(notebook, f"%%node talker\n{body}")
     shown = notebook.run(
         "from test_msgs.action import Fibonacci\n"
-        'with launch("talker") as ros:\n    goal = ros.send_goal("/fibonacci", Fibonacci, Fibonacci.Goal())\n'
+        'with launch("talker") as ros:\n    goal = ros.action("/fibonacci", Fibonacci).send_goal(Fibonacci.Goal())\n'
         "    goal.wait_for_result()\n"
         "    print(ros.log())"
     )
@@ -774,7 +774,7 @@ def test_what_a_subshell_answers_leaves_the_interrupts_of_the_cell_alone(noteboo
     """JupyterLab sends what widgets say over subshells, each a thread of the kernel, while a cell runs."""
     write(notebook)
     subshell = notebook.open_subshell()
-    cell = 'with launch("talker") as ros:\n    ros.expect_node("/talker")\n    ros.wait(lambda: False, within=60)'
+    cell = 'with launch("talker") as ros:\n    ros.node("/talker").expect()\n    ros.wait(lambda: False, within=60)'
     with ThreadPoolExecutor() as pool:
         ran = pool.submit(notebook.run, cell)
         notebook.ask(subshell)

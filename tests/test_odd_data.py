@@ -18,7 +18,7 @@ from std_msgs.msg import Int64, String
 from test_checks import Grade, grade  # noqa: F401  a fixture
 
 from autograder.checks import outcomes
-from autograder.checks.expect.meanwhile import MeanwhileExpectations
+from autograder.checks.launch import Launch
 from autograder.core.results import CheckResult, Status
 from autograder.course.lab import Cell, load_lab
 from autograder.grading import worker
@@ -69,13 +69,13 @@ from rclpy.time import Time
 from std_msgs.msg import Header
 with launch("clock") as ros:
     with ros.part("it is there"):
-        ros.expect_node("/clock")
+        ros.node("/clock").expect()
     with ros.part("the stamp"):
-        heard = ros.expect_messages("/stamps", Header)
+        heard = ros.topic("/stamps", Header).expect_messages()
         Time.from_msg(heard[-1].stamp)
         {more}
     with ros.part("it stays"):
-        ros.expect_node("/clock")
+        ros.node("/clock").expect()
 ros.score({{"it is there": 0.5, "the stamp": 1, "it stays": 0.5}})
 """
 CLOCK = """
@@ -136,8 +136,8 @@ HEARS = """
 from MODULE.msg import TYPE
 from std_msgs.msg import Float64
 with launch("sender") as ros:
-    ros.listen("/own", Float64)
-    ros.expect_messages("/sent", TYPE)
+    ros.topic("/own", Float64).listen()
+    ros.topic("/sent", TYPE).expect_messages()
     {more}
 ros.score(2)
 """
@@ -166,7 +166,7 @@ def test_what_is_allowed_in_a_message_is_no_reason_for_a_check_that_breaks(grade
 
 def test_what_the_check_itself_sends_is_no_reason_for_its_breaking(grade: Grade) -> None:  # noqa: F811
     subscribes = "node.create_subscription(Float64, 'own', print, 10)"
-    more = "ros.publish('/own', Float64(data=float('nan'))); ros.expect_messages('/own', Float64); [][0]"
+    more = "ros.publisher('/own', Float64).publish(Float64(data=float('nan'))); ros.topic('/own', Float64).expect_messages(); [][0]"
     result = sent(grade, "std_msgs/Float64", subscribes, more)
     assert result.points is None and len(result.flags) == 1, result
 
@@ -217,8 +217,8 @@ class Counted(float):
 
 def test_each_message_is_looked_at_once_and_a_long_text_is_cut_before_it_is_kept(grade: Grade) -> None:  # noqa: F811
     more = """looked_at = []
-    ros.expect_messages("/sent", TYPE, at_least=40, where=lambda m: looked_at.append(m) or True)
-    ros.require(len(looked_at) <= ros.listen("/sent", TYPE).count, "Each message is looked at once")
+    ros.topic("/sent", TYPE).expect_messages(at_least=40, where=lambda m: looked_at.append(m) or True)
+    ros.require(len(looked_at) <= ros.topic("/sent", TYPE).listen().count, "Each message is looked at once")
     ros.require(False, "It is long", because="x" * 1_000_000)"""
     result = sent(grade, "std_msgs/String", "", more.replace("TYPE", "String"))
     assert [outcome.title for outcome in result.outcomes if outcome.status is Status.FAILED] == ["It is long"]
@@ -228,14 +228,14 @@ def test_each_message_is_looked_at_once_and_a_long_text_is_cut_before_it_is_kept
 def test_messages_during_runs_are_looked_up_and_not_counted_one_by_one() -> None:
     observer = Observer(91)
     try:
-        running = MeanwhileExpectations()
-        running._running.observer = observer
+        ros = Launch([], [], [], [])
+        ros._running.observer = observer
         ticks, runs = observer.record("/ticks", Int64), observer.record("/activity", String)
         for number in range(4000):
             stamp, word = Counted(0.001 * number), ("begin", "end")[number % 2]
             ticks._messages.append(Received(Int64(), stamp, stamp, number + 1))
             runs._messages.append(Received(String(data=f"slow {word}"), stamp, stamp + 0.0005, number + 1))
-        found = running.messages_during("/ticks", Int64, callback="slow", activity="/activity")
+        found = ros.activity("/activity").messages_during("slow", ros.topic("/ticks", Int64))
     finally:
         observer.close()
     assert found == [1] * 2000

@@ -236,7 +236,8 @@ def test_outside_of_a_course_nbgrader_executes_nothing(environment: Environment,
 @pytest.mark.parametrize(
     ("cell", "old", "new", "said"),
     [
-        ("check_greeter", "ros.expect_node", "ros.expect_nod", "there is no `expect_nod`; `expect_node` may be meant"),
+        ("check_greeter", ").expect()", ").expct()", "there is no `expct`; `expect` may be meant"),
+        ("check_greeter", "ros.node", "ros.nod", "there is no `nod`; `node` may be meant"),
         ("check_greeter", "at_least=3", "at_last=3", "`expect_messages` has no argument `at_last`; `at_least` may be"),
         ("check_greeter", "String, at_least=3", "Strnig, at_least=3", "nothing is called `Strnig`"),
         ("check_greeter", '{"the text": 2,', '{"the text": 3,', "its score gives 4 points, and its metadata 3"),

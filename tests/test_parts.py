@@ -17,12 +17,12 @@ from autograder.course.cells import MORE_AT_GRADING, without_hidden_tests
 PARTS = """\
 with launch("talker") as ros:
     with ros.part("the name"):
-        ros.expect_node("/talker", hint="")
+        ros.node("/talker").expect(hint="")
     with ros.part("the words"):
-        ros.expect_messages("/chatter", String, where=lambda m: m.data.startswith("{word}"), within={within})
-        ros.expect_publisher("/chatter", String)
+        ros.topic("/chatter", String).expect_messages(where=lambda m: m.data.startswith("{word}"), within={within})
+        ros.topic("/chatter", String).expect_publisher()
     with ros.part("the service"):
-        ros.expect_service("/how_many", Trigger)
+        ros.service("/how_many", Trigger).expect()
 ros.score({{"the name": 0.5, "the words": 1, "the service": 0.5}})
 """
 Grade = Callable[..., CheckResult]
@@ -53,12 +53,12 @@ def test_a_program_that_ends_takes_every_part_of_its_launch_and_none_of_another(
     check = """\
         with launch("talker") as ros:
             with ros.part("first"):
-                ros.expect_node("/talker")
+                ros.node("/talker").expect()
         with launch("broken") as ros:
             with ros.part("second"):
-                ros.expect_node("/broken")
+                ros.node("/broken").expect()
             with ros.part("third"):
-                ros.expect_node("/broken")
+                ros.node("/broken").expect()
         ros.score({"first": 1, "second": 0.5, "third": 0.5})
         """
     result = grade(check, talker__py=TALKER, broken__py="raise ValueError(1)\n")
@@ -114,14 +114,14 @@ def test_what_was_found_out_before_the_check_sent_what_ended_the_program_stands(
     check = """\
         with launch("fragile") as ros:
             with ros.part("talks"):
-                ros.expect_messages("/talk", String, at_least=3)
-                ros.publish("/hear", String(data="good"))
+                ros.topic("/talk", String).expect_messages(at_least=3)
+                ros.publisher("/hear", String).publish(String(data="good"))
             with ros.part("hears"):
-                ros.publish("/hear", String(data="bad"))
-                heard = ros.listen("/talk", String).count
-                ros.expect_messages("/talk", String, at_least=heard + 10)
+                ros.publisher("/hear", String).publish(String(data="bad"))
+                heard = ros.topic("/talk", String).listen().count
+                ros.topic("/talk", String).expect_messages(at_least=heard + 10)
             with ros.part("talks on"):
-                ros.expect_messages("/talk", String, at_least=heard + 12)
+                ros.topic("/talk", String).expect_messages(at_least=heard + 12)
         ros.score({"talks": 1, "hears": 0.5, "talks on": 0.5})
         """
     result = grade(check, fragile__py=program)
@@ -134,10 +134,10 @@ def test_what_fails_outside_the_parts_takes_those_of_its_launch(grade: Grade) ->
     check = """\
         with launch("talker") as ros:
             with ros.part("before"):
-                ros.expect_node("/talker")
+                ros.node("/talker").expect()
             ros.require(False, "It holds for all", because="It does not.")
             with ros.part("after"):
-                ros.expect_node("/talker")
+                ros.node("/talker").expect()
         ros.score({"before": 1, "after": 1})
         """
     assert earned(grade(check, talker__py=TALKER)) == {"before": 0.0, "after": 0.0}
@@ -159,11 +159,11 @@ def released(check: str) -> str:
 HIDDEN = """\
 with launch("talker") as ros:
     with ros.part("the name"):
-        ros.expect_node("/talker")
+        ros.node("/talker").expect()
     with ros.part("the words"):
-        ros.expect_publisher("/chatter", String)
+        ros.topic("/chatter", String).expect_publisher()
         ### BEGIN HIDDEN TESTS
-        ros.expect_messages("/chatter", String, at_least=2)
+        ros.topic("/chatter", String).expect_messages(at_least=2)
         ### END HIDDEN TESTS
 ros.score({"the name": 1, "the words": 1})
 """
@@ -332,10 +332,10 @@ with launch("talker") as ros:
     with ros.part("first"):
         inner({first})
     with ros.part("second"):
-        ros.expect_node("/talker")
+        ros.node("/talker").expect()
     must(ros, {second})
     with ros.part("third"):
-        ros.expect_node("/talker")
+        ros.node("/talker").expect()
 ros.score({{"first": 0.5, "second": 0.5, "third": 1}})
 """
 

@@ -186,20 +186,20 @@ def programs(tmp_path: Path) -> Iterator[Path]:
 
 def test_a_launch_draws_what_its_programs_did(programs: Path) -> None:
     with launch("robot") as ros:
-        ros.expect_publisher("/activity", String, node="/robot")
+        ros.topic("/activity", String).expect_publisher(node="/robot")
         assert ros.wait(lambda: ros.runs().count("camera") >= 2 and ros.runs().count("beat") >= 2, 60)
-        on_graph = ros.graph()
+        on_graph = ros.draw.graph()
     runs = ros.runs()
     assert runs.overlap() == 1 and runs.threads() == {1} and runs.longest("camera") > 0.1
     assert {run.group for run in runs} == {"default group (exclusive)"} and {run.node for run in runs} == {"/robot"}
     assert "/robot publishes on /activity (reliable)." in on_graph.alt
-    assert "camera ran" in ros.timeline().alt and "/robot publishes" in ros.arrivals("/activity").alt
+    assert "camera ran" in ros.draw.timeline().alt and "/robot publishes" in ros.draw.arrivals("/activity").alt
 
 
 def test_a_failed_check_shows_the_picture_that_explains_it(programs: Path) -> None:
     with launch("robot") as ros:
         assert ros.wait(lambda: ros.runs().count("camera") >= 2 and ros.runs().count("beat") >= 2, 60)
-        ros.expect_overlap("/activity", ["beat", "camera"])
+        ros.activity("/activity").expect_overlap(["beat", "camera"])
     shown = ros.score(1).result
     failure = shown.first_failure
     assert failure and failure.code == "single-threaded-executor" and failure.picture

@@ -18,7 +18,7 @@ import check_api  # noqa: E402  (these make pages of the book)
 import reason_codes  # noqa: E402
 import reference  # noqa: E402
 
-from autograder.checks.launch import Launch  # noqa: E402
+from autograder.checks.nouns import NOUNS  # noqa: E402
 from autograder.course.book import read_book  # noqa: E402
 from autograder.reasons import KINDS, Group, Kind, all_kinds, kind_of_lab  # noqa: E402
 
@@ -84,8 +84,8 @@ def test_every_folder_of_the_package_stands_among_the_layers() -> None:
 
 def test_everything_that_ros_offers_is_documented() -> None:
     page = check_api.check_api()
-    offered = [name for name, _ in check_api.offered(Launch)]
-    assert {"expect_node", "expect_messages", "part", "score"} <= set(offered)
+    offered = [f"{noun}.{name}" for noun, class_ in NOUNS.items() for name, _ in check_api.offered(class_)]
+    assert {"node.expect", "topic.expect_messages", "ros.part", "ros.score", "ros.graph"} <= set(offered)
     assert [name for name in offered if f"\n### {name}\n" not in page] == []
 
 

@@ -367,11 +367,11 @@ def test_a_robot_goes_on_from_cell_to_cell(notebook: Notebook) -> None:
     # The second sentence is the notebook's own.
     assert shown == "Unknown topic '/chater'\n(there is no /chater; the nearest name is /chatter)\n1\n"
     assert "running: talker" in notebook.run("robot").text
-    assert "✓ passed" in notebook.run('robot.expect_node("/talker")').text
-    shown = notebook.run('robot.expect_node("/nope", within=0)')
+    assert "✓ passed" in notebook.run('robot.node("/talker").expect()').text
+    shown = notebook.run('robot.node("/nope").expect(within=0)')
     assert "✗ failed" in shown.text and "Traceback" not in shown.error
     # A check has programs and a domain of its own, and the robot goes on.
-    inside = notebook.run('with launch("talker", name="other") as ros:\n    ros.wait_for_graph(lambda: ros.nodes())\n'
+    inside = notebook.run('with launch("talker", name="other") as ros:\n    ros.graph.wait(lambda: ros.graph.nodes())\n'
                           "    %ros2 node list")  # fmt: skip
     assert "/other\n" in inside.text  # on a busy machine with what the talker has printed before it
     assert notebook.run("%ros2 node list").text == "/talker\n"

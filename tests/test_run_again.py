@@ -41,8 +41,8 @@ rclpy.spin(node)
 """Needs 0.3 s of a CPU once somebody listens: 5 s of its time where sixteen others want it, and a check waits for 3."""
 CHECK = """
 with launch("p") as ros:
-    ros.expect_node("/talker", within=60)
-    ros.expect_messages("/talk", String, within=1)
+    ros.node("/talker").expect(within=60)
+    ros.topic("/talk", String).expect_messages(within=1)
 ros.score(1)
 """
 GRADE = """

@@ -155,7 +155,9 @@ def test_a_lab_that_would_tell_its_solution_is_not_given_out(course: Path, tmp_p
     root = shutil.copytree(course, tmp_path / "course")
     told = [{**cell, "source": re.sub(r"###.*\n", "", str(cell["source"]))} for cell in toy.CELLS]
     (root / "labs" / "toy" / "notes.json").write_text(json.dumps(toy.notebook(told)), encoding="utf-8")
-    (root / "labs" / "toy" / "hints.md").write_text('ros.expect_exit("talker", status=secret, hint="Mind the status.")')
+    (root / "labs" / "toy" / "hints.md").write_text(
+        'ros.program("talker").expect_exit(status=secret, hint="Mind the status.")'
+    )
     with pytest.raises(KitError, match=r"hints\.md: a hidden test of toy") as refused:
         write_kit(root, None, tmp_path / "out")
     assert "Nothing was written" in refused.value.do

@@ -41,10 +41,10 @@ CELLS = [
     cell(
         "code",
         """with launch("talker") as ros:
-    ros.expect_exit("talker", within=60)
+    ros.program("talker").expect_exit(within=60)
     ### BEGIN HIDDEN TESTS
     secret = 0
-    ros.expect_exit("talker", status=secret, hint="Mind the status.")
+    ros.program("talker").expect_exit(status=secret, hint="Mind the status.")
     ### END HIDDEN TESTS
 ros.score(3)""",
         6,

@@ -21,7 +21,7 @@ class Misuse(Exception):
 
 
 def place_of(error: BaseException, is_cells: Callable[[str], bool]) -> str:
-    """Where in the check cell an error arose, as `line 3: ros.expect_node("/talker")`; empty if it was not there.
+    """Where in the check cell an error arose, as `line 3: ros.node("/talker").expect()`; empty if it was not there.
 
     Args:
         error: that was raised.

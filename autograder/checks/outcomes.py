@@ -253,7 +253,7 @@ def _part_around(lines: Sequence[str], number: int) -> str:
     return ""
 
 
-_EXPECTS = re.compile(r"expect_|require(_equal)?$")
+_EXPECTS = re.compile(r"expect(_|$)|require(_equal)?$")
 _PART = re.compile(r"""\.part\(\s*("[^"]*"|'[^']*')""")
 
 
@@ -297,7 +297,7 @@ def _rest_not_checked(whole: bool = False, standing: Collection[str] = ()) -> No
     hidden = hidden_lines(_lines(frame))
     for node, part in _expectations(block, findings.current.part):
         if (whole and part not in standing) or (not whole and node.lineno > frame.f_lineno):
-            text = " ".join(ast.unparse(node).split(".", 1)[-1].split())
+            text = " ".join(ast.unparse(node).removeprefix("ros.").split())
             findings.current.outcomes.append(
                 Outcome(
                     status=Status.NOT_CHECKED,

@@ -2,9 +2,9 @@
 
     with launch("talker") as ros:
         with ros.part("the name"):
-            ros.expect_node("/talker")
+            ros.node("/talker").expect()
         with ros.part("the numbers"):
-            ros.expect_messages("/numbers", Int64, at_least=5)
+            ros.topic("/numbers", Int64).expect_messages(at_least=5)
     ros.score({"the name": 1, "the numbers": 2})
 
 What fails inside a part ends that part only. What fails outside takes every part of its launch.

@@ -4,15 +4,23 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any
 
-from autograder.checks import runtime
+from autograder.checks import runtime, seen
+from autograder.checks.concurrency import Concurrency
 from autograder.checks.program import Program
 from autograder.checks.settling import Settling
+from autograder.core.front_end import Watcher
 from autograder.core.results import NodeLog
 from autograder.diagnosis import Scene
+from autograder.graph.lifecycle import LifecycleClient
 from autograder.graph.observer import Observer
+from autograder.graph.services import OfferedService
 from autograder.reasons import Reason
 from autograder.sandbox.running_program import RunningProgram
+
+if TYPE_CHECKING:
+    from autograder.graph.actions import ActionSeen  # loads numpy, which most labs do not need
 
 SETTLE = 2.0
 """Seconds that a new program may take to show that it lives."""
@@ -45,6 +53,26 @@ class Running:
         """Programs that the check itself has stopped."""
         self.may_end: list[RunningProgram] = []
         """Programs that the check itself has stopped, or that are asked to end by themselves."""
+        self.watcher: Watcher | None = None
+        """Shows in a notebook what is waited for."""
+        self.introduced = (0, 0)
+        """How many recordings and programs there were when all programs had made their nodes, and these were asked."""
+        self.met: dict[str, int] = {}
+        """Nodes that have answered, or had their time to, and how many recordings there were when they were asked."""
+        self.overlaps: list[tuple[str, str]] = []
+        """Topic and title of each expectation of overlapping callbacks that was met."""
+        self.concurrencies: dict[str, Concurrency] = {}
+        """What was made last of the messages on each topic of begins and ends."""
+        self.lifecycle_clients: dict[str, LifecycleClient] = {}
+        self.actions: dict[str, ActionSeen] = {}
+        self.offered: dict[str, OfferedService] = {}
+        """Services that the check offers, by their names."""
+        self.publishers: dict[tuple[str, str], Any] = {}
+        """The check's own publishers, by topic and QoS profile."""
+        self.known_publishers: list[Any] = []
+        """Those of them that have been used: what subscribed by then knows them."""
+        self.graph: seen.Graph | None = None
+        """The graph as it was when the launch ended."""
         self._ended: float | None = None
 
     def scene(self) -> Scene:
@@ -95,6 +123,12 @@ class Running:
         failed = [program for program in ended if program.exit_status() != 0]
         last = ended if len(ended) == len(self.programs) else []
         return next(iter(failed + last), None)
+
+    def lifecycle_client(self, node: str) -> LifecycleClient:
+        """Who asks this lifecycle node, and has recorded its changes since the first call of this."""
+        if node not in self.lifecycle_clients:
+            self.lifecycle_clients[node] = LifecycleClient(self.observer, node)
+        return self.lifecycle_clients[node]
 
     def settle_programs(self) -> None:
         """Give a new program a moment to show what becomes of it, before something is held against it."""

@@ -11,7 +11,7 @@ import re
 import textwrap
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from functools import cache
+from functools import cache, cached_property
 from typing import Any
 
 from reason_codes import ROOT, label
@@ -125,10 +125,10 @@ def _undented(text: str) -> str:
     return first + newline + textwrap.indent(textwrap.dedent(rest), indent)
 
 
-def _entry(name: str, thing: Any, of: str = "") -> list[str]:
+def _entry(name: str, thing: Any, of: str = "", call: bool = True) -> list[str]:
     said = documented(thing)
-    heading = name if of in ("", "ros") else f"{of}.{name}"
-    lines = [f"### {heading}", "", "```python", signature_of(f"{of}.{name}" if of else name, thing), "```", ""]
+    heading = f"{of}.{name}" if of else name
+    lines = [f"### {heading}", "", "```python", signature_of(heading, thing) if call else heading, "```", ""]
     lines += [said.text, ""]
     lines += [f"- `{argument}`: {meaning}" for argument, meaning in said.args] + [""]
     for title in ("Returns", "Raises"):
@@ -143,6 +143,10 @@ def _entry(name: str, thing: Any, of: str = "") -> list[str]:
     return lines
 
 
+def _member(noun: type, name: str, called: str) -> list[str]:
+    return _entry(name, _function(noun, name), of=called, call=callable(getattr(noun, name)))
+
+
 def _linked(word: re.Match[str]) -> str:
     """A code in a docstring as a link to what it stands for; another word as it is."""
     return f"[{word[0]}](#{label(word[1])})" if word[1] in all_kinds() else word[0]
@@ -154,7 +158,7 @@ def check_api() -> str:
     from autograder.checks.answers import Answers
     from autograder.checks.building import Package
     from autograder.checks.forms import seal
-    from autograder.checks.launch import Launch
+    from autograder.checks.nouns import NOUNS
 
     lines = ["## What a check cell imports", ""]
     for name in checks.__all__:
@@ -167,54 +171,58 @@ def check_api() -> str:
             lines.append("")
         elif callable(thing):
             lines += _entry(name, thing)
-    owner = None
-    for name, group in offered(Launch):
-        if group is not owner:
-            lines += [f"## {_title(group)}", ""]
-            owner = group
-        lines += _entry(name, inspect.unwrap(getattr(Launch, name)), of="ros")
+    for called, noun in NOUNS.items():
+        lines += [f"## {called}", "", inspect.getdoc(noun) or "", ""]
+        for name, _ in offered(noun):
+            lines += _member(noun, name, called)
     lines += ["## A table of answers", "", "`answers` gives a table, which a check looks at in a block of its own.", ""]
     for name, _ in offered(Answers):
-        lines += _entry(name, getattr(Answers, name), of="table")
+        lines += _member(Answers, name, "table")
     lines += ["## A package", "", "`build` gives a package, which a check looks at in a block of its own.", ""]
     for name, _ in offered(Package):
-        lines += _entry(name, getattr(Package, name), of="package")
+        lines += _member(Package, name, "package")
     lines += [*_entry("seal", seal, of="forms"), "## What these calls give", ""]
-    for thing in _given_back(Launch):
+    for thing in _given_back():
         lines += [f"### {thing.__name__}", "", documented(thing).text, ""]
         lines += [f"- `{field}`: {meaning}" for field, meaning in _fields(thing)]
         for name, _ in offered(thing):
-            call = signature_of(name, getattr(thing, name))
-            lines.append(f"- `{' '.join(call.split())}`: {documented(getattr(thing, name)).text.splitlines()[0]}")
+            call = signature_of(name, _function(thing, name)) if callable(getattr(thing, name)) else name
+            lines.append(f"- `{' '.join(call.split())}`: {documented(_function(thing, name)).text.splitlines()[0]}")
         lines.append("")
     return "\n".join(lines)
 
 
-def _given_back(launch: type) -> list[type]:
-    """The kit's own classes that the methods of a launch return, in order."""
+def _given_back() -> list[type]:
+    """The kit's own classes, other than nouns, that the methods of the nouns return, in order."""
+    from autograder.checks.nouns import NOUNS
+
     found: list[type] = []
-    for name, _ in offered(launch):
-        method = inspect.unwrap(getattr(launch, name))
-        words = re.findall(r"\w+", str(inspect.signature(method).return_annotation))
-        things = [method.__globals__.get(word) for word in words]
-        found += [thing for thing in things if inspect.isclass(thing) and thing.__module__.startswith("autograder.")]
-    return [thing for thing in dict.fromkeys(found) if offered(thing) or _fields(thing)]
+    for noun in NOUNS.values():
+        for name, _ in offered(noun):
+            method = _function(noun, name)
+            words = re.findall(r"\w+", str(inspect.signature(method).return_annotation))
+            things = [method.__globals__.get(word) for word in words]
+            found += [it for it in things if inspect.isclass(it) and it.__module__.startswith("autograder.")]
+    others = [thing for thing in dict.fromkeys(found) if thing not in NOUNS.values()]
+    return [thing for thing in others if offered(thing) or _fields(thing)]
 
 
-def offered(launch: type) -> list[tuple[str, type]]:
-    """The public methods of a launch, each with the class that defines it first."""
+def offered(noun: type) -> list[tuple[str, type]]:
+    """The public methods and properties of a noun, each with the class that defines it first."""
     found: dict[str, type] = {}
-    for owner in launch.__mro__:
+    for owner in noun.__mro__:
         if not owner.__module__.startswith("autograder."):
             continue  # what Python or pydantic give is theirs to explain
         for name, thing in vars(owner).items():
-            # What a launch does to say what it waits for is put around the methods of other classes.
-            mine = inspect.isfunction(thing) and inspect.unwrap(thing).__qualname__.startswith(f"{owner.__name__}.")
-            if mine and not name.startswith("_"):
+            is_mine = inspect.isfunction(thing) or isinstance(thing, (property, cached_property))
+            if is_mine and not name.startswith("_"):
                 found.setdefault(name, owner)
     return list(found.items())
 
 
-def _title(owner: type) -> str:
-    text = (inspect.getdoc(owner) or owner.__name__).split("\n")[0]
-    return re.split(r"[:.] |[:.]$", text)[0].replace("`", "")
+def _function(noun: type, name: str) -> Any:
+    """The function behind a method or property of a noun."""
+    thing = inspect.getattr_static(noun, name)
+    if isinstance(thing, property):
+        return thing.fget
+    return inspect.unwrap(thing.func if isinstance(thing, cached_property) else thing)

@@ -9,7 +9,7 @@ import inspect
 import json
 import re
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,6 +18,7 @@ from autograder.authoring import requirements
 from autograder.checks.answers import Answers
 from autograder.checks.building import Package
 from autograder.checks.launch import Launch
+from autograder.checks.nouns import noun_given
 from autograder.core.errors import KitError
 from autograder.course.book import read_book
 from autograder.course.cells import MARK, BadNameError, grade_id_of, nbgrader_of, parse, source_of
@@ -134,11 +135,11 @@ def _markers(source: str) -> Iterator[str]:
 
 _BLOCKS = {"launch": Launch, "launch_file": Launch, "answers": Answers, "build": Package}
 """What `with launch(…) as ros` gives, by the function."""
-_FULL_NAMES = {"topic", "node", "publisher", "service"}
-"""Arguments of expectations and the like that are full names."""
-_NAMES = {"expect_node", "expect_no_node", "expect_service", "call", "call_many", "send_goal", "serve", "requests"}
+_FULL_NAMES = {"topic", "node", "publisher", "nodes"}
+"""Arguments of nouns and expectations that are full names."""
+_NAMES = {"topic", "publisher", "node", "service", "server", "action"}
 """What takes a full name as `name`."""
-_NO_FULL_NAMES = {"start", "expect_log"}
+_NO_FULL_NAMES = {"start"}
 """What takes something else as `node`."""
 _WORDS = {
     ("expect_state", "state"): ("unconfigured", "inactive", "active", "finalized"),
@@ -197,22 +198,20 @@ def _unknown_names(tree: ast.AST, known: set[str]) -> Iterator[str]:
 
 
 def _unknown_expectations(tree: ast.AST) -> Iterator[str]:
-    """Methods and keywords that `ros`, `table` or `package` does not have."""
-    names: dict[str, type] = {}
+    """Methods and keywords that `ros` and its nouns, `table` or `package` do not have."""
+    names = _nouns_of(tree)
     for node in ast.walk(tree):
-        if isinstance(node, ast.withitem) and isinstance(node.optional_vars, ast.Name):
-            call = node.context_expr
-            if isinstance(call, ast.Call) and isinstance(call.func, ast.Name) and call.func.id in _BLOCKS:
-                names[node.optional_vars.id] = _BLOCKS[call.func.id]
+        if not isinstance(node, ast.Attribute):
+            continue
+        owner = _noun_of(node.value, names)
+        offered = {one for one in dir(owner) if not one.startswith("_")} if owner is not None else set()
+        if owner is not None and node.attr not in offered and not _is_field(owner, node.attr):
+            yield f"line {node.lineno}: there is no `{node.attr}`{_nearest(node.attr, offered)}."
     for node in ast.walk(tree):
         if not isinstance(node, ast.Call) or not isinstance(node.func, ast.Attribute):
             continue
-        owner = names.get(node.func.value.id) if isinstance(node.func.value, ast.Name) else None
-        if owner is None:
-            continue
-        name, offered = node.func.attr, {one for one in dir(owner) if not one.startswith("_")}
-        if name not in offered:
-            yield f"line {node.lineno}: there is no `{name}`{_nearest(name, offered)}."
+        owner, name = _noun_of(node.func.value, names), node.func.attr
+        if owner is None or not inspect.isroutine(getattr(owner, name, None)):
             continue
         parameters = inspect.signature(getattr(owner, name)).parameters
         yield from _wrong_words(node, name, parameters)
@@ -222,6 +221,38 @@ def _unknown_expectations(tree: ast.AST) -> Iterator[str]:
             if keyword.arg is not None and keyword.arg not in parameters:
                 near = _nearest(keyword.arg, set(parameters))
                 yield f"line {keyword.value.lineno}: `{name}` has no argument `{keyword.arg}`{near}."
+
+
+def _nouns_of(tree: ast.AST) -> dict[str, type]:
+    """The names of a cell that stand for a noun: `ros` of a block, and what was assigned from one."""
+    names: dict[str, type] = {}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.withitem) and isinstance(node.optional_vars, ast.Name):
+            call = node.context_expr
+            if isinstance(call, ast.Call) and isinstance(call.func, ast.Name) and call.func.id in _BLOCKS:
+                names[node.optional_vars.id] = _BLOCKS[call.func.id]
+    bound: dict[str, set[type | None]] = {}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Assign):
+            for target in node.targets:
+                if isinstance(target, ast.Name):
+                    bound.setdefault(target.id, set()).add(_noun_of(node.value, names))
+    return names | {name: one for name, found in bound.items() if len(found) == 1 and (one := next(iter(found)))}
+
+
+def _noun_of(value: ast.expr, names: Mapping[str, type]) -> type | None:
+    """The noun that an expression gives, as far as it can be told without running it."""
+    if isinstance(value, ast.Name):
+        return names.get(value.id)
+    if isinstance(value, ast.Call):
+        value = value.func
+    owner = _noun_of(value.value, names) if isinstance(value, ast.Attribute) else None
+    return noun_given(owner, value.attr) if owner is not None and isinstance(value, ast.Attribute) else None
+
+
+def _is_field(owner: type, name: str) -> bool:
+    """Whether the objects of a class get this attribute when they are made."""
+    return any(name in getattr(one, "__annotations__", {}) for one in owner.__mro__) or name == "name"
 
 
 def _wrong_words(call: ast.Call, name: str, parameters: Iterable[str]) -> Iterator[str]:

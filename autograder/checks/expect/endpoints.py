@@ -9,8 +9,7 @@ from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from autograder import diagnosis
 from autograder.checks import outcomes
-from autograder.checks.expect.expectations import WITHIN
-from autograder.checks.expect.graph import GONE_WITHIN, GraphExpectations
+from autograder.checks.expect.meeting import Meeting
 from autograder.graph.names import node_of, type_name
 from autograder.reasons import Group, Kind
 
@@ -29,7 +28,7 @@ End = Literal["publisher", "subscription"]
 _PRESENT: dict[End, Kind] = {"publisher": PUBLISHER_PRESENT, "subscription": SUBSCRIPTION_PRESENT}
 
 
-class EndExpectations(GraphExpectations):
+class Ends(Meeting):
     """What ends a topic must have, and what not."""
 
     def _ends(self, topic: str, msg_type: type | None, kind: End, node: str) -> list[TopicEndpointInfo]:
@@ -50,7 +49,7 @@ class EndExpectations(GraphExpectations):
         def number() -> int:
             return len(self._ends(topic, msg_type, kind, node))
 
-        found = self.wait_for_graph(lambda: number() >= count, within)
+        found = self._wait_for_graph(lambda: number() >= count, within)
         # A node that listens in two places of its own does what was asked; two publishers may be two senders.
         if found and (kind == "subscription" or number() == count):
             outcomes.passed(title, observed=topic)
@@ -70,49 +69,6 @@ class EndExpectations(GraphExpectations):
             hint=hint,
         )
 
-    def expect_publisher(
-        self, topic: str, msg_type: type, *, node: str = "", count: int = 1, within: float = WITHIN, hint: str = ""
-    ) -> None:
-        """The topic has exactly `count` publishers of this type, of the node `node` if one is given.
-
-        Args:
-            topic: full name.
-            msg_type: message class.
-            node: full name of the node whose they are; by default of any.
-            count: how many publishers.
-            within: seconds until they must be there.
-            hint: a pointer for the student.
-
-        Example:
-            `ros.expect_publisher("/chatter", String, node="/talker")`
-
-        Codes:
-            `no-topic`, `topic-name`, `wrong-type`, `wrong-node`, `wrong-end`, `absolute-name`, `count`,
-            `extra-publisher`.
-        """
-        self._expect_end(topic, msg_type, "publisher", node, count, within, hint)
-
-    def expect_subscription(
-        self, topic: str, msg_type: type, *, node: str = "", at_least: int = 1, within: float = WITHIN, hint: str = ""
-    ) -> None:
-        """The topic has subscriptions of this type, of the node `node` if one is given.
-
-        Args:
-            topic: full name.
-            msg_type: message class.
-            node: full name of the node whose they are; by default of any.
-            at_least: so many subscriptions.
-            within: seconds until they must be there.
-            hint: a pointer for the student.
-
-        Example:
-            `ros.expect_subscription("/chatter", String, node="/listener")`
-
-        Codes:
-            `no-topic`, `topic-name`, `wrong-type`, `wrong-node`, `wrong-end`, `absolute-name`, `count`.
-        """
-        self._expect_end(topic, msg_type, "subscription", node, at_least, within, hint)
-
     def _owners(self, topic: str, kind: End, msg_type: type | None = None, node: str = "") -> str:
         """Whose ends of this kind are on the topic, with their number where a node has several."""
         owners = Counter(node_of(end) for end in self._ends(topic, msg_type, kind, node))
@@ -126,35 +82,3 @@ class EndExpectations(GraphExpectations):
             lambda: _PRESENT[kind](f"A {kind} on `{topic}` is still there, of {self._owners(topic, kind)}."),
             hint=hint,
         )
-
-    def expect_no_publisher(self, topic: str, *, within: float = GONE_WITHIN, hint: str = "") -> None:
-        """Nobody publishes on the topic.
-
-        Args:
-            topic: full name.
-            within: seconds until they must be gone.
-            hint: a pointer for the student.
-
-        Example:
-            `ros.expect_no_publisher("/chatter")`
-
-        Codes:
-            `publisher-present`.
-        """
-        self._expect_no_end(topic, "publisher", within, hint)
-
-    def expect_no_subscription(self, topic: str, *, within: float = GONE_WITHIN, hint: str = "") -> None:
-        """Nobody subscribes to the topic.
-
-        Args:
-            topic: full name.
-            within: seconds until they must be gone.
-            hint: a pointer for the student.
-
-        Example:
-            `ros.expect_no_subscription("/chatter")`
-
-        Codes:
-            `subscription-present`.
-        """
-        self._expect_no_end(topic, "subscription", within, hint)

@@ -19,6 +19,9 @@ from autograder.reasons import Reason
 WITHIN = 10.0
 """Seconds that an expectation waits at the most: far beyond what a start takes on a busy machine."""
 
+GONE_WITHIN = 2.0
+"""Seconds that an absence may take to show, for example after a node was stopped."""
+
 _POINTER = re.compile(r"\w, (?:sections? )?'[^']+'")
 """`Week 2, section 'Groups'`, whatever a course calls its parts."""
 
@@ -42,11 +45,11 @@ def objection(verdict: object, otherwise: str) -> str:
 
 
 class Expectations:
-    """A running launch, and what can be asked of it. Each group of expectations adds what it asks."""
+    """A running launch, and what can be asked of it. Each noun adds what it asks."""
 
-    def __init__(self) -> None:
-        """Nothing runs yet."""
-        self._running = Running()
+    def __init__(self, running: Running) -> None:
+        """Ask about this launch."""
+        self._running = running
 
     @property
     def _observer(self) -> Observer:
@@ -64,7 +67,7 @@ class Expectations:
         """Return the question whether a node that is waited for cannot come any more."""
         return self._running.hopeless_without(lambda: node in self._observer.nodes())
 
-    def wait(
+    def _wait(
         self, ready: Callable[[], object], within: float = WITHIN, needs: Callable[[], object] | None = None
     ) -> bool:
         """Wait until something is so, and tell whether it is: this records no outcome.
@@ -74,24 +77,17 @@ class Expectations:
             within: seconds until it must have come. The wait ends earlier when every program has ended.
             needs: whether that is on the graph without which it cannot come. Once nothing new appears on the graph
                 and it is still missing, the wait ends.
-
-        Example:
-            `came = ros.wait(lambda: ros.listen("/chatter", String).count >= 3, within=5)`
         """
         give_up = self._running.hopeless_without(needs) if needs else self._running.all_ended
         return self._observer.wait(ready, within, give_up)
 
-    def wait_for_graph(self, ready: Callable[[], object], within: float = WITHIN) -> bool:
-        """Wait for something on the graph, and tell whether it is there: this records no outcome.
+    def _wait_for_graph(self, ready: Callable[[], object], within: float = WITHIN) -> bool:
+        """Wait for something on the graph; the wait ends earlier once nothing new appears there."""
+        return self._wait(ready, within, needs=ready)
 
-        Args:
-            ready: what is waited for, such as a node or a publisher.
-            within: seconds until it must have come. The wait ends earlier once nothing new appears on the graph.
-
-        Example:
-            `ros.wait_for_graph(lambda: len(ros.nodes()) >= 2)`
-        """
-        return self.wait(ready, within, needs=ready)
+    def _topics(self) -> str:
+        own = [t for t in sorted(self._observer.topics()) if t not in ("/rosout", "/parameter_events")]
+        return ", ".join(own) or "no topic"
 
     def _sure_if(self, quicker: bool) -> None:
         """Note that what is decided next does not depend on the machine: a busy one never makes a program faster."""
@@ -147,3 +143,15 @@ class Expectations:
         else:
             self._running.settle_programs()
             self._fail(title, diagnose(), expected=expected, observed=text, hint=hint)
+
+
+class Noun(Expectations):
+    """One thing of a launch that has a name, such as a topic, and what can be asked of it."""
+
+    def __init__(self, running: Running, name: str) -> None:
+        """Ask about what has this name in this launch."""
+        super().__init__(running)
+        self.name = name
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__.lower()} {self.name}"

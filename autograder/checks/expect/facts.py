@@ -8,15 +8,18 @@ from typing import TYPE_CHECKING, Any
 from autograder import diagnosis
 from autograder.checks import outcomes
 from autograder.checks.expect.expectations import Expectations
+from autograder.checks.expect.topic import CONTENT
 from autograder.checks.misuse import Misuse
 from autograder.diagnosis.programs import EXITED
 from autograder.diagnosis.spinning import NOT_SPINNING, SPINNING_ENDED
 from autograder.reasons import Group, Kind, kind_of_lab
 
 if TYPE_CHECKING:
-    from autograder.graph.actions import Goal
+    from autograder.checks.expect.goal import SentGoal
 
-CONTENT = Kind("content", "messages came, and what they say is not what was asked for", Group.MESSAGES)
+ARGUMENT_NOT_NEEDED = Kind(
+    "argument-not-needed", "a launch file runs without an argument that it should demand", Group.FILES
+)
 REQUIRED = Kind(
     "required", "a fact that the check established does not hold; the check gave no code of its own", Group.OUTPUT
 )
@@ -37,7 +40,7 @@ class Facts(Expectations):
         code: str = "",
         evident: object = False,
         node: str = "",
-        goal: Goal | None = None,
+        goal: SentGoal | None = None,
     ) -> None:
         """State a fact: passed if `condition` is true in Python's sense.
 
@@ -72,7 +75,7 @@ class Facts(Expectations):
         scene = self._scene()
         found = (
             diagnosis.program_trouble(scene),
-            diagnosis.why_no_result(scene, goal.name) if goal is not None and goal.empty_handed else None,
+            diagnosis.why_no_result(scene, goal.name) if goal is not None and goal.seen.empty_handed else None,
             None if evident else diagnosis.inside_reason(scene, node),
         )
         # Where the check has a reason, these say less: they are what a program looks like that does nothing more.
@@ -104,6 +107,29 @@ class Facts(Expectations):
         have, want = _in_words(observed), _in_words(expected)
         because = because or f"It is {have}, not {want}."
         self.require(observed == expected, title, expected=want, observed=have, because=because, hint=hint, code=code)
+
+    def expect_argument_needed(self, name: str, *, hint: str = "") -> None:
+        """The launch file cannot be run, because a launch argument has no default and was not given.
+
+        Args:
+            name: of the launch argument.
+            hint: a pointer for the student.
+
+        Example:
+            `ros.expect_argument_needed("vehicle")`
+
+        Codes:
+            `argument-not-needed`, and those of launch files.
+        """
+        title = f"Without `{name}` the launch file is refused"
+        told = self._running.trouble[0].because if self._running.trouble else ""
+        if f"the launch argument `{name}` has no value" in told:
+            outcomes.passed(title)
+            return
+        number = len(self._running.described)
+        started = f"It starts {number} program{'' if number == 1 else 's'} without it."
+        reason = self._running.trouble[0] if self._running.trouble else ARGUMENT_NOT_NEEDED(started)
+        self._fail(title, reason, expected=f"the launch argument `{name}` is wanted", hint=hint)
 
 
 def _in_words(value: Any) -> str:

@@ -1,17 +1,17 @@
-"""Expectations of lifecycle nodes: states, transitions, and the steps they take."""
+"""`ros.lifecycle`: states of lifecycle nodes, transitions, and the steps they take."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from functools import cached_property
 from typing import NoReturn
 
 from autograder import diagnosis
 from autograder.checks import outcomes
 from autograder.checks.expect.expectations import WITHIN
 from autograder.checks.expect.meeting import Meeting
-from autograder.graph.lifecycle import Change, LifecycleClient, Requested, in_order
+from autograder.checks.waiting import waits_for
+from autograder.graph.lifecycle import LifecycleClient, Requested
 from autograder.graph.parameters import NoAnswer
 from autograder.graph.services import ServiceMissing
 from autograder.reasons import Group, Kind, Reason, kind_of_lab
@@ -49,27 +49,15 @@ def _other_way(seen: Sequence[tuple[str, str]], wanted: Sequence[tuple[str, str]
     return f"`{callback}` returned SUCCESS." if callback else ""
 
 
-class LifecycleExpectations(Meeting):
-    """What state a node must be in, and how it got there."""
+class Lifecycle(Meeting):
+    """The state machine of a lifecycle node: its state, its transitions, and the steps that it took."""
 
-    @cached_property
-    def _lifecycle_clients(self) -> dict[str, LifecycleClient]:
-        return {}
+    @property
+    def _client(self) -> LifecycleClient:
+        return self._running.lifecycle_client(self.name)
 
-    def watch_transitions(self, node: str) -> LifecycleClient:
-        """Record a node's state changes from now on; its events are volatile, so watch before it starts.
-
-        Args:
-            node: full name.
-
-        Example:
-            `ros.watch_transitions("/camera")`
-        """
-        if node not in self._lifecycle_clients:
-            self._lifecycle_clients[node] = LifecycleClient(self._observer, node)
-        return self._lifecycle_clients[node]
-
-    def _unreachable(self, title: str, node: str, error: Exception, hint: str) -> NoReturn:
+    def _unreachable(self, title: str, error: Exception, hint: str) -> NoReturn:
+        node = self.name
         scene = self._scene()
         expected, observed = node, ", ".join(self._observer.nodes())
         if isinstance(error, NoAnswer):
@@ -83,31 +71,32 @@ class LifecycleExpectations(Meeting):
             reason = diagnosis.why_no_node(scene, node)
         self._fail(title, reason, expected=expected, observed=observed, hint=hint)
 
-    def state(self, node: str, *, within: float = WITHIN) -> str:
+    @waits_for("the state of `{name}`")
+    def state(self, *, within: float = WITHIN) -> str:
         """Label of a node's current state; a node that does not tell it is a failed outcome.
 
         Args:
-            node: full name.
             within: seconds until it must have answered.
 
         Example:
-            `before = ros.state("/camera")`
+            `before = ros.lifecycle("/camera").state()`
 
         Codes:
-            `no-answer`, `not-lifecycle`, and those of `expect_node`.
+            `no-answer`, `not-lifecycle`, and those of `node.expect`.
         """
+        node = self.name
         try:
-            return self.watch_transitions(node).state(within, self._without(node))
+            return self._client.state(within, self._without(node))
         except (ServiceMissing, NoAnswer) as error:
-            self._unreachable(f"`{node}` tells its lifecycle state", node, error, "")
+            self._unreachable(f"`{node}` tells its lifecycle state", error, "")
 
+    @waits_for("the state of `{name}`")
     def expect_state(
-        self, node: str, state: str, *, within: float = WITHIN, because: str = "", code: str = "", hint: str = ""
+        self, state: str, *, within: float = WITHIN, because: str = "", code: str = "", hint: str = ""
     ) -> None:
         """A lifecycle node is in this state, or gets there.
 
         Args:
-            node: full name.
             state: `unconfigured`, `inactive`, `active` or `finalized`.
             within: seconds until it must be there.
             because: what another state would mean here, if the check knows it.
@@ -115,16 +104,17 @@ class LifecycleExpectations(Meeting):
             hint: a pointer for the student.
 
         Example:
-            `ros.expect_state("/camera", "active")`
+            `ros.lifecycle("/camera").expect_state("active")`
 
         Codes:
             `state` or `code`, `no-answer`, `not-lifecycle`, and errors in callbacks.
         """
+        node = self.name
         title = f"`{node}` is {state}"
         try:
-            seen = self.watch_transitions(node).wait_for_state(state, within, self._without(node))
+            seen = self._client.wait_for_state(state, within, self._without(node))
         except (ServiceMissing, NoAnswer) as error:
-            self._unreachable(title, node, error, hint)
+            self._unreachable(title, error, hint)
         self._expect_that(
             seen == state,
             title,
@@ -154,48 +144,50 @@ class LifecycleExpectations(Meeting):
         last = next((line.strip() for line in reversed(lines) if line.strip()), "")
         return f" The last line of its log is `{_LOGGED.sub('', last)[:200]}`." if last else ""
 
-    def available_transitions(self, node: str, *, within: float = WITHIN) -> Mapping[str, str]:
+    @waits_for("an answer of `{name}`")
+    def available_transitions(self, *, within: float = WITHIN) -> Mapping[str, str]:
         """Labels of the transitions that a node offers now, each with the state it leads to.
 
         Args:
-            node: full name.
             within: seconds until it must have answered.
 
         Example:
-            `ros.require("configure" in ros.available_transitions("/camera"), "It can be configured")`
+            `ros.require("configure" in ros.lifecycle("/camera").available_transitions(), "It can be configured")`
 
         Codes:
-            `no-answer`, `not-lifecycle`, and those of `expect_node`.
+            `no-answer`, `not-lifecycle`, and those of `node.expect`.
         """
+        node = self.name
         try:
-            return self.watch_transitions(node).available(within, self._without(node))
+            return self._client.available(within, self._without(node))
         except (ServiceMissing, NoAnswer) as error:
-            self._unreachable(f"`{node}` tells its transitions", node, error, "")
+            self._unreachable(f"`{node}` tells its transitions", error, "")
 
+    @waits_for("`{name}` to change its state")
     def transition(
-        self, node: str, label: str, *, expect: str | None = "success", within: float = WITHIN, hint: str = ""
+        self, label: str, *, expect: str | None = "success", within: float = WITHIN, hint: str = ""
     ) -> Requested:
         """Request a transition by its label.
 
         Args:
-            node: full name.
             label: `configure`, `activate`, `deactivate`, `cleanup` or `shutdown`.
             expect: `success`, `failure` (the node answers that it did not succeed), or None: look only, no outcome.
             within: seconds until it must have been answered.
             hint: a pointer for the student.
 
         Example:
-            `ros.transition("/camera", "configure")`
+            `ros.lifecycle("/camera").transition("configure")`
 
         Codes:
             `state`, `transition-failed`, `transition-succeeded`, `no-answer`, `not-lifecycle`, and errors in callbacks.
         """
+        node = self.name
         title = f"`{node}`: {label}" + {"success": " succeeds", "failure": " does not succeed", None: ""}[expect]
         self._meet(lambda: node in self._observer.nodes(), within)
         try:
-            done = self.watch_transitions(node).transition(label, within, self._without(node))
+            done = self._client.transition(label, within, self._without(node))
         except (ServiceMissing, NoAnswer) as error:
-            self._unreachable(title, node, error, hint)
+            self._unreachable(title, error, hint)
         if expect is None:
             return done
         if not done.offered:
@@ -231,35 +223,23 @@ class LifecycleExpectations(Meeting):
         outcomes.passed(title, observed=done.after)
         return done
 
-    def changes(self, *nodes: str) -> list[Change]:
-        """State changes so far, in the order of publication.
-
-        Args:
-            nodes: full names; by default all nodes that are watched.
-
-        Example:
-            `steps = [change.step for change in ros.changes("/camera")]`
-        """
-        return in_order([self.watch_transitions(node) for node in nodes or self._lifecycle_clients])
-
-    def expect_transitions(
-        self, node: str, steps: Sequence[tuple[str, str]], *, within: float = WITHIN, hint: str = ""
-    ) -> None:
+    @waits_for("transitions of `{name}`")
+    def expect_transitions(self, steps: Sequence[tuple[str, str]], *, within: float = WITHIN, hint: str = "") -> None:
         """A node took exactly these steps since it is watched.
 
         Args:
-            node: full name.
             steps: of each the state that was left and the one that was entered.
             within: seconds until the last of them must have come.
             hint: a pointer for the student.
 
         Example:
-            `ros.expect_transitions("/camera", [("unconfigured", "configuring"), ("configuring", "inactive")])`
+            `ros.lifecycle("/camera").expect_transitions([("inactive", "activating"), ("activating", "active")])`
 
         Codes:
             `transitions`, and errors in callbacks.
         """
-        client = self.watch_transitions(node)
+        node = self.name
+        client = self._client
         seen = [change.step for change in client.wait_for_changes(len(steps), within, self._without(node))]
         told = ", ".join(f"{a} to {b}" for a, b in seen) or "no step"
         self._expect_that(

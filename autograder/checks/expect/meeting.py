@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Callable
-from functools import cached_property
 
 from rcl_interfaces.srv import ListParameters
 
-from autograder.checks.expect.expectations import Expectations
+from autograder.checks.expect.expectations import Noun
 from autograder.checks.settling import shows_all
 from autograder.diagnosis.events import read
 from autograder.graph.services import ServiceMissing, call_all
@@ -23,16 +22,8 @@ _ASKED = 16
 """So many nodes are asked at the most: a program may make any number of them."""
 
 
-class Meeting(Expectations):
+class Meeting(Noun):
     """Nodes and the observer get to know each other."""
-
-    _introduced = (0, 0)
-    """How many recordings and programs there were when all programs had made their nodes, and these were asked."""
-
-    @cached_property
-    def _met(self) -> dict[str, int]:
-        """Nodes that have answered, or had their time to, and how many recordings there were when they were asked."""
-        return {}
 
     def _settle(self, name: str) -> None:
         """Wait for proof that a node which was just made also lives on: an answer from it.
@@ -44,7 +35,7 @@ class Meeting(Expectations):
         The answer also says that the node knows all ends that the observer had when it asked: a program learns of
         them in the order in which they were made, and the question's own end is the last.
         """
-        self._met[name] = len(self._observer.recordings())
+        self._running.met[name] = len(self._observer.recordings())
         with contextlib.suppress(ServiceMissing):
             call_all(
                 self._observer,
@@ -68,19 +59,21 @@ class Meeting(Expectations):
             within: seconds until it must be there; what is missing is left to whoever sends.
         """
         recorded, started = len(self._observer.recordings()), len(self._running.programs)
-        if not recorded or not self.wait_for_graph(ready, within):
+        if not recorded or not self._wait_for_graph(ready, within):
             return
-        if self._introduced == (recorded, started):
+        if self._running.introduced == (recorded, started):
             self._observer.wait(self._observer.hears_all, MATCHES_WITHIN)
             return
         complete = self._all_begun()
         for _ in range(2):  # an answer may come from a program that has made more nodes before it
             self._observer.wait(self._hears_programs, MATCHES_WITHIN)
-            strangers = [name for name in sorted(set(self._observer.nodes())) if self._met.get(name, 0) < recorded]
+            strangers = [
+                name for name in sorted(set(self._observer.nodes())) if self._running.met.get(name, 0) < recorded
+            ]
             for name in strangers[:_ASKED]:
                 self._settle(name)
         if complete:  # a program that comes up later is asked before what is sent then
-            self._introduced = (recorded, started)
+            self._running.introduced = (recorded, started)
 
     def _hears_programs(self) -> bool:
         """Whether the observer has found all that the programs have said they made, and hears it."""

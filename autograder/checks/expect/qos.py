@@ -1,4 +1,4 @@
-"""Expectations of QoS: what the ends of a topic offer and request, and whether they match."""
+"""`ros.qos`: what the ends of a topic offer and request, and whether they match."""
 
 from __future__ import annotations
 
@@ -7,9 +7,10 @@ from typing import Any, get_args
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from autograder import diagnosis
-from autograder.checks.expect.endpoints import End, EndExpectations
+from autograder.checks.expect.endpoints import End, Ends
 from autograder.checks.expect.expectations import WITHIN
 from autograder.checks.misuse import Misuse
+from autograder.checks.waiting import waits_for
 from autograder.diagnosis.matching import MISMATCH
 from autograder.graph import qos
 from autograder.graph.names import node_of
@@ -27,12 +28,12 @@ _WORDS = {
 Policies = dict[str, str | float | None]
 
 
-class QosExpectations(EndExpectations):
-    """What QoS the ends of a topic must have."""
+class Qos(Ends):
+    """The QoS of a topic: what its publishers offer and its subscriptions request."""
 
-    def expect_qos(
+    @waits_for("an endpoint on `{name}`")
+    def expect(
         self,
-        topic: str,
         *,
         of: End = "publisher",
         node: str = "",
@@ -43,7 +44,6 @@ class QosExpectations(EndExpectations):
         """Every end of one kind on the topic has these QoS policies.
 
         Args:
-            topic: full name.
             of: which ends, `publisher` or `subscription`.
             node: full name of the node whose ends are meant; by default everybody's are.
             within: seconds until there must be such an end.
@@ -53,15 +53,16 @@ class QosExpectations(EndExpectations):
                 `lifespan` and `lease`. History and depth are not on the graph.
 
         Example:
-            `ros.expect_qos("/map", reliability="reliable", durability="transient_local")`
+            `ros.qos("/map").expect(reliability="reliable", durability="transient_local")`
 
         Codes:
             `qos-reliability` and so on by the policy, and those of `expect_publisher` and `expect_subscription`.
         """
+        topic = self.name
         _refuse_misspelt(of, policies)
         wanted = _in_words(policies, policies)
         title = f"The {of} on `{topic}` has {wanted}"
-        if not self.wait_for_graph(lambda: self._ends(topic, None, of, node), within):
+        if not self._wait_for_graph(lambda: self._ends(topic, None, of, node), within):
             self._fail(
                 title,
                 diagnosis.why_no_endpoint(self._scene(), topic, None, of, node),
@@ -84,29 +85,30 @@ class QosExpectations(EndExpectations):
     def _all_there(self, topic: str, kind: End) -> None:
         """Wait until the nodes at this end are built: their constructors may be about to make further ends."""
         for owner in {node_of(end) for end in self._ends(topic, None, kind, "")}:
-            if owner not in self._met:
+            if owner not in self._running.met:
                 self._settle(owner)
 
-    def expect_match(self, topic: str, *, within: float = WITHIN, hint: str = "") -> None:
+    @waits_for("both ends of `{name}`")
+    def expect_match(self, *, within: float = WITHIN, hint: str = "") -> None:
         """Every subscription to the topic accepts the QoS that every publisher of it offers.
 
         Args:
-            topic: full name.
             within: seconds until there must be a publisher and a subscription.
             hint: a pointer for the student.
 
         Example:
-            `ros.expect_match("/scan")`
+            `ros.qos("/scan").expect_match()`
 
         Codes:
             those of `expect_publisher` and `expect_subscription`, and `qos-reliability` and so on by the policy.
         """
+        topic = self.name
         title = f"Publishers and subscriptions on `{topic}` match"
 
         def ends(kind: End) -> list[TopicEndpointInfo]:
             return self._ends(topic, None, kind, "")
 
-        if not self.wait_for_graph(lambda: ends("publisher") and ends("subscription"), within):
+        if not self._wait_for_graph(lambda: ends("publisher") and ends("subscription"), within):
             missing: End = "subscription" if ends("publisher") else "publisher"
             self._fail(
                 title,
@@ -127,17 +129,17 @@ class QosExpectations(EndExpectations):
 
 def _refuse_misspelt(of: str, policies: Policies) -> None:
     if of not in get_args(End):
-        raise Misuse(f"expect_qos: of={of!r} is neither 'publisher' nor 'subscription'.")
+        raise Misuse(f"qos: of={of!r} is neither 'publisher' nor 'subscription'.")
     unknown = sorted(policies.keys() - qos.POLICIES)
     if unknown or not policies:
         known = ", ".join(sorted(qos.POLICIES))
-        raise Misuse(f"expect_qos knows no policy called {', '.join(unknown) or 'nothing'}. It knows {known}.")
+        raise Misuse(f"qos knows no policy called {', '.join(unknown) or 'nothing'}. It knows {known}.")
     for policy, value in policies.items():
         words = _WORDS.get(policy)
         if words is not None and value not in words:
-            raise Misuse(f"expect_qos: {policy}={value!r} is neither {' nor '.join(map(repr, words))}.")
+            raise Misuse(f"qos: {policy}={value!r} is neither {' nor '.join(map(repr, words))}.")
         if words is None and not (value is None or (isinstance(value, (int, float)) and value > 0)):
-            raise Misuse(f"expect_qos: {policy}={value!r} is no time; it is a number of seconds above 0, or None.")
+            raise Misuse(f"qos: {policy}={value!r} is no time; it is a number of seconds above 0, or None.")
 
 
 def _in_words(policies: Policies, values: Policies) -> str:

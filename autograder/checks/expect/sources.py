@@ -6,7 +6,7 @@ import itertools
 from collections import Counter
 from collections.abc import Sequence
 
-from autograder.checks.expect.endpoints import EXTRA_PUBLISHER, EndExpectations
+from autograder.checks.expect.endpoints import EXTRA_PUBLISHER, Ends
 from autograder.checks.settling import shows_all
 from autograder.diagnosis.names import WRONG_NODE
 from autograder.graph.names import UNKNOWN_NODE, node_of
@@ -20,7 +20,7 @@ _NAMED_WITHIN = 10.0
 _NAMELESS = "a node whose name is not known"
 
 
-class SourceExpectations(EndExpectations):
+class Sources(Ends):
     """What expectations of messages ask of their publishers."""
 
     def _one_source(

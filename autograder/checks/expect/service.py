@@ -1,4 +1,4 @@
-"""Expectations of services: offered, and answered."""
+"""`ros.service`: whether a service is offered, and what it answers."""
 
 from __future__ import annotations
 
@@ -10,6 +10,8 @@ from autograder.checks import outcomes
 from autograder.checks.expect.expectations import WITHIN
 from autograder.checks.expect.meeting import Meeting
 from autograder.checks.parts import asked
+from autograder.checks.running import Running
+from autograder.checks.waiting import waits_for
 from autograder.graph.names import type_name
 from autograder.graph.services import Answer, ServiceMissing, call_all
 
@@ -17,26 +19,31 @@ ANSWER_WITHIN = 5.0
 """Seconds that an answer may take: a local round trip takes 1 to 4 ms, a stuck node does not answer."""
 
 
-class ServiceExpectations(Meeting):
-    """What must answer."""
+class Service(Meeting):
+    """A service of the student's: whether it is offered, and what it answers."""
 
-    def expect_service(self, name: str, srv_type: type, *, within: float = WITHIN, hint: str = "") -> None:
+    def __init__(self, running: Running, name: str, srv_type: type) -> None:
+        """Ask about the service of this name and class."""
+        super().__init__(running, name)
+        self._type = srv_type
+
+    @waits_for("the service `{name}`")
+    def expect(self, *, within: float = WITHIN, hint: str = "") -> None:
         """A node offers this service with this type.
 
         Args:
-            name: full name.
-            srv_type: service class.
             within: seconds until it must be there.
             hint: a pointer for the student.
 
         Example:
-            `ros.expect_service("/add", AddTwoInts)`
+            `ros.service("/add", AddTwoInts).expect()`
 
         Codes:
             `no-service`, `service-name`, `wrong-type`.
         """
+        name, srv_type = self.name, self._type
         wanted = type_name(srv_type)
-        found = self.wait_for_graph(lambda: wanted in self._observer.services().get(name, []), within)
+        found = self._wait_for_graph(lambda: wanted in self._observer.services().get(name, []), within)
         self._expect_that(
             found,
             f"The service `{name}` ({wanted}) is offered",
@@ -45,14 +52,11 @@ class ServiceExpectations(Meeting):
             hint=hint,
         )
 
-    def call_many(
-        self, name: str, srv_type: type, requests: Sequence[Any], *, within: float = ANSWER_WITHIN, hint: str = ""
-    ) -> list[Answer]:
+    @waits_for("answers of `{name}`")
+    def call_many(self, requests: Sequence[Any], *, within: float = ANSWER_WITHIN, hint: str = "") -> list[Answer]:
         """Send all requests at once; each must be answered. A missing server or answer is a failed outcome.
 
         Args:
-            name: full name.
-            srv_type: service class.
             requests: of that class.
             within: seconds until every answer must have come.
             hint: a pointer for the student.
@@ -61,11 +65,12 @@ class ServiceExpectations(Meeting):
             the answers, in the order of the requests; `response` is what was said.
 
         Example:
-            `answers = ros.call_many("/add", AddTwoInts, [AddTwoInts.Request(a=1, b=2), AddTwoInts.Request(a=3, b=4)])`
+            `answers = ros.service("/add", AddTwoInts).call_many([AddTwoInts.Request(a=n, b=1) for n in range(5)])`
 
         Codes:
-            those of `expect_service`, `no-answer`, and what blocks a callback.
+            those of `expect`, `no-answer`, and what blocks a callback.
         """
+        name, srv_type = self.name, self._type
         title = f"The service `{name}` answers"
         self._meet(lambda: name in self._observer.services(), within)
         gone = self._running.hopeless_without(lambda: name in self._observer.services())
@@ -88,12 +93,11 @@ class ServiceExpectations(Meeting):
         outcomes.passed(title)
         return answers
 
-    def call(self, name: str, srv_type: type, request: Any, *, within: float = ANSWER_WITHIN, hint: str = "") -> Any:
+    @waits_for("an answer of `{name}`")
+    def call(self, request: Any, *, within: float = ANSWER_WITHIN, hint: str = "") -> Any:
         """Call a service of the student's; a missing server or answer is a failed outcome.
 
         Args:
-            name: full name.
-            srv_type: service class.
             request: of that class.
             within: seconds until the answer must have come.
             hint: a pointer for the student.
@@ -102,9 +106,21 @@ class ServiceExpectations(Meeting):
             the response.
 
         Example:
-            `total = ros.call("/add", AddTwoInts, AddTwoInts.Request(a=1, b=2)).sum`
+            `total = ros.service("/add", AddTwoInts).call(AddTwoInts.Request(a=1, b=2)).sum`
 
         Codes:
             those of `call_many`.
         """
-        return self.call_many(name, srv_type, [request], within=within, hint=hint)[0].response
+        return self.call_many([request], within=within, hint=hint)[0].response
+
+    def kept_waiting(self) -> str:
+        """Why it answers only after another callback of its program: a sentence, for reasons only.
+
+        Returns:
+            empty where no reason is established.
+
+        Example:
+            `because = ros.service("/get_total", GetTotal).kept_waiting() or "The answer came late."`
+        """
+        found = diagnosis.why_kept_waiting(self._scene(), self.name)
+        return found.because if found else ""

@@ -1,16 +1,20 @@
-"""Expectations of how programs end: by themselves, or when they are told to."""
+"""`ros.program`: a program that the launch has started: alive, ended, how it ends when it is told to."""
 
 from __future__ import annotations
 
 import re
 import signal
+from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 from autograder import diagnosis
 from autograder.checks import outcomes
-from autograder.checks.expect.expectations import WITHIN
-from autograder.checks.expect.programs import ProgramExpectations
+from autograder.checks.expect.expectations import WITHIN, Noun
 from autograder.checks.misuse import Misuse
+from autograder.checks.program import Program
+from autograder.checks.running import Running
+from autograder.checks.waiting import waits_for
 from autograder.core.output import tidy
 from autograder.diagnosis import last_traceback
 from autograder.diagnosis.programs import EXITED
@@ -75,14 +79,133 @@ def _comes_back(where: str, never_spun: bool) -> str:
     return "`spin` does not return by itself." if ".spin(" in where else ""
 
 
-class EndingExpectations(ProgramExpectations):
-    """How the programs end."""
+class StartedProgram(Noun):
+    """A program that the launch has started; after a restart, its last run."""
 
-    def expect_exit(self, name: str, *, status: int | None = None, within: float = WITHIN, hint: str = "") -> None:
+    def __init__(self, running: Running, name: str, start: Callable[[Program], None]) -> None:
+        """Ask about the program of this name; that there is none is a failed outcome.
+
+        Args:
+            running: the launch.
+            name: of the program, or of its node as the launch names it: that tells several runs of one program apart.
+            start: starts one more program of the launch.
+        """
+        super().__init__(running, name)
+        self._start = start
+        self._program  # noqa: B018 - a missing one fails here
+
+    @property
+    def _program(self) -> RunningProgram:
+        """The last started program of this name; a missing one is a failed outcome."""
+        for node, program in reversed(self._running.programs):
+            if self.name in (node.program, node.node_name()):
+                return program
+        self._fail(f"The program `{self.name}` is there", diagnosis.program_trouble(self._scene()))
+
+    def running(self) -> bool:
+        """Whether it has not ended."""
+        return self._program.running()
+
+    def exit_status(self) -> int | None:
+        """Its exit status, negative for a signal; None while it runs."""
+        return self._program.exit_status()
+
+    def output(self) -> str:
+        """What it has printed so far.
+
+        Example:
+            `printed = ros.program("talker").output()`
+        """
+        return self._program.output()
+
+    def signal(self, number: int) -> None:
+        """Send it a signal, such as `signal.SIGINT`, which is what Ctrl-C does."""
+        self._program.signal(number)
+
+    def events(self) -> list[dict[str, Any]]:
+        """What its probe has told, as it told it: evidence for reasons only."""
+        return self._program.events()
+
+    def seen_runs(self, kind: str, name: str) -> int | None:
+        """How often a callback was seen to begin inside it: evidence for reasons only.
+
+        Args:
+            kind: `subscription` or `service`.
+            name: full name of its topic or service.
+
+        Returns:
+            None where the inside of the program cannot be seen.
+
+        Example:
+            `runs = ros.program("recorder").seen_runs("subscription", "/frames")`
+        """
+        things = [t for inside in self._scene().insides if inside.name == self.name for t in inside.callbacks]
+        return next((thing.runs for thing in things if (thing.kind, thing.name) == (kind, name)), None)
+
+    def stop(self, *, kill: bool = False) -> None:
+        """End it: politely (SIGTERM), or without a chance to clean up.
+
+        Args:
+            kill: end it without a chance to clean up.
+
+        Example:
+            `ros.program("talker").stop()`
+        """
+        program = self._program
+        self._running.may_end.append(program)
+        self._running.stopped.append(program)
+        program.stop(grace=0.0 if kill else 2.0)
+
+    def restart(self) -> None:
+        """Start it once more, with the words that it was started with before; it has ended, or `stop` has ended it.
+
+        One that was killed is still on the graph for a while: its topics have one publisher more than there is.
+
+        Example:
+            `ros.program("planner").restart()`
+        """
+        wanted = self._program
+        if wanted.running():
+            raise Misuse(f"restart: `{self.name}` still runs; end it with ros.program({self.name!r}).stop() before.")
+        self._start(next(launched for launched, program in self._running.programs if program is wanted))
+
+    def expect_started(self) -> None:
+        """The launch started it: its words could be read, and its package or cell is there.
+
+        Example:
+            `ros.program("camera").expect_started()`
+
+        Codes:
+            those of words that cannot be read, such as `rule-syntax`.
+        """
+        outcomes.passed(f"The program `{self.name}` is there")
+
+    @waits_for("the program `{name}`")
+    def expect_running(self, *, hint: str = "") -> None:
+        """A program has not ended.
+
+        Args:
+            hint: a pointer for the student.
+
+        Example:
+            `ros.expect_running("talker")`
+
+        Codes:
+            `crashed`, `exited` and other reasons why a program ends.
+        """
+        name = self.name
+        self._expect_that(
+            self._program.running(),
+            f"`{name}` is still running",
+            lambda: diagnosis.program_trouble(self._scene()),
+            hint=hint,
+        )
+
+    @waits_for("the end of the program `{name}`")
+    def expect_exit(self, *, status: int | None = None, within: float = WITHIN, hint: str = "") -> None:
         """A program ends by itself.
 
         Args:
-            name: of the program.
             status: its exit status; by default any.
             within: seconds until it must have ended.
             hint: a pointer for the student.
@@ -93,10 +216,11 @@ class EndingExpectations(ProgramExpectations):
         Codes:
             `still-running`, `exit-status`, `shutdown-in-callback`, and reasons why a program ends or does not.
         """
-        program = self.program(name)
+        name = self.name
+        program = self._program
         self._running.may_end.append(program)
         title = f"`{name}` ends by itself" + ("" if status is None else f" with exit status {status}")
-        if not self.wait(lambda: not program.running(), within):
+        if not self._wait(lambda: not program.running(), within):
             where = self._place_of(program)
             hint = f"{_comes_back(where, self._never_spun(program))} {hint}".strip()
             others = self._other_runs(program)
@@ -136,13 +260,13 @@ class EndingExpectations(ProgramExpectations):
         last = f" The last line it printed is `{_STAMP.sub('', said[-1])[:120]}`." if said else ""
         return EXIT_STATUS(f"It ended with status {program.exit_status()}.{last}")
 
-    def expect_clean_end(self, name: str, *, by: str = "SIGINT", within: float = 3.0, hint: str = "") -> None:
+    @waits_for("the end of the program `{name}`")
+    def expect_clean_end(self, *, by: str = "SIGINT", within: float = 3.0, hint: str = "") -> None:
         """A program that is told to end does so: with exit status 0, and without printing an error.
 
         Where rclpy was interrupted as it began to wait, the program shows nothing; it is started again, and told again.
 
         Args:
-            name: of the program.
             by: the signal that tells it: `SIGINT`, as Ctrl-C does, or `SIGTERM`, as launch and systemd do.
             within: seconds until it must have ended.
             hint: a pointer for the student.
@@ -153,20 +277,21 @@ class EndingExpectations(ProgramExpectations):
         Codes:
             `signal-ignored`, `unclean-end`, and those of `expect_running`.
         """
+        name = self.name
         if by not in _SAID:
             raise Misuse(f"expect_clean_end: by={by!r} is none of {', '.join(_SAID)}.")
-        self.expect_running(name)
+        self.expect_running()
         title = f"`{name}` ends cleanly at {_SAID[by]}"
         for _ in range(_TRIES - 1):
-            if not self._ends_interrupted(title, name, by, within, hint):
+            if not self._ends_interrupted(title, by, within, hint):
                 return
-            self.restart(name)
-        if self._ends_interrupted(title, name, by, within, hint):
+            self.restart()
+        if self._ends_interrupted(title, by, within, hint):
             outcomes.passed(title, observed="rclpy was interrupted while it began to wait")
 
-    def _ends_interrupted(self, title: str, name: str, by: str, within: float, hint: str) -> bool:
+    def _ends_interrupted(self, title: str, by: str, within: float, hint: str) -> bool:
         """Tell a program to end; whether rclpy was interrupted as it began to wait. What else it does is an outcome."""
-        program = self.program(name)
+        program = self._program
         self._running.may_end.append(program)
         self._observer.wait(lambda: self._spun(program) or not program.running(), _SPINS_WITHIN)
         said_before = len(program.output())
@@ -182,7 +307,7 @@ class EndingExpectations(ProgramExpectations):
             self._fail(title, reason, expected="ended", observed="still running", hint=hint)
         self._running.stopped.append(program)
         status, said = program.exit_status(), program.output()[said_before:]
-        error = last_traceback(said, name) if status or "Traceback (most recent call last)" in said else None
+        error = last_traceback(said, self.name) if status or "Traceback (most recent call last)" in said else None
         if error is not None and _CONTEXT_GONE in error.because and _RACE_OF_RCLPY.search(said):
             return True
         because = f"After {_SAID[by]}, it ended with exit status {status}."

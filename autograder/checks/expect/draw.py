@@ -1,4 +1,4 @@
-"""Pictures of a launch: who ran when, who talks to whom, which state, which match, which arrival. No outcomes."""
+"""`ros.draw`: pictures of who ran when, who talks to whom, which state, which match, which arrival. No outcomes."""
 
 from __future__ import annotations
 
@@ -6,26 +6,13 @@ from collections.abc import Iterable
 
 from autograder import pictures
 from autograder.checks import seen
-from autograder.checks.expect.lifecycle import LifecycleExpectations
+from autograder.checks.expect.expectations import Expectations
 from autograder.checks.misuse import Misuse
-from autograder.pictures import Picture, Runs
+from autograder.pictures import Picture
 
 
-class Pictures(LifecycleExpectations):
+class Draw(Expectations):
     """What happened in this launch, drawn. Each picture can also be asked for after the block."""
-
-    _graph: seen.Graph | None = None
-    """The graph as it was when the launch ended."""
-
-    def runs(self) -> Runs:
-        """What the programs' callbacks did so far, run by run: when, how long, on which thread, in which group.
-
-        Seen from inside the programs, the first 2000 runs of each; a moment old.
-
-        Example:
-            `print(ros.runs().longest_pause("heartbeat"))`
-        """
-        return seen.runs(self._insides())
 
     def timeline(self, *callbacks: str, seconds: float | None = None, by: str = "callback") -> Picture:
         """A picture of when each callback ran, on which thread, in which callback group.
@@ -36,17 +23,17 @@ class Pictures(LifecycleExpectations):
             by: `callback`, a row for each callback, or `thread`, a row for each thread.
 
         Example:
-            `ros.timeline(seconds=2)`
+            `ros.draw.timeline(seconds=2)`
         """
-        return pictures.timeline(self.runs().of(*callbacks), seconds=seconds, by=by)
+        return pictures.timeline(seen.runs(self._insides()).of(*callbacks), seconds=seconds, by=by)
 
     def graph(self) -> Picture:
         """A picture of the nodes and topics, with the quality of service of each end: now, or as it was at the end.
 
         Example:
-            `ros.graph()`
+            `ros.draw.graph()`
         """
-        found = self._graph or seen.graph(self._observer)
+        found = self._running.graph or seen.graph(self._observer)
         return pictures.graph(found.nodes, found.endpoints, seen.mismatch)
 
     def qos(self, topic: str = "") -> Picture:
@@ -56,9 +43,9 @@ class Pictures(LifecycleExpectations):
             topic: full name; without it, the sentence of the refusal names the topics that there are.
 
         Example:
-            `ros.qos("/frames")`
+            `ros.draw.qos("/frames")`
         """
-        found = self._graph or seen.graph(self._observer)
+        found = self._running.graph or seen.graph(self._observer)
         _refuse_unnamed("qos", topic, [end.topic for end in found.endpoints])
         return pictures.qos(topic, [end for end in found.endpoints if end.topic == topic], seen.mismatch)
 
@@ -70,10 +57,10 @@ class Pictures(LifecycleExpectations):
                 `launch(..., lifecycle=[node])` does from the start.
 
         Example:
-            `ros.lifecycle("/camera")`
+            `ros.draw.lifecycle("/camera")`
         """
-        client = self._lifecycle_clients.get(node)
-        if client is None and self._graph is None and f"{node}/get_state" not in self._observer.services():
+        client = self._running.lifecycle_clients.get(node)
+        if client is None and self._running.graph is None and f"{node}/get_state" not in self._observer.services():
             raise Misuse(f"lifecycle: `{node}` is no lifecycle node; it offers no service `{node}/get_state`.")
         changes = [change.step for change in client.changes] if client else []
         return pictures.lifecycle(node, pictures.steps(changes))
@@ -86,10 +73,10 @@ class Pictures(LifecycleExpectations):
             seconds: how much of it; by default all.
 
         Example:
-            `ros.arrivals("/frames")`
+            `ros.draw.arrivals("/frames")`
         """
         if not topic:  # only then is the graph asked, of which an ended launch of grading keeps nothing
-            found = self._graph or seen.graph(self._observer)
+            found = self._running.graph or seen.graph(self._observer)
             _refuse_unnamed("arrivals", topic, [end.topic for end in found.endpoints])
         return pictures.arrivals(topic, seen.traffic(self._insides(), topic), seconds=seconds)
 
@@ -102,4 +89,4 @@ def _refuse_unnamed(picture: str, topic: str, there: Iterable[str]) -> None:
     """
     if not topic:
         known = ", ".join(f'"{name}"' for name in sorted(set(there))) or "none so far"
-        raise Misuse(f'{picture}: it is about one topic, such as ros.{picture}("/chatter"). Topics here: {known}.')
+        raise Misuse(f'{picture}: it is about one topic, such as ros.draw.{picture}("/chatter"). Topics here: {known}.')

@@ -1,4 +1,4 @@
-"""Expectations of messages: how many, how often, what is in them, from whom."""
+"""`ros.topic`: who publishes and subscribes, and which messages arrive: how many, how often, saying what, from whom."""
 
 from __future__ import annotations
 
@@ -12,18 +12,21 @@ from rclpy.qos import QoSProfile
 from autograder import diagnosis
 from autograder.checks import outcomes
 from autograder.checks.expect import rates
-from autograder.checks.expect.expectations import WITHIN, objection
-from autograder.checks.expect.facts import CONTENT
+from autograder.checks.expect.endpoints import End
+from autograder.checks.expect.expectations import GONE_WITHIN, WITHIN, objection
 from autograder.checks.expect.meeting import MATCHES_WITHIN
 from autograder.checks.expect.rates import RATE
-from autograder.checks.expect.sources import SourceExpectations
+from autograder.checks.expect.sources import Sources
 from autograder.checks.message_text import in_words, int_in_float, shorten
 from autograder.checks.misuse import Misuse
+from autograder.checks.running import Running
+from autograder.checks.waiting import waits_for
 from autograder.diagnosis.callbacks import MESSAGE_FIELD
 from autograder.graph.names import node_of
 from autograder.graph.recording import Received, Recording, quiet_profile
 from autograder.reasons import Group, Kind, Reason, kind_of_lab
 
+CONTENT = Kind("content", "messages came, and what they say is not what was asked for", Group.MESSAGES)
 TOO_FEW = Kind(
     "too-few",
     "some messages came in the time, and fewer than asked for; no other reason was established",
@@ -106,26 +109,109 @@ def _number(messages: int) -> str:
     return f"{messages} message{'s' * (messages != 1)}"
 
 
-class MessageExpectations(SourceExpectations):
-    """What must arrive, and what must not."""
+class Topic(Sources):
+    """A topic: who is at its ends, and what arrives on it."""
 
-    def listen(self, topic: str, msg_type: type, qos: QoSProfile | None = None) -> Recording:
+    def __init__(self, running: Running, name: str, msg_type: type | None = None) -> None:
+        """Ask about the topic of this name; most questions need the class of its messages."""
+        super().__init__(running, name)
+        self._type = msg_type
+
+    @property
+    def _class(self) -> type:
+        """The class of its messages.
+
+        Raises:
+            Misuse: the check did not name it.
+        """
+        if self._type is None:
+            raise Misuse(f'ros.topic("{self.name}"): what is asked here needs the message type, as a second argument.')
+        return self._type
+
+    @waits_for("a publisher on `{name}`")
+    def expect_publisher(self, *, node: str = "", count: int = 1, within: float | None = None, hint: str = "") -> None:
+        """The topic has exactly so many publishers of this type, of the node `node` if one is given.
+
+        Args:
+            node: full name of the node whose they are; by default of any.
+            count: so many publishers; 0: nobody publishes on the topic any more, with whatever type.
+            within: seconds until they must be there, by default 10, or gone, by default 2.
+            hint: a pointer for the student.
+
+        Example:
+            `ros.topic("/chatter", String).expect_publisher(node="/talker")`
+
+        Codes:
+            `no-topic`, `topic-name`, `wrong-type`, `wrong-node`, `wrong-end`, `absolute-name`, `count`,
+            `extra-publisher`, `publisher-present`.
+        """
+        self._expect_ends("publisher", node, count, within, hint)
+
+    @waits_for("a subscription on `{name}`")
+    def expect_subscription(
+        self, *, node: str = "", count: int = 1, within: float | None = None, hint: str = ""
+    ) -> None:
+        """The topic has at least so many subscriptions of this type, of the node `node` if one is given.
+
+        Args:
+            node: full name of the node whose they are; by default of any.
+            count: so many subscriptions; 0: nobody subscribes to the topic any more, with whatever type.
+            within: seconds until they must be there, by default 10, or gone, by default 2.
+            hint: a pointer for the student.
+
+        Example:
+            `ros.topic("/chatter", String).expect_subscription(node="/listener")`
+
+        Codes:
+            `no-topic`, `topic-name`, `wrong-type`, `wrong-node`, `wrong-end`, `absolute-name`, `count`,
+            `subscription-present`.
+        """
+        self._expect_ends("subscription", node, count, within, hint)
+
+    def _expect_ends(self, kind: End, node: str, count: int, within: float | None, hint: str) -> None:
+        if count:
+            self._expect_end(self.name, self._class, kind, node, count, WITHIN if within is None else within, hint)
+        else:
+            self._expect_no_end(self.name, kind, GONE_WITHIN if within is None else within, hint)
+
+    @waits_for("the topic `{name}` to go away")
+    def expect_unused(self, *, within: float = GONE_WITHIN, hint: str = "") -> None:
+        """Nobody publishes or subscribes to this topic.
+
+        Args:
+            within: seconds until nobody may use it any more.
+            hint: a pointer for the student.
+
+        Example:
+            `ros.topic("/chatter").expect_unused()`
+
+        Codes:
+            `topic-present`, `absolute-name`.
+        """
+        gone = self._observer.wait(lambda: self.name not in self._observer.topics(), within)
+        self._expect_that(
+            gone,
+            f"Nobody uses the topic `{self.name}`",
+            lambda: diagnosis.why_topic_present(self._scene(), self.name),
+            observed=self._topics,
+            hint=hint,
+        )
+
+    def listen(self, qos: QoSProfile | None = None) -> Recording:
         """Record a topic from now on; the same topic and profile share a recording.
 
         Args:
-            topic: full name.
-            msg_type: message class.
             qos: subscribe with this profile instead of one that hears everything.
 
         Example:
-            `heard = ros.listen("/chatter", String).count`
+            `heard = ros.topic("/chatter", String).listen().count`
         """
+        topic, msg_type = self.name, self._class
         return self._observer.record(topic, msg_type, qos)
 
+    @waits_for("messages on `{name}`")
     def expect_messages(
         self,
-        topic: str,
-        msg_type: type,
         *,
         at_least: int = 0,
         at_most: int | None = None,
@@ -146,8 +232,6 @@ class MessageExpectations(SourceExpectations):
         """Messages arrive on a topic.
 
         Args:
-            topic: full name.
-            msg_type: message class.
             at_least: so many, by default 1, or 10 with `rate`.
             at_most: not more, watched for `for_seconds`; 0 means that none may come.
             exactly: both at once.
@@ -168,15 +252,16 @@ class MessageExpectations(SourceExpectations):
             the counted messages.
 
         Example:
-            `ros.expect_messages("/chatter", String, at_least=10, rate=2, publisher="/talker")`
+            `ros.topic("/chatter", String).expect_messages(at_least=10, rate=2, publisher="/talker")`
 
         Codes:
             `too-few`, `too-many`, `content`, `message-field`, `rate`, `extra-publisher`, `wrong-node`, and of silence.
         """
+        topic, msg_type = self.name, self._class
         need, most = _numbers(at_least, at_most, exactly, rate)
         recording = self._observer.record(topic, msg_type, qos)
         wanted = _Wanted(recording, need, most, rate, skip, where, saying, hint)
-        if not self.wait(wanted.enough, within, lambda: self._ends(topic, msg_type, "publisher", "")):
+        if not self._wait(wanted.enough, within, lambda: self._ends(topic, msg_type, "publisher", "")):
             self._too_few(wanted, qos or quiet_profile(), within)
         self._not_more(wanted, for_seconds)
         self._one_source(wanted.title, topic, msg_type, publisher, publishers, recording.messages[skip:])
@@ -232,11 +317,11 @@ class MessageExpectations(SourceExpectations):
             in_time = wanted.most is not None or rates.in_time(last, rate, tolerance, every)
             return in_time and rates.at_rate(last, rate, tolerance, every)
 
-        self.wait(lambda: right() or len(wanted.counted()) >= enough, within)
+        self._wait(lambda: right() or len(wanted.counted()) >= enough, within)
         until = time.monotonic() + within
         while not right() and rates.too_slow(wanted.counted()[-need:], rate, every) and time.monotonic() < until:
             known, began = wanted.recording.count, time.monotonic()
-            self.wait(lambda: right() or wanted.recording.count >= known + need, within)  # noqa: B023
+            self._wait(lambda: right() or wanted.recording.count >= known + need, within)  # noqa: B023
             if self._observer.patience.kept(began) < _HELD_UP * (time.monotonic() - began):
                 break  # nobody else slowed it down
         last = wanted.counted()[-need:]
@@ -266,27 +351,25 @@ class MessageExpectations(SourceExpectations):
         observed = shorten("; ".join(said if len(received) <= 4 else [*said[:2], "…", *said[2:]]))
         self._fail(wanted.title, CONTENT(wrong), observed=observed, hint=wanted.hint)
 
-    def expect_silence(
-        self, topic: str, msg_type: type, *, for_seconds: float = 1.0, because: str = "", code: str = "", hint: str = ""
-    ) -> None:
+    @waits_for("silence on `{name}`")
+    def expect_silence(self, *, for_seconds: float = 1.0, because: str = "", code: str = "", hint: str = "") -> None:
         """Nothing arrives on the topic from now on, whatever came before and is already under way.
 
         From now on: once the nodes that publish have answered a question, and so have taken what was sent before it.
 
         Args:
-            topic: full name.
-            msg_type: message class.
             for_seconds: how long it is watched, in seconds.
             because: what a message would mean here, if the check knows better than "it should not".
             code: the code of that reason.
             hint: a pointer for the student.
 
         Example:
-            `ros.expect_silence("/chatter", String, for_seconds=0.5)`
+            `ros.topic("/chatter", String).expect_silence(for_seconds=0.5)`
 
         Codes:
             `not-silent`, or `code`.
         """
+        topic, msg_type = self.name, self._class
         recording = self._observer.record(topic, msg_type)
         self._observer.wait(self._hears_programs, MATCHES_WITHIN)  # nobody hears what was made a moment ago
         for node in {node_of(end) for end in self._observer.publishers(topic)}:
@@ -308,3 +391,11 @@ class MessageExpectations(SourceExpectations):
             observed=_number(published()),
             hint=hint,
         )
+
+    def account(self) -> str:
+        """What was seen of its publisher, of the callbacks of that node and of the messages: for reasons only.
+
+        Example:
+            `ros.require(heard, "The status goes on", because=f"Nothing came. {ros.topic('/status').account()}")`
+        """
+        return diagnosis.account(self._scene(), self.name)
