@@ -21,7 +21,7 @@ OFFERED = {
         publisher qos require require_equal runs score server service start stop topic wait
     """,
     "topic": """
-        account expect_messages expect_publisher expect_silence expect_subscription expect_unused listen
+        account expect_last expect_messages expect_publisher expect_silence expect_subscription expect_unused listen
     """,
     "publisher": "open publish stream",
     "qos": "expect expect_match",

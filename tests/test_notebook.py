@@ -573,6 +573,8 @@ def test_an_exception_reaches_the_student_as_python_shows_it(notebook: Notebook,
     assert error in shown.error and "Traceback" in shown.error and "after" not in shown.text
     scored = notebook.run(f'with launch("talker") as ros:\n    {line}\nros.score(2)')
     assert error in scored.error and "points" not in scored.text
+    told = "A cell above this check defines `Int32`, and it has not been run"
+    assert (told in scored.text, told in shown.text) == (error == "NameError", False)
 
 
 def test_what_a_cell_without_a_score_expected_is_shown(notebook: Notebook) -> None:
@@ -728,7 +730,7 @@ def test_an_interrupted_check_has_no_verdict_wherever_that_finds_it(notebook: No
     assert notebook.run(CHECK).result == whole.result
 
 
-@pytest.mark.parametrize("expectation", ["expect_node('/talker')", "require(True, 'All is well')"])
+@pytest.mark.parametrize("expectation", ["node('/talker').expect()", "require(True, 'All is well')"])
 def test_an_interrupted_check_that_expects_without_a_score_says_the_same(notebook: Notebook, expectation: str) -> None:
     write(notebook)
     kill = "os.kill(os.getpid(), signal.SIGINT)"

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from autograder.course.cells import CODE_STUB
+from autograder.course.cells import CODE_STUB, for_checks
 from autograder.course.lab import load_lab
 from autograder.gradebook import release
 
@@ -57,7 +57,9 @@ def test_a_check_is_folded_below_a_sentence_that_says_what_it_looks_at(lab: str)
     cells = json.loads((ROOT / "labs" / lab / f"{lab}.ipynb").read_text(encoding="utf-8"))["cells"]
     for above, cell in pairwise(cells):
         marks = cell["metadata"].get("nbgrader", {})
-        if cell["cell_type"] == "code" and marks.get("grade"):
+        if for_checks(cell):
+            assert marks["locked"] and cell["metadata"]["jupyter"] == {"source_hidden": True}, marks["grade_id"]
+        elif cell["cell_type"] == "code" and marks.get("grade"):
             last = "".join(above["source"]).strip().splitlines()[-1]
             assert above["cell_type"] == "markdown" and not last.startswith("#"), marks["grade_id"]
             assert last not in ("**Check.**", "---"), marks["grade_id"]

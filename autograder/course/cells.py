@@ -45,6 +45,9 @@ _FILE_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}(\.[A-Za-z0-9_-]{1,32})*
 _PACKAGE_FILE = re.compile(r"src(/[A-Za-z0-9_][A-Za-z0-9_.-]{0,63}){2,5}")
 """A file of a ROS package, in the place that it has in a colcon workspace."""
 
+FOR_CHECKS = "for-checks"
+"""The tag of a cell that students run and need not read: it is folded in the released notebook, as checks are."""
+
 
 def nbgrader_of(cell: dict[str, Any]) -> dict[str, Any]:
     """Return a cell's nbgrader metadata; empty if it has none, or something else in its place."""
@@ -89,6 +92,13 @@ def source_of(cell: dict[str, Any]) -> str:
     if not isinstance(source, str):
         raise ValueError("a cell's source is neither text nor lines of text")
     return encodable(source).replace("\r\n", "\n").replace("\r", "\n")
+
+
+def for_checks(cell: dict[str, Any]) -> bool:
+    """Whether a cell holds what only checks use, such as a lab's own expectations: it has the tag `for-checks`."""
+    metadata = cell.get("metadata")
+    tags = metadata.get("tags") if isinstance(metadata, dict) else None
+    return isinstance(tags, list) and FOR_CHECKS in tags
 
 
 def headings(markdown: str) -> list[tuple[int, str]]:

@@ -27,7 +27,7 @@ from nbgrader.preprocessors import (
     NbGraderPreprocessor,
 )
 
-from autograder.course.cells import blank_mark, without_hidden_tests
+from autograder.course.cells import blank_mark, for_checks, without_hidden_tests
 from autograder.course.lab import load_lab
 from autograder.gradebook import own_tables
 from autograder.gradebook.backup import back_up
@@ -185,8 +185,8 @@ class StableNotebook(NbGraderPreprocessor):  # type: ignore[misc]
                 cell.metadata.pop(key, None)
             if cell.cell_type == "code":
                 cell.outputs, cell.execution_count = [], None
-                if utils.is_grade(cell) and not utils.is_solution(cell):
-                    # A check is there to be run; whoever wants to read it opens the cell.
+                if (utils.is_grade(cell) and not utils.is_solution(cell)) or for_checks(cell):
+                    # It is there to be run; whoever wants to read it opens the cell.
                     cell.metadata["jupyter"] = {"source_hidden": True}
                 if utils.is_solution(cell):
                     cell.metadata["autograder"] = blank_mark(cell.source)

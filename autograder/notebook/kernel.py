@@ -29,7 +29,12 @@ if TYPE_CHECKING:
     from autograder.sandbox.running_program import RunningProgram
 
 _SCORED = re.compile(r"\bscore\(")
-_EXPECTS = re.compile(r"\bscore\(|\.(expect_|require)")
+_NOT_DEFINED = (
+    "A cell above this check defines `{name}`, and it has not been run since the kernel started. Choose "
+    "Run > Run All Above Selected Cell in the menu, and then run this check again."
+)
+"""A check is locked, so a name that it does not know is not the student's mistake; it happens after a restart."""
+_EXPECTS = re.compile(r"\bscore\(|\.(expect|require)")
 """How a cell that makes a check of something asks for a verdict."""
 _CELL_ID = re.compile(r"[A-Za-z0-9_-]{1,64}")
 """A cell's id as notebooks save it (nbformat); Visual Studio Code tells the address of a document in its place."""
@@ -94,6 +99,8 @@ class Kernel:
             self._forget_verdict()
         else:
             self._keep_verdict(result)
+            if self.scored and isinstance(result.error_in_exec, NameError):
+                print(_NOT_DEFINED.format(name=result.error_in_exec.name))
 
     def _end_block(self) -> None:
         """No launch of a block outlives its cell, wherever that was left."""

@@ -21,7 +21,16 @@ from autograder.checks.launch import Launch
 from autograder.checks.nouns import noun_given
 from autograder.core.errors import KitError
 from autograder.course.book import read_book
-from autograder.course.cells import MARK, BadNameError, grade_id_of, nbgrader_of, parse, source_of
+from autograder.course.cells import (
+    FOR_CHECKS,
+    MARK,
+    BadNameError,
+    for_checks,
+    grade_id_of,
+    nbgrader_of,
+    parse,
+    source_of,
+)
 from autograder.course.lab import Cell, Lab, lab_names, load_lab
 from autograder.course.paths import CoursePaths
 from autograder.course.settings import SETTINGS_FILE, read_settings
@@ -108,8 +117,10 @@ def _answer(cell: dict[str, Any]) -> Iterator[str]:
 
 
 def _outside(cell: dict[str, Any]) -> Iterator[str]:
-    """Markers that nothing cuts, because the cell is of another kind."""
+    """Markers that nothing cuts, and a tag that does nothing, because the cell is of another kind."""
     marks = nbgrader_of(cell)
+    if for_checks(cell) and (not marks.get("locked") or marks.get("grade") or marks.get("solution")):
+        yield f"it has the tag `{FOR_CHECKS}`, so it must be locked and neither a check nor an answer."
     found = {match[2] for match in MARK.finditer(source_of(cell))}
     if "SOLUTION" in found and not marks.get("solution"):
         yield "it contains a solution, but students do not fill it in, so they would receive the solution."

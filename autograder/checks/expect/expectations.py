@@ -2,25 +2,35 @@
 
 from __future__ import annotations
 
+import inspect
 import re
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from autograder import diagnosis
 from autograder.checks import outcomes, parts, seen
+from autograder.checks.misuse import Misuse
 from autograder.checks.running import Running
 from autograder.diagnosis import Scene
 from autograder.diagnosis.inside import Inside
 from autograder.diagnosis.programs import EXITED
+from autograder.diagnosis.spinning import NOT_SPINNING, SPINNING_ENDED
 from autograder.graph.observer import Observer
-from autograder.reasons import Reason
+from autograder.reasons import Group, Kind, Reason, kind_of_lab
+
+if TYPE_CHECKING:
+    from autograder.graph.actions import Goal  # loads numpy, which most labs do not need
 
 WITHIN = 10.0
 """Seconds that an expectation waits at the most: far beyond what a start takes on a busy machine."""
 
 GONE_WITHIN = 2.0
 """Seconds that an absence may take to show, for example after a node was stopped."""
+
+REQUIRED = Kind(
+    "required", "a fact that the check established does not hold; the check gave no code of its own", Group.OUTPUT
+)
 
 _POINTER = re.compile(r"\w, (?:sections? )?'[^']+'")
 """`Week 2, section 'Groups'`, whatever a course calls its parts."""
@@ -143,6 +153,40 @@ class Expectations:
         else:
             self._running.settle_programs()
             self._fail(title, diagnose(), expected=expected, observed=text, hint=hint)
+
+    def _require(
+        self,
+        condition: object,
+        title: str,
+        *,
+        expected: str = "",
+        observed: str = "",
+        because: str = "",
+        hint: str = "",
+        code: str = "",
+        evident: object = False,
+        node: str = "",
+        goal: Goal | None = None,
+    ) -> None:
+        """State a fact that the check has established; `ros.require` says what the arguments mean."""
+        if inspect.isroutine(condition):
+            raise Misuse("require: its condition is a function, and a function is always true; call it.")
+        if condition:
+            outcomes.passed(title, expected=expected, observed=observed)
+            return
+        self._running.settle_programs()
+        scene = self._scene()
+        found = (
+            diagnosis.program_trouble(scene),
+            diagnosis.why_no_result(scene, goal.name) if goal is not None and goal.empty_handed else None,
+            None if evident else diagnosis.inside_reason(scene, node),
+        )
+        # Where the check has a reason, these say less: they are what a program looks like that does nothing more.
+        vague = (EXITED, NOT_SPINNING, SPINNING_ENDED) if because else ()
+        trouble = next((one for one in found if one and one.kind not in vague), None)
+        kind = kind_of_lab(code) if code else REQUIRED
+        reason = trouble or (kind(because) if because else None)
+        self._fail(title, reason, expected=expected, observed=observed, hint=hint)
 
 
 class Noun(Expectations):

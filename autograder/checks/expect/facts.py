@@ -2,26 +2,18 @@
 
 from __future__ import annotations
 
-import inspect
 from typing import TYPE_CHECKING, Any
 
-from autograder import diagnosis
 from autograder.checks import outcomes
 from autograder.checks.expect.expectations import Expectations
 from autograder.checks.expect.topic import CONTENT
-from autograder.checks.misuse import Misuse
-from autograder.diagnosis.programs import EXITED
-from autograder.diagnosis.spinning import NOT_SPINNING, SPINNING_ENDED
-from autograder.reasons import Group, Kind, kind_of_lab
+from autograder.reasons import Group, Kind
 
 if TYPE_CHECKING:
     from autograder.checks.expect.goal import SentGoal
 
 ARGUMENT_NOT_NEEDED = Kind(
     "argument-not-needed", "a launch file runs without an argument that it should demand", Group.FILES
-)
-REQUIRED = Kind(
-    "required", "a fact that the check established does not hold; the check gave no code of its own", Group.OUTPUT
 )
 
 
@@ -66,24 +58,18 @@ class Facts(Expectations):
         Codes:
             `code`, by default `required` with a reason and `failed` without.
         """
-        if inspect.isroutine(condition):
-            raise Misuse("require: its condition is a function, and a function is always true; call it.")
-        if condition:
-            outcomes.passed(title, expected=expected, observed=observed)
-            return
-        self._running.settle_programs()
-        scene = self._scene()
-        found = (
-            diagnosis.program_trouble(scene),
-            diagnosis.why_no_result(scene, goal.name) if goal is not None and goal.seen.empty_handed else None,
-            None if evident else diagnosis.inside_reason(scene, node),
+        self._require(
+            condition,
+            title,
+            expected=expected,
+            observed=observed,
+            because=because,
+            hint=hint,
+            code=code,
+            evident=evident,
+            node=node,
+            goal=goal.seen if goal is not None else None,
         )
-        # Where the check has a reason, these say less: they are what a program looks like that does nothing more.
-        vague = (EXITED, NOT_SPINNING, SPINNING_ENDED) if because else ()
-        trouble = next((one for one in found if one and one.kind not in vague), None)
-        kind = kind_of_lab(code) if code else REQUIRED
-        reason = trouble or (kind(because) if because else None)
-        self._fail(title, reason, expected=expected, observed=observed, hint=hint)
 
     def require_equal(
         self, title: str, observed: Any, expected: Any, *, because: str = "", hint: str = "", code: str = CONTENT.code

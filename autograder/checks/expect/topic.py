@@ -351,6 +351,58 @@ class Topic(Sources):
         observed = shorten("; ".join(said if len(received) <= 4 else [*said[:2], "…", *said[2:]]))
         self._fail(wanted.title, CONTENT(wrong), observed=observed, hint=wanted.hint)
 
+    @waits_for("messages on `{name}`")
+    def expect_last(
+        self,
+        value: object,
+        title: str = "",
+        *,
+        times: int = 1,
+        within: float = WITHIN,
+        because: str = "",
+        code: str = CONTENT.code,
+        evident: object = False,
+        node: str = "",
+        hint: str = "",
+    ) -> None:
+        """The topic comes to say this: the `data` of its last message is this value.
+
+        Args:
+            value: of `data`.
+            title: what is required, as a sentence without its full stop.
+            times: so many of the last messages say it, one after the other.
+            within: seconds until they must.
+            because: what is wrong if they do not; by default what the last one says.
+            code: of that reason.
+            evident: as for `ros.require`, like `node`.
+            node: full name of a node: what its program waits for is a reason.
+            hint: a pointer for the student.
+
+        Example:
+            `ros.topic("/health", String).expect_last("ok", within=8)`
+
+        Codes:
+            `code`, by default `content`, and errors in callbacks.
+        """
+        heard = self.listen()
+
+        def last() -> list[Any]:
+            return [getattr(received.msg, "data", received.msg) for received in heard.messages[-times:]]
+
+        came = self._wait(lambda: last() == [value] * times, within)
+        said = ", ".join(map(str, last())) or "nothing"
+        self._require(
+            came,
+            title or f"`{self.name}` says `{value}`",
+            expected=str(value) + f", {times} times" * (times > 1),
+            observed=said,
+            because=because or f"After {within:g} s, the last of its messages says `{said}`.",
+            code=code,
+            evident=evident,
+            node=node,
+            hint=hint,
+        )
+
     @waits_for("silence on `{name}`")
     def expect_silence(self, *, for_seconds: float = 1.0, because: str = "", code: str = "", hint: str = "") -> None:
         """Nothing arrives on the topic from now on, whatever came before and is already under way.
