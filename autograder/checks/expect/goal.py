@@ -94,7 +94,7 @@ class SentGoal(Meanwhile):
             the result message.
 
         Example:
-            `sequence = ros.expect_result(goal).sequence`
+            `sequence = goal.expect_result().sequence`
 
         Codes:
             `execute-exception`, `no-succeed`, `execute-return`, `message-field`, `goal-status`, `goal-unfinished`, and
@@ -141,7 +141,7 @@ class SentGoal(Meanwhile):
             the result message.
 
         Example:
-            `where = ros.expect_canceled(goal).sequence`
+            `where = goal.expect_canceled().sequence`
 
         Codes:
             `cancel-refused`, `no-cancel-callback`, `cancel-return`, `goal-holds-thread`, `goal-holds-group`,
@@ -209,7 +209,7 @@ class SentGoal(Meanwhile):
             the feedback messages.
 
         Example:
-            `ros.expect_feedback(goal, at_least=5, rate=10)`
+            `goal.expect_feedback(at_least=5, rate=10)`
 
         Codes:
             `no-feedback`, `goal-feedback`, `rate`, `content`, and those of `expect_result`.

@@ -188,7 +188,7 @@ class StartedProgram(Noun):
             hint: a pointer for the student.
 
         Example:
-            `ros.expect_running("talker")`
+            `ros.program("talker").expect_running()`
 
         Codes:
             `crashed`, `exited` and other reasons why a program ends.
@@ -211,7 +211,7 @@ class StartedProgram(Noun):
             hint: a pointer for the student.
 
         Example:
-            `ros.expect_exit("stopper", status=0)`
+            `ros.program("stopper").expect_exit(status=0)`
 
         Codes:
             `still-running`, `exit-status`, `shutdown-in-callback`, and reasons why a program ends or does not.
@@ -272,7 +272,7 @@ class StartedProgram(Noun):
             hint: a pointer for the student.
 
         Example:
-            `ros.expect_clean_end("talker", by="SIGTERM")`
+            `ros.program("talker").expect_clean_end(by="SIGTERM")`
 
         Codes:
             `signal-ignored`, `unclean-end`, and those of `expect_running`.
