@@ -44,7 +44,7 @@ BIN = Path(sys.prefix) / "bin"
 PLAIN_LAUNCH = """
 import os, signal, subprocess, sys, tempfile
 from pathlib import Path
-from autograder.checks import runtime
+from autograder.checks import current
 
 
 class PlainProgram:
@@ -114,7 +114,7 @@ class PlainPrograms:
     close = end
 
 
-runtime.current._sandbox = PlainPrograms()
+current.check._sandbox = PlainPrograms()
 """
 
 
@@ -219,7 +219,7 @@ def alone(folder: Path, lab_name: str) -> Measured:
 def observers(launches: int, seconds: float) -> float:
     """CPU seconds of the observers of so many launches, each of which sees nothing for so long."""
     watch = (
-        "import time\nfrom autograder.checks import runtime\nfrom autograder.graph.observer import Observer\n"
+        "import time\nfrom autograder.checks import current\nfrom autograder.graph.observer import Observer\n"
         f"began = time.process_time()\nfor _ in range({launches}):\n"
         f"    one = Observer(7)\n    one.pause({seconds})\n    one.close()\nprint(time.process_time() - began)\n"
     )

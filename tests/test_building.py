@@ -15,7 +15,7 @@ import pytest
 from boxes import ROOT
 from test_run_again import crowded_cpu  # noqa: F401  a fixture
 
-from autograder.checks import build, runtime
+from autograder.checks import build, current
 from autograder.core.results import CheckResult, Isolation, Status
 from autograder.course.lab import Cell
 from autograder.grading.builds import with_interfaces
@@ -513,11 +513,11 @@ def test_without_a_compiler_nothing_is_decided_and_the_reason_is_told(
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_text(text)
     monkeypatch.setenv("PATH", str(tmp_path))
-    runtime.current.configure(tmp_path, Isolation.NONE, 1)
+    current.check.configure(tmp_path, Isolation.NONE, 1)
     with build("things") as things, things.part("a part"):
         things.expect_built()
     score = things.score({"a part": 1})
-    runtime.current.configure(tmp_path, Isolation.NONE, 1)
+    current.check.configure(tmp_path, Isolation.NONE, 1)
     assert score.result.points is None
     assert [one.status for one in score.result.outcomes] == [Status.UNKNOWN]
     assert "a C compiler" in score.result.outcomes[0].because
@@ -586,7 +586,7 @@ def test_a_build_about_which_nothing_is_known_raises_a_flag(tmp_path: Path, monk
         (tmp_path / name).write_text(text)
     monkeypatch.setattr(sandbox_build._Watched, "had_no_chance", True)
     monkeypatch.setattr(sandbox_build, "BUILD_SECONDS", 0.1)
-    runtime.current.configure(tmp_path, Isolation.NONE, 1)
+    current.check.configure(tmp_path, Isolation.NONE, 1)
     with build("sensors") as sensors:
         sensors.expect_built()
     score = sensors.score(1)
@@ -606,7 +606,7 @@ def test_a_build_that_the_system_ends_each_time_costs_nothing_and_raises_a_flag(
     for name, text in package("sensors", {**SENSORS, "setup.py": setup}).items():
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_text(text)
-    runtime.current.configure(tmp_path, Isolation.NONE, 1)
+    current.check.configure(tmp_path, Isolation.NONE, 1)
     with build("sensors") as sensors:
         sensors.expect_built()
     score = sensors.score(1)

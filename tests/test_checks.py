@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from autograder.checks import runtime
+from autograder.checks import current
 from autograder.core.results import CheckResult, Isolation, Outcome, Status
 from autograder.grading.job import Cell, Job
 from autograder.grading.worker import run_job
@@ -84,7 +84,7 @@ def grade(tmp_path: Path) -> Iterator[Grade]:
         return result
 
     yield run
-    runtime.current.close()
+    current.check.close()
     linecache.clearcache()
 
 
@@ -129,7 +129,8 @@ def test_a_right_node_earns_the_points_under_names_and_values_that_vary(grade: G
          'ros.topic("/chatter", String).expect_messages(within=6)', "not-spinning", "nothing spins"),
         ("        self.count = 0", "        self.count = nothing", 'ros.node("/talker").expect()', "crashed",
          "self.count = nothing"),
-        ("        self.count = 0", "        self.handle = 0", 'ros.node("/talker").expect()', "crashed", "another name"),
+        ("        self.count = 0", "        self.handle = 0", 'ros.node("/talker").expect()', "crashed",
+         "another name"),
         ("        self.count = 0", "        self.timers = []", 'ros.node("/talker").expect()', "crashed",
          "needs another name"),
         ("def tick(self):", "def tick(self):\n        self.handle = 0",
@@ -148,7 +149,8 @@ def test_a_right_node_earns_the_points_under_names_and_values_that_vary(grade: G
         ("        return response", "        return", 'ros.service("/how_many", Trigger).call(Trigger.Request())',
          "service-no-return",
          "did not return the response"),
-        ("response.success = True", "raise ValueError('no')", 'ros.service("/how_many", Trigger).call(Trigger.Request())',
+        ("response.success = True", "raise ValueError('no')",
+         'ros.service("/how_many", Trigger).call(Trigger.Request())',
          "service-exception", "ValueError: no"),
         ("self.count += 1", "self.count += 1; self.count == 60 and self.get_logger().info('tick')",
          'ros.topic("/rosout", Log).expect_messages(at_least=3, within=6)', "too-few",
@@ -864,8 +866,9 @@ def test_the_fields_that_a_check_looked_at_stand_first_in_what_was_observed(grad
         """\
         from sensor_msgs.msg import Range
         with launch("talker") as ros:
-            ros.topic("/chatter", Range).expect_messages()
-            ros.topic("/chatter", Range).expect_messages(where=lambda m: m.range > 3 and m.header.frame_id == "x", within=2)
+            chatter = ros.topic("/chatter", Range)
+            chatter.expect_messages()
+            chatter.expect_messages(where=lambda m: m.range > 3 and m.header.frame_id == "x", within=2)
         ros.score(2)
         """,
         talker__py=program,
@@ -942,7 +945,7 @@ launch:
     params = "/veh/robot:\n  ros__parameters: {word: from the file}\n"
     result = grade(check, robot__py=f"import os\n{program}", a__launch__yaml=launched, p__yaml=params)
     assert result.points == 2.0, result
-    assert not list(runtime.current.folder.glob(".launch_params_*"))
+    assert not list(current.check.folder.glob(".launch_params_*"))
 
 
 def test_a_parameter_file_that_ros2_launch_would_not_find_is_the_reason(grade: Grade) -> None:

@@ -35,11 +35,11 @@ MEMBERS = [(lab, student) for lab in LABS for student in sample_class.students(l
 ALONE = "the solution, with each check's own files alone"
 SETTINGS = Settings(force=True, jobs=4 * len(os.sched_getaffinity(0)))
 LEAVE_ONLY = """
-from autograder.checks.runtime import current
+from autograder.checks import current
 for name, text in {files!r}.items():
-    (current.folder / name).unlink(missing_ok=True)
+    (current.check.folder / name).unlink(missing_ok=True)
     if name in {kept!r}:
-        (current.folder / name).write_text(text, encoding="utf-8")
+        (current.check.folder / name).write_text(text, encoding="utf-8")
 """
 TRIES_ALONE = 5
 Grade = Callable[[threading.Event], SubmissionResult]

@@ -13,7 +13,7 @@ import pytest
 from diagnosis_cases import CASES, Case
 
 import autograder.diagnosis
-from autograder.checks import Program, launch, runtime
+from autograder.checks import Program, current, launch
 from autograder.core.results import Isolation
 from autograder.diagnosis import Scene
 from autograder.diagnosis.events import read
@@ -38,7 +38,7 @@ def answers(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, tupl
     folder = tmp_path_factory.mktemp("programs")
     for name, case in CASES.items():
         (folder / f"{name}.py").write_text(case.source(name))
-    runtime.current.configure(folder, Isolation.NONE, 7)
+    current.check.configure(folder, Isolation.NONE, 7)
     found: dict[str, tuple[Reason | None, str]] = {}
     names = list(CASES)
     for start in range(0, len(names), TOGETHER):
@@ -62,7 +62,7 @@ def answers(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, tupl
             for name in batch:
                 ros.wait(lambda: answered(name), 30.0)  # noqa: B023
     yield found
-    runtime.current.close()
+    current.check.close()
 
 
 def _told(case: Case, said: Reason) -> bool:
@@ -115,13 +115,13 @@ rclpy.spin(rclpy.create_node("twin"))
 
 def test_where_a_program_runs_twice_the_node_of_one_is_not_the_misplaced_node_of_the_other(tmp_path: Path) -> None:
     (tmp_path / "twin.py").write_text(LATE)
-    runtime.current.configure(tmp_path, Isolation.NONE, 7)
+    current.check.configure(tmp_path, Isolation.NONE, 7)
     with launch(Program("twin", namespace="/first"), Program("twin", namespace="/late"), Program("twin")) as ros:
         ros.wait(lambda: {"/first/twin", "/twin"} <= set(ros.graph.nodes()), 20.0)
         ros.wait(lambda: all(inside.attached for inside in ros._running.scene().insides), 20.0)
         scene = ros._running.scene()
         late, astray = [autograder.diagnosis.why_no_node(scene, f"/{where}/twin") for where in ("late", "astray")]
-    runtime.current.close()
+    current.check.close()
     assert late.code == "no-node" and "runs, but" in late.because
     assert astray.code == "namespace" and "namespace: `/twin`." in astray.because
 
@@ -136,13 +136,13 @@ rclpy.spin(rclpy.create_node(sys.argv[1]))
 
 def test_a_node_that_lies_a_namespace_too_deep_is_found_beside_another_run_of_its_program(tmp_path: Path) -> None:
     (tmp_path / "camera.py").write_text(SIDES)
-    runtime.current.configure(tmp_path, Isolation.NONE, 7)
+    current.check.configure(tmp_path, Isolation.NONE, 7)
     right = Program("camera", namespace="/car", arguments_of_its_own=("right",))
     left = Program("camera", namespace="/car/car", arguments_of_its_own=("left",))  # two `push_ros_namespace`
     with launch(right, left) as ros:
         ros.wait(lambda: {"/car/right", "/car/car/left"} <= set(ros.graph.nodes()), 30.0)
         ros.wait(lambda: all(inside.nodes for inside in ros._running.scene().insides), 30.0)
         found = autograder.diagnosis.why_no_node(ros._running.scene(), "/car/left")
-    runtime.current.close()
+    current.check.close()
     assert found.code == "namespace" and "another namespace: `/car/car/left`." in found.because
     assert "adds a level" in found.hint

@@ -20,7 +20,7 @@ import yaml
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from autograder.checks import findings, runtime
+from autograder.checks import current
 from autograder.checks.command_line import command_line
 from autograder.checks.forms import NAME_OR_NONE
 from autograder.core.errors import KitError
@@ -249,10 +249,10 @@ FORMS = {"number": range(1, 9), "word": ["yes", "no"], "name": NAME_OR_NONE, "wo
 @settings(max_examples=50, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
 @given(text=tables | st.text(max_size=40).map(lambda text: f"number: {text}\nword: {text}"))
 def test_no_table_leaves_a_check_undecided(text: str, tmp_path: Path) -> None:
-    before = runtime.current.folder
-    runtime.current.configure(tmp_path, Isolation.NONE, seed=1)
+    before = current.check.folder
+    current.check.configure(tmp_path, Isolation.NONE, seed=1)
     (tmp_path / "table.yaml").write_bytes(text.encode("utf-8", "replace"))
-    findings.current.reset()
+    current.check.findings.reset()
     try:
         exec(CHECK, globals() | {"scores": (scores := [])})
         result = scores[0].result
@@ -260,8 +260,8 @@ def test_no_table_leaves_a_check_undecided(text: str, tmp_path: Path) -> None:
         with contextlib.suppress(Refused):
             command_line("table.yaml", "word").words()
     finally:
-        runtime.current.configure(before, Isolation.NONE, seed=1)
-        findings.current.reset()
+        current.check.configure(before, Isolation.NONE, seed=1)
+        current.check.findings.reset()
 
 
 WHOLE = io.BytesIO()

@@ -187,12 +187,12 @@ def test_the_tab_key_offers_magics_programs_and_the_words_of_ros2(
 
 
 def test_each_cell_begins_with_no_findings(shell: InteractiveShell) -> None:
-    from autograder.checks import findings
+    from autograder.checks import current
     from autograder.core.results import Outcome, Status
 
-    findings.current.outcomes.append(Outcome(status=Status.PASSED, title="left over"))
+    current.check.findings.outcomes.append(Outcome(status=Status.PASSED, title="left over"))
     shell.run_cell("1")
-    assert findings.current.outcomes == []
+    assert current.check.findings.outcomes == []
 
 
 def new_kernel(shell: InteractiveShell, manifest: Path | None) -> Kernel:
@@ -606,7 +606,8 @@ def test_a_nodes_output_streams_while_a_cell_explores(notebook: Notebook) -> Non
 
 def test_a_cell_that_only_looks_has_no_verdict_but_for_what_failed(notebook: Notebook) -> None:
     write(notebook)
-    looks = 'with launch("talker", "talker") as ros:\n    ros.service("/nothing", Trigger).call(Trigger.Request(), within=1)'
+    looks = 'with launch("talker", "talker") as ros:\n'
+    looks += '    ros.service("/nothing", Trigger).call(Trigger.Request(), within=1)'
     assert "passed" not in notebook.run('with launch("talker") as ros:\n    ros.graph.wait(ros.graph.nodes)').text
     shown = notebook.run(f"from std_srvs.srv import Trigger\n{looks}")
     assert "✗ failed" in shown.text
@@ -726,7 +727,7 @@ def test_an_interrupted_check_has_no_verdict_wherever_that_finds_it(notebook: No
     while int(notebook.run(threads).text) > before and time.monotonic() < deadline:
         pass
     assert int(notebook.run(threads).text) <= before
-    assert notebook.run("from autograder.checks import runtime\nprint(runtime.current.block)").text == "None\n"
+    assert notebook.run("from autograder.checks import current\nprint(current.check.block)").text == "None\n"
     assert notebook.run(CHECK).result == whole.result
 
 
@@ -759,7 +760,7 @@ def test_a_start_that_is_interrupted_leaves_nothing_running(notebook: Notebook) 
     notebook.run("%%node quiet\nimport time\ntime.sleep(600)")
     while not notebook.run('robot = launch("quiet").start()', interrupt_after=2.0).error:
         pass  # it waits for five seconds for a node; the machine is slow
-    assert notebook.run("from autograder.checks import runtime\nprint(runtime.current.robot)").text == "None\n"
+    assert notebook.run("from autograder.checks import current\nprint(current.check.robot)").text == "None\n"
 
 
 def test_an_interrupted_command_ends_its_cell(notebook: Notebook) -> None:

@@ -166,7 +166,8 @@ def test_what_is_allowed_in_a_message_is_no_reason_for_a_check_that_breaks(grade
 
 def test_what_the_check_itself_sends_is_no_reason_for_its_breaking(grade: Grade) -> None:  # noqa: F811
     subscribes = "node.create_subscription(Float64, 'own', print, 10)"
-    more = "ros.publisher('/own', Float64).publish(Float64(data=float('nan'))); ros.topic('/own', Float64).expect_messages(); [][0]"
+    more = "ros.publisher('/own', Float64).publish(Float64(data=float('nan')));"
+    more += " ros.topic('/own', Float64).expect_messages(); [][0]"
     result = sent(grade, "std_msgs/Float64", subscribes, more)
     assert result.points is None and len(result.flags) == 1, result
 

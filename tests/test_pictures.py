@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from std_msgs.msg import String
 
-from autograder.checks import findings, launch, runtime
+from autograder.checks import current, launch
 from autograder.core.results import CellResult, Isolation, Outcome, Status
 from autograder.pictures import (
     Endpoint,
@@ -176,12 +176,12 @@ rclpy.spin(Robot())
 def programs(tmp_path: Path) -> Iterator[Path]:
     """A folder with a program; what a check finds is forgotten at the end."""
     (tmp_path / "robot.py").write_text(TWO_TIMERS)
-    runtime.current.configure(tmp_path, Isolation.NONE, seed=1)
-    findings.current.reset()
+    current.check.configure(tmp_path, Isolation.NONE, seed=1)
+    current.check.findings.reset()
     yield tmp_path
-    findings.current.reset()
-    runtime.current.close()
-    runtime.current.__init__()  # type: ignore[misc]
+    current.check.findings.reset()
+    current.check.close()
+    current.check.__init__()  # type: ignore[misc]
 
 
 def test_a_launch_draws_what_its_programs_did(programs: Path) -> None:

@@ -14,7 +14,7 @@ from std_msgs.msg import String
 
 from autograder.arguments import params_file, remap_rules, rule_effect
 from autograder.arguments.rule_effect import RULE_WITHOUT_MATCH
-from autograder.checks import command_line, runtime
+from autograder.checks import command_line, current
 from autograder.core.results import Isolation
 from autograder.reasons import Refused
 
@@ -242,10 +242,10 @@ def test_nested_keys_of_a_parameter_file_are_joined() -> None:
 
 @pytest.fixture
 def table(tmp_path: Path) -> Iterator[Path]:
-    before = runtime.current.folder
-    runtime.current.configure(tmp_path, Isolation.NONE, seed=1)
+    before = current.check.folder
+    current.check.configure(tmp_path, Isolation.NONE, seed=1)
     yield tmp_path / "rules.yaml"
-    runtime.current.configure(before, Isolation.NONE, seed=1)
+    current.check.configure(before, Isolation.NONE, seed=1)
 
 
 @pytest.mark.parametrize(

@@ -65,7 +65,8 @@ for number in range(2):
 
 @pytest.mark.skipif(not preflight().full, reason="without full isolation /dev/shm is the machine's")
 def test_a_program_that_maps_more_than_there_is_room_for_is_told_the_limit() -> None:
-    check = 'from autograder.checks import launch\nwith launch("fills") as ros:\n    ros.program("fills").expect_exit(status=0)\n'
+    check = 'from autograder.checks import launch\nwith launch("fills") as ros:\n'
+    check += '    ros.program("fills").expect_exit(status=0)\n'
     given = job(check + "score(1)", files={"fills.py": FILLS}).model_copy(update={"isolation": Isolation.FULL})
     (result,) = run_in_worker(given).checks
     assert result.points == 0 and result.first_failure is not None
@@ -225,7 +226,8 @@ time.sleep({8 if times == 1 else 60})
         result = run_in_worker(
             job(
                 "from autograder.checks import launch\n"
-                "with launch('victim') as ros:\n    ros.program('victim').expect_exit(status=0, within=60)\nros.score(1)",
+                "with launch('victim') as ros:\n"
+                "    ros.program('victim').expect_exit(status=0, within=60)\nros.score(1)",
                 files={"victim.py": program},
             )
         )

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from autograder.checks import findings, outcomes, runtime
+from autograder.checks import current, outcomes
 from autograder.checks.command_line import UNANSWERED
 from autograder.checks.forms import NAME_OR_NONE, allowed, begins_with_slash, is_seal, misses, one_of, same, seal
 from autograder.checks.misuse import Misuse
@@ -50,7 +50,7 @@ class Answers:
         self._questions: dict[str, None] = {}
 
     def __enter__(self) -> Answers:
-        findings.current.begin_block()
+        current.check.findings.begin_block()
         return self
 
     def __exit__(self, kind: object, error: BaseException | None, trace: object) -> bool:
@@ -61,12 +61,12 @@ class Answers:
         if self._table:
             return
         title = f"`{self.file}` is a table of answers"
-        here = runtime.current.front_end
+        here = current.check.front_end
         if here is not None and not here.has(self.file):
             because, hint = here.why_missing("file", self.file)
             outcomes.failed(title, FILE_MISSING(because, hint))
         try:
-            table = student_yaml.read(runtime.current.use(self.file), table=True)
+            table = student_yaml.read(current.check.use(self.file), table=True)
         except Refused as error:
             outcomes.failed(title, replace(error.reason, hint=error.reason.hint or _LINES))
         if not isinstance(table, dict) or not table:
@@ -129,7 +129,7 @@ class Answers:
 
     def _lost(self, question: str) -> bool:
         """Whether it has been said already that there is no usable answer."""
-        found = findings.current.outcomes[findings.current.block_began :]
+        found = current.check.findings.outcomes[current.check.findings.block_began :]
         return any(outcome.part == question and outcome.status is Status.FAILED for outcome in found)
 
     def expect_sealed(self, answers: Mapping[str, str], hint: str = "") -> None:

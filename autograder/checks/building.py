@@ -8,7 +8,7 @@ from contextlib import AbstractContextManager
 from dataclasses import replace
 from typing import NoReturn
 
-from autograder.checks import findings, outcomes, runtime
+from autograder.checks import current, outcomes
 from autograder.checks.parts import part
 from autograder.checks.scoring import Score, score
 from autograder.graph.names import nearest
@@ -38,8 +38,8 @@ class Package:
         self._built: Built | None = None
 
     def __enter__(self) -> Package:
-        findings.current.begin_block()
-        runtime.current.use_package(self.name)
+        current.check.findings.begin_block()
+        current.check.use_package(self.name)
         return self
 
     def __exit__(self, kind: object, error: BaseException | None, trace: object) -> bool:
@@ -114,7 +114,7 @@ class Package:
         """
         title = f"package.xml names {', '.join(f'`{one}`' for one in packages)} as needed at run time"
         title += f", and {', '.join(f'`{one}`' for one in to_build)} to build it" * bool(to_build)
-        sources = runtime.current.workspace.source(self.name)
+        sources = current.check.workspace.source(self.name)
         reason = missing_package(self.name) or not_described(sources, self.name)
         if reason is not None:
             self._fail(title, reason, hint)
@@ -215,7 +215,7 @@ class Package:
 
     def _build(self) -> Built:
         if self._built is None:
-            self._built = runtime.current.workspace.build(self.name)
+            self._built = current.check.workspace.build(self.name)
         return self._built
 
     def _ready(self, title: str, hint: str) -> Built:
@@ -223,7 +223,7 @@ class Package:
         reason = missing_package(self.name)
         if reason is None:
             built = self._build()
-            reason = why_not_built(built, runtime.current.workspace.source(self.name))
+            reason = why_not_built(built, current.check.workspace.source(self.name))
             if reason is None:
                 return built
         self._fail(title, reason, hint)
@@ -241,7 +241,7 @@ def _not_named(package: str, when: str, named: Sequence[str], tag: str) -> Reaso
 
 def missing_package(name: str) -> Reason | None:
     """Why a package cannot be built at all; None if it can be tried."""
-    if runtime.current.workspace.source(name).is_dir():
+    if current.check.workspace.source(name).is_dir():
         return None
     first = f"%%file src/{name}/package.xml"
     because = f"There is no package `{name}`: no cell that begins with `{first}` or the like has been run."
@@ -250,14 +250,14 @@ def missing_package(name: str) -> Reason | None:
 
 def why_no_package(name: str) -> Reason | None:
     """Build a package; None if that went well, or why not."""
-    runtime.current.use_package(name)
-    space = runtime.current.workspace
+    current.check.use_package(name)
+    space = current.check.workspace
     return missing_package(name) or why_not_built(space.build(name), space.source(name))
 
 
 def why_not_found(package: str, name: str) -> Reason | None:
     """Why a package that is built has no executable of a name; None if it has."""
-    return why_no_executable(runtime.current.workspace.build(package), name)
+    return why_no_executable(current.check.workspace.build(package), name)
 
 
 def _by_colcon_alone(path: str, log: str) -> bool:

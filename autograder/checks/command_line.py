@@ -7,7 +7,7 @@ import shlex
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-from autograder.checks import runtime
+from autograder.checks import current
 from autograder.core import student_yaml
 from autograder.core.student_yaml import YAML_REFUSED
 from autograder.graph.names import nearest
@@ -77,7 +77,7 @@ class CommandLine:
 
     def _text(self) -> str:
         try:
-            table = student_yaml.read(runtime.current.use(self.file), table=True)
+            table = student_yaml.read(current.check.use(self.file), table=True)
         except Refused as error:
             raise Refused(replace(error.reason, hint=error.reason.hint or "Write `entry: words`.")) from None
         text = table.get(self.entry) if isinstance(table, dict) else None

@@ -1,7 +1,7 @@
 """What has been found out since the last score: the outcomes and logs that one check cell collects.
 
-A check cell may launch several times; its score speaks for all of them. One process runs one cell at a time, so
-there is one current collection, and it is started afresh for each cell.
+A check cell may launch several times; its score speaks for all of them. The collection is started afresh for each
+cell.
 """
 
 from __future__ import annotations
@@ -67,6 +67,3 @@ class Findings:
     def seconds(self) -> float:
         """How long ago the cell, or what comes after its last score, began."""
         return time.monotonic() - self._began
-
-
-current = Findings()

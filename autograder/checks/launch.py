@@ -12,7 +12,7 @@ from typing import Any, Self
 
 from rclpy.qos import QoSProfile
 
-from autograder.checks import contradictions, findings, outcomes, runtime, seen
+from autograder.checks import contradictions, current, outcomes, seen
 from autograder.checks.building import why_no_package, why_not_found
 from autograder.checks.expect.action import Action
 from autograder.checks.expect.activity import Activity
@@ -75,16 +75,16 @@ class Launch(Facts):
         self._entered = self._over = False
 
     def __enter__(self) -> Launch:
-        if runtime.current.block is not None:
+        if current.check.block is not None:
             raise Misuse("A launch begins inside another one; let the first block end before.")
-        runtime.current.block = self._enter()
+        current.check.block = self._enter()
         return self
 
     def _enter(self) -> Robot:
         """Begin to watch, and start the programs."""
         if self._entered:
             raise Misuse("This launch has run already; call launch(…) again for another one.")
-        here = runtime.current.front_end
+        here = current.check.front_end
         if here is not None:
             here.ready()
         domain = claim_domain()
@@ -92,11 +92,13 @@ class Launch(Facts):
         os.environ.update(profile_environment())
         os.environ.pop("ROS_AUTOMATIC_DISCOVERY_RANGE", None)
         try:
-            self._running.observer = Observer(domain.id, findings.current.patience, domain.release)
+            self._running.observer = Observer(
+                domain.id, current.check.findings.patience, domain.release, current.check.bag
+            )
         except RuntimeError as error:  # rclpy's RCLError is one
             raise no_threads("the launch") or error from None
         self._entered = True
-        findings.current.begin_block()
+        current.check.findings.begin_block()
         try:
             if here is not None:
                 self._running.watcher = here.watch(
@@ -116,7 +118,7 @@ class Launch(Facts):
         """Listen, and then start the programs."""
         if not self._build():
             return
-        self._group = runtime.current.sandbox.group()
+        self._group = current.check.sandbox.group()
         for topic, msg_type in self._listen:
             self._observer.record(topic, msg_type)
         for offer in self._serve:
@@ -152,7 +154,7 @@ class Launch(Facts):
         if node is None:
             refuse_to_start(self._running.described)
             make_room()
-            runtime.current.robot = robot = self._enter()
+            current.check.robot = robot = self._enter()
             try:
                 robot.wait_for_nodes()
             except BaseException:  # the cell has no name for it yet, by which it could be stopped
@@ -168,15 +170,15 @@ class Launch(Facts):
     def _start(self, node: Program | str) -> None:
         launched = Program(node) if isinstance(node, str) else node
         file = file_of(launched)
-        runtime.current.use(file)
+        current.check.use(file)
         if launched.params_file:
-            runtime.current.use(launched.params_file)
+            current.check.use(launched.params_file)
         if launched.package:
             reason = why_not_found(launched.package, launched.program)
             if reason is not None:
                 self._running.trouble.append(reason)
                 return
-        elif not runtime.current.has(file):
+        elif not current.check.has(file):
             self._miss(launched.program)
             return
         words = words_of(launched)
@@ -193,7 +195,7 @@ class Launch(Facts):
 
     def _miss(self, program: str) -> None:
         """No cell has written this program."""
-        if runtime.current.front_end is None:
+        if current.check.front_end is None:
             self._running.missing.append(program)
         else:
             self._running.trouble.append(why_missing(program))
@@ -439,7 +441,7 @@ class Launch(Facts):
         return log_of([one for _, one in self._running.programs], program)
 
     def __repr__(self) -> str:
-        if self._robot is not None and runtime.current.robot is self._robot:
+        if self._robot is not None and current.check.robot is self._robot:
             return str(self._robot)
         if self._over:
             return "This launch has ended; .log() says what its programs printed."
@@ -448,7 +450,7 @@ class Launch(Facts):
 
     def _ipython_display_(self) -> None:
         """As the last line of a cell: run for a moment and show what happens."""
-        here = runtime.current.front_end
+        here = current.check.front_end
         if self._entered or here is None:
             if here is None or self._robot is None or here.number != self._robot.cell:
                 print(self)
@@ -494,16 +496,16 @@ class Launch(Facts):
             self._look_back()
         finally:
             self._close()
-        findings.current.logs += self._running.logs(ended)
+        current.check.findings.logs += self._running.logs(ended)
 
     def _look_back(self) -> None:
         """Keep what only the running programs show: in a notebook for a picture, else what contradicts itself."""
-        if runtime.current.front_end is not None:
+        if current.check.front_end is not None:
             with contextlib.suppress(ForgedGraph):
                 self._running.graph = seen.graph(self._observer)
             return
         varied = [node.may_vary_names() for node, _ in self._running.programs]
-        findings.current.flags += contradictions.flags(self._scene(), self._running.overlaps, varied)
+        current.check.findings.flags += contradictions.flags(self._scene(), self._running.overlaps, varied)
 
     def _close(self) -> None:
         """End the programs and everything that watched them."""
@@ -513,10 +515,10 @@ class Launch(Facts):
             if self._running.watcher is not None:
                 self._running.watcher.close()
         finally:
-            if runtime.current.block is self._robot:
-                runtime.current.block = None
-            if runtime.current.robot is self._robot:
-                runtime.current.robot = None
+            if current.check.block is self._robot:
+                current.check.block = None
+            if current.check.robot is self._robot:
+                current.check.robot = None
             self._observer.close()
-            remove_written(runtime.current.folder)
+            remove_written(current.check.folder)
             remove_logs()

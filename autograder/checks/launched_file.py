@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from autograder.checks import runtime
+from autograder.checks import current
 from autograder.checks.program import Program
 from autograder.launch_files import declared_arguments, read_launch_file
 from autograder.packages.built import Built
@@ -29,7 +29,7 @@ class LaunchedFile:
 
     def packages(self) -> list[str]:
         """The package, if the student writes it as one that is built."""
-        return [self.package] if runtime.current.workspace.source(self.package).is_dir() else []
+        return [self.package] if current.check.workspace.source(self.package).is_dir() else []
 
     def nodes(self) -> list[Program]:
         """What the file starts.
@@ -37,7 +37,7 @@ class LaunchedFile:
         Raises:
             Refused: it cannot be read.
         """
-        built, home = self._built(), runtime.current.folder.resolve()
+        built, home = self._built(), current.check.folder.resolve()
         folder = self._folder()
 
         def find(wanted: str) -> Path:
@@ -46,7 +46,7 @@ class LaunchedFile:
             return folder
 
         programs = set(built.executables if built else self.stand_ins) or {path.stem for path in folder.glob("*.py")}
-        runtime.current.use(self.name)
+        current.check.use(self.name)
         found = read_launch_file(self._path(), self.arguments, find, programs, self.includes, self.namespace)
         return [
             self._stand_in(
@@ -68,12 +68,12 @@ class LaunchedFile:
         return [name for name in self.arguments if name not in declared]
 
     def _built(self) -> Built | None:
-        return runtime.current.workspace.build(self.package) if self.packages() else None
+        return current.check.workspace.build(self.package) if self.packages() else None
 
     def _folder(self) -> Path:
         """The folder of the package's files: the installed one, if the package is built."""
         built = self._built()
-        return built.folder.resolve() / "share" / self.package if built else runtime.current.folder.resolve()
+        return built.folder.resolve() / "share" / self.package if built else current.check.folder.resolve()
 
     def _path(self) -> Path:
         built = self._built()

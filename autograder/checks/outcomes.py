@@ -12,7 +12,7 @@ from pathlib import Path
 from types import FrameType
 from typing import NoReturn
 
-from autograder.checks import findings, runtime, unusable
+from autograder.checks import current, unusable
 from autograder.checks.misuse import place_of
 from autograder.core.errors import KitError
 from autograder.core.results import Outcome, Picture, Status
@@ -76,7 +76,7 @@ def ends_block(error: BaseException | None, ran: bool = False) -> bool:
             failed_as_a_whole("The ROS graph can be read", FORGED_GRAPH(_FORGED))
         return True
     if isinstance(error, KitError):  # such as a machine without a compiler
-        if ran or runtime.current.block is not None:  # what the student wrote may have brought it about
+        if ran or current.check.block is not None:  # what the student wrote may have brought it about
             _flag(error)
         unknown("This can be found out on this machine", " ".join(part for part in (error.what, error.do) if part))
         return True
@@ -85,7 +85,7 @@ def ends_block(error: BaseException | None, ran: bool = False) -> bool:
         _record(_failure(_USABLE, UNUSABLE_DATA(because)))
         _void_parts()
         return True
-    if runtime.current.front_end is not None or not isinstance(error, Exception):
+    if current.check.front_end is not None or not isinstance(error, Exception):
         return False
     place = place_of(error, _is_cells)
     _flag(error)
@@ -103,7 +103,7 @@ def ends_part(error: Exception) -> bool:
 
 
 def _flag(error: BaseException) -> None:
-    if runtime.current.front_end is None:
+    if current.check.front_end is None:
         unusable.broke(error, place_of(error, _is_cells))
 
 
@@ -154,7 +154,7 @@ def failed(
     """
     _record(_failure(title, reason, expected, observed).model_copy(update={"picture": picture}))
     _rest_not_checked()
-    if findings.current.part:
+    if current.check.findings.part:
         raise CheckEnded(title)
     _void_parts()
     raise LaunchEnded(title)
@@ -162,8 +162,8 @@ def failed(
 
 def _void_parts(standing: Collection[str] = ()) -> None:
     """Take the points of every part that the current launch or table has looked at, or would have; others stand."""
-    found = findings.current.outcomes[findings.current.block_began :]
-    findings.current.lost_parts |= {outcome.part for outcome in found if outcome.part} - set(standing)
+    found = current.check.findings.outcomes[current.check.findings.block_began :]
+    current.check.findings.lost_parts |= {outcome.part for outcome in found if outcome.part} - set(standing)
 
 
 def failed_as_a_whole(
@@ -180,10 +180,10 @@ def failed_as_a_whole(
         LaunchEnded: always.
     """
     _void_parts(standing)
-    current = findings.current
-    found = current.outcomes[current.block_began :]
-    current.outcomes[current.block_began :] = [outcome for outcome in found if outcome.part in standing]
-    current.part = ""
+    findings = current.check.findings
+    found = findings.outcomes[findings.block_began :]
+    findings.outcomes[findings.block_began :] = [outcome for outcome in found if outcome.part in standing]
+    findings.part = ""
     _record(_failure(title, reason, expected, observed))
     _rest_not_checked(whole=True, standing=standing)
     _void_parts(standing)
@@ -205,18 +205,18 @@ def unknown(title: str, because: str) -> None:
 
 
 def _record(outcome: Outcome) -> None:
-    patience = findings.current.patience
+    patience = current.check.findings.patience
     if outcome.status is Status.PASSED:
         patience.passed()
     else:
-        findings.current.starved = max(findings.current.starved, patience.decided())
-    outcome.part = findings.current.part
+        current.check.findings.starved = max(current.check.findings.starved, patience.decided())
+    outcome.part = current.check.findings.part
     frame = _check_frame()
     # A cell's own helper function records for the line that called it: hidden there is hidden here.
     while frame is not None and not outcome.hidden:
         outcome.hidden = frame.f_lineno in hidden_lines(_lines(frame))
         frame = frame.f_back if frame.f_code.co_name != "<module>" else None
-    findings.current.outcomes.append(outcome)
+    current.check.findings.outcomes.append(outcome)
 
 
 def _check_frame() -> FrameType | None:
@@ -291,14 +291,14 @@ def _part_title(block: ast.With) -> str:
 
 def _rest_not_checked(whole: bool = False, standing: Collection[str] = ()) -> None:
     """Record what the source still wanted to check in the same block, or all that it wanted in the launch."""
-    frame, block = _block_of("" if whole else findings.current.part)
+    frame, block = _block_of("" if whole else current.check.findings.part)
     if frame is None or block is None:
         return
     hidden = hidden_lines(_lines(frame))
-    for node, part in _expectations(block, findings.current.part):
+    for node, part in _expectations(block, current.check.findings.part):
         if (whole and part not in standing) or (not whole and node.lineno > frame.f_lineno):
             text = " ".join(ast.unparse(node).removeprefix("ros.").split())
-            findings.current.outcomes.append(
+            current.check.findings.outcomes.append(
                 Outcome(
                     status=Status.NOT_CHECKED,
                     title=text if len(text) <= 120 else text[:117] + "...",

@@ -20,7 +20,8 @@ import contextlib
 import time
 from collections.abc import Iterator
 
-from autograder.checks import findings, outcomes
+from autograder.checks import current, outcomes
+from autograder.checks.findings import Asked
 
 
 @contextlib.contextmanager
@@ -30,9 +31,9 @@ def part(title: str) -> Iterator[None]:
     Raises:
         ValueError: parts do not nest, and each has a title.
     """
-    if findings.current.part or not title:
+    if current.check.findings.part or not title:
         raise ValueError(f"part({title!r}): parts have a title and do not nest.")
-    findings.current.part = title
+    current.check.findings.part = title
     try:
         yield
     except outcomes.LaunchEnded:
@@ -43,17 +44,17 @@ def part(title: str) -> Iterator[None]:
         if not outcomes.ends_part(error):
             raise
     finally:
-        findings.current.part = ""
-    findings.current.finished.add(title)
+        current.check.findings.part = ""
+    current.check.findings.finished.add(title)
 
 
 def asked(what: str) -> None:
     """Note that the check is about to send something: on this topic, to this service, or a "parameter"."""
-    current = findings.current
-    current.asked.append(findings.Asked(time.monotonic(), what, frozenset(current.finished)))
+    findings = current.check.findings
+    findings.asked.append(Asked(time.monotonic(), what, frozenset(findings.finished)))
 
 
 def before(what: str, when: float) -> frozenset[str]:
     """Titles of the parts that were finished before the check sent what led to a callback for `what` at this moment."""
-    sent = [one for one in findings.current.asked if one.when < when and one.what == what]
+    sent = [one for one in current.check.findings.asked if one.when < when and one.what == what]
     return sent[-1].parts if sent else frozenset()

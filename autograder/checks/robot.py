@@ -6,7 +6,7 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-from autograder.checks import runtime
+from autograder.checks import current
 from autograder.checks.misuse import Misuse
 from autograder.checks.running import Running
 from autograder.graph.observer import Observer
@@ -28,7 +28,7 @@ class Robot:
         self._running = running
         self._begun_with = {node.program: _written(node.program) for node in running.described}
         self.stop = stop
-        here = runtime.current.front_end
+        here = current.check.front_end
         self.cell = here.number if here is not None else 0
         """The number in the brackets beside the cell that began it."""
 
@@ -84,16 +84,16 @@ def make_room() -> None:
     Raises:
         Misuse: nothing can go on from here.
     """
-    if runtime.current.front_end is None or runtime.current.front_end.scored:
+    if current.check.front_end is None or current.check.front_end.scored:
         raise Misuse("start() is for looking around in a notebook; a check is a block: with launch(…) as ros:")
-    if runtime.current.block is not None:
+    if current.check.block is not None:
         raise Misuse("A launch is started inside of another one's block; let that end before.")
-    if runtime.current.robot is not None:
-        runtime.current.robot.stop()
+    if current.check.robot is not None:
+        current.check.robot.stop()
         print("What was started before has been stopped: one launch at a time goes on from cell to cell.")
 
 
 def _written(program: str) -> int:
     """When a program's file was written, in nanoseconds; 0 if there is none."""
-    path = runtime.current.folder / f"{program}.py"
+    path = current.check.folder / f"{program}.py"
     return path.stat().st_mtime_ns if path.is_file() else 0

@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
-from autograder.checks import runtime, seen
+from autograder.checks import current, seen
 from autograder.checks.concurrency import Concurrency
 from autograder.checks.program import Program
 from autograder.checks.settling import Settling
@@ -81,7 +81,7 @@ class Running:
             self.observer,
             [program for _, program in self.programs],
             self.missing,
-            runtime.current.folder,
+            current.check.folder,
             rules=[node.all_rules() for node, _ in self.programs],
             parameter_rules=[node.parameter_rules() for node, _ in self.programs],
             parameters=[list(node.parameters) for node, _ in self.programs],

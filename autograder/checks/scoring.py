@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from autograder.checks import findings, outcomes, runtime
+from autograder.checks import current, outcomes
 from autograder.core import interrupts
 from autograder.core.results import CellResult, Outcome, Part, Status
 
@@ -40,8 +40,8 @@ def score(points: float | Mapping[str, float]) -> Score:
     """
     interrupts.here()
     more = outcomes.parts_with_more_at_grading()
-    blank = runtime.current.blank_answers()
-    cell = findings.current
+    blank = current.check.blank_answers()
+    cell = current.check.findings
     found, lost, used = cell.outcomes, cell.lost_parts, cell.used
     parts = [_part(title, worth, found, lost, more) for title, worth in _by_part(points, found).items()]
     full = round(sum(points.values()), 6) if isinstance(points, Mapping) else points
@@ -75,7 +75,7 @@ def score(points: float | Mapping[str, float]) -> Score:
 
 def unscored() -> Score | None:
     """What a cell expected and found that asks for no score; None if that was nothing."""
-    cell = findings.current
+    cell = current.check.findings
     # What the programs printed has been shown while they ran.
     result = CellResult(max_points=0, points=0, seconds=cell.seconds, outcomes=cell.outcomes)
     used = cell.used
@@ -86,7 +86,7 @@ def unscored() -> Score | None:
 
 def _in_notebook(result: CellResult, used: set[str]) -> Score:
     """The score, in a notebook with what is known of the cells that the programs came from."""
-    here = runtime.current.front_end
+    here = current.check.front_end
     if here is None:
         return Score(result)
     return Score(result, [*here.remarks(used), *_too_busy(result)], here.origin(used))

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from autograder.arguments import params_file, remap_rules
 from autograder.arguments.params_file import PARAMS_FILE
-from autograder.checks import runtime
+from autograder.checks import current
 from autograder.checks.program import Program
 from autograder.checks.waiting import NotLaunchedError
 from autograder.diagnosis.programs import PROGRAM_MISSING
@@ -35,7 +35,7 @@ def refused_words(words: Sequence[str]) -> Reason | None:
     refused = remap_rules.refused_parameter(words)
     if refused:
         return refused
-    unreadable = params_file.unreadable(words, runtime.current.folder)
+    unreadable = params_file.unreadable(words, current.check.folder)
     if unreadable is not None:
         hint = "Look at the indentation there, and at brackets and quotation marks."
         return PARAMS_FILE(unreadable.reason.because, hint)
@@ -44,7 +44,7 @@ def refused_words(words: Sequence[str]) -> Reason | None:
 
 def why_missing(program: str) -> Reason:
     """Why no cell has written a program."""
-    here = runtime.current.front_end
+    here = current.check.front_end
     because, hint = here.why_missing("node", program) if here is not None else (f"There is no `{program}`.", "")
     return PROGRAM_MISSING(because, hint)
 
@@ -56,7 +56,7 @@ def refuse_to_start(programs: Sequence[Program]) -> None:
         NotLaunchedError: there is something.
     """
     for node in programs:
-        if not node.package and not runtime.current.has(file_of(node)):
+        if not node.package and not current.check.has(file_of(node)):
             raise NotLaunchedError(why_missing(node.program))
         words = words_of(node)
         if isinstance(words, Reason):

@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from itertools import islice
 from typing import Any
 
-from autograder.checks import findings, runtime
+from autograder.checks import current
 from autograder.checks.misuse import Misuse
 from autograder.core.errors import KitError
 from autograder.graph.observer import Observer
@@ -46,10 +46,10 @@ def broke(error: BaseException, place: str) -> None:
         error: with which it broke.
         place: where in the check cell, or nothing.
     """
-    if not findings.current.used:
+    if not current.check.findings.used:
         return
     where = f" ({place})" if place else ""
-    findings.current.flags.append(
+    current.check.findings.flags.append(
         f"A check broke after programs or files of this submission had come in: {type(error).__name__}:"
         f" {str(error)[:200]}{where}. Data that nobody expected can bring that about, and so can a mistake in the"
         " check. Look at the programs and at what they printed before you decide about the points."
@@ -62,7 +62,7 @@ def reason(error: BaseException) -> str:
     Args:
         error: with which it broke. One of the kit's or of the machine's is explained by nothing that a program sends.
     """
-    block = runtime.current.block
+    block = current.check.block
     if block is None or not isinstance(error, Exception) or isinstance(error, (KitError, Misuse, OSError)):
         return ""
     for where, message in _received(block.observer):

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import TypeVar
 
-from autograder.checks import runtime
+from autograder.checks import current
 
 _T = TypeVar("_T")
 _LETTERS = "bcdfghjkmnpqrstvwxz"
@@ -15,7 +15,7 @@ _LETTERS = "bcdfghjkmnpqrstvwxz"
 
 def token(length: int = 4) -> str:
     """A random word of lower-case letters."""
-    return "".join(runtime.current.random.choice(_LETTERS) for _ in range(length))
+    return "".join(current.check.random.choice(_LETTERS) for _ in range(length))
 
 
 def name(stem: str) -> str:
@@ -25,14 +25,14 @@ def name(stem: str) -> str:
 
 def integer(low: int, high: int) -> int:
     """A whole number from `low` to `high`, both included."""
-    return runtime.current.random.randint(low, high)
+    return current.check.random.randint(low, high)
 
 
 def number(low: float, high: float) -> float:
     """A number between `low` and `high`, with two decimals."""
-    return round(runtime.current.random.uniform(low, high), 2)
+    return round(current.check.random.uniform(low, high), 2)
 
 
 def pick(*values: _T) -> _T:
     """One of the values."""
-    return runtime.current.random.choice(values)
+    return current.check.random.choice(values)

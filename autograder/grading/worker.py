@@ -19,13 +19,12 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, TextIO
 
-from autograder.checks import findings, outcomes, runtime, unusable
+from autograder.checks import current, outcomes, unusable
 from autograder.checks.misuse import place_of
 from autograder.checks.scoring import Score
 from autograder.core.results import CellResult, CheckResult, NodeLog, Status
 from autograder.course.lab import Cell
 from autograder.grading.job import CELL_CPU_SECONDS, CELL_SECONDS, STUCK_SECONDS, Job
-from autograder.graph import bag
 from autograder.graph.patience import ALONE
 from autograder.sandbox.inside.warm_up import load_ros
 from autograder.sandbox.limits import MIB
@@ -51,10 +50,10 @@ def run_job(job: Job, folder: Path, stacks: TextIO = sys.stderr) -> Iterator[Che
     for name, text in job.files.items():
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         (folder / name).write_text(text, encoding="utf-8")
-    findings.current.alone = job.alone
-    runtime.current.configure(folder, job.isolation, job.seed, job.answers, job.built)
+    current.check.findings.alone = job.alone
+    current.check.configure(folder, job.isolation, job.seed, job.answers, job.built)
     if job.files:
-        _ = runtime.current.sandbox  # it warms up while the set-up cells import their messages
+        _ = current.check.sandbox  # it warms up while the set-up cells import their messages
     namespace: dict[str, Any] = {"__name__": "check_cells"}
     logs_kept = LOGS_KEPT // max(1, len(job.checks))
     broken_set_up = ""
@@ -62,8 +61,8 @@ def run_job(job: Job, folder: Path, stacks: TextIO = sys.stderr) -> Iterator[Che
         for number, cell in enumerate(job.cells):
             limit = CELL_SECONDS + ALONE * job.alone + job.build_seconds
             started = time.monotonic()
-            findings.current.reset()
-            runtime.current.vary_for(f"{job.seed} {cell.grade_id}")
+            current.check.findings.reset()
+            current.check.vary_for(f"{job.seed} {cell.grade_id}")
             faulthandler.dump_traceback_later(limit + STUCK_SECONDS, exit=True, file=stacks)
             error, value = _run_cell(cell, number, namespace, limit, CELL_CPU_SECONDS)
             faulthandler.cancel_dump_traceback_later()
@@ -75,7 +74,7 @@ def run_job(job: Job, folder: Path, stacks: TextIO = sys.stderr) -> Iterator[Che
             yield check.model_copy(update={"logs": _within(check.logs, logs_kept), "seconds": took})
     finally:
         faulthandler.cancel_dump_traceback_later()
-        runtime.current.close()
+        current.check.close()
 
 
 def _check_result(cell: Cell, value: object, error: str) -> CheckResult:
@@ -85,16 +84,16 @@ def _check_result(cell: Cell, value: object, error: str) -> CheckResult:
     else:
         because = error or f"The check cell did not end in a score of {cell.points:g} points."
         found_out = [
-            *findings.current.outcomes,
+            *current.check.findings.outcomes,
             outcomes.worded(Status.UNKNOWN, code=outcomes.GRADER.code, title="The check itself broke", because=because),
         ]
         found = CellResult(
             max_points=cell.points or 0.0,
             points=None,
-            starved=max(findings.current.starved, findings.current.patience.decided()),
+            starved=max(current.check.findings.starved, current.check.findings.patience.decided()),
             outcomes=found_out,
-            flags=list(dict.fromkeys(findings.current.flags)),
-            logs=findings.current.logs,
+            flags=list(dict.fromkeys(current.check.findings.flags)),
+            logs=current.check.findings.logs,
         )
     return _shortened(CheckResult(grade_id=cell.grade_id, title=cell.title, **dict(found)))
 
@@ -185,14 +184,14 @@ def main() -> int:
     job = Job.model_validate_json(sys.stdin.buffer.read())
     _, hard = resource.getrlimit(resource.RLIMIT_DATA)
     resource.setrlimit(resource.RLIMIT_DATA, (MEMORY if hard == resource.RLIM_INFINITY else min(MEMORY, hard), hard))
-    bag.current.wanted = job.messages
+    current.check.bag.wanted = job.messages
     with Scratch() as scratch:
         scratch.chmod(0o755)
         folder = scratch / "submission"
         folder.mkdir(mode=0o755)
         for check in run_job(job, folder, out):
             out.write(check.model_dump_json() + "\n")
-            out.writelines(message.model_dump_json() + "\n" for message in bag.current.empty(check.grade_id))
+            out.writelines(message.model_dump_json() + "\n" for message in current.check.bag.empty(check.grade_id))
             out.flush()
     out.close()
     return 0

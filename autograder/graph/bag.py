@@ -51,7 +51,3 @@ class Bag:
             )
             for topic, name, stamp, data in taken
         ]
-
-
-current = Bag()
-"""That of this process."""

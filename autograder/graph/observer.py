@@ -24,6 +24,7 @@ from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from autograder.core import interrupts
 from autograder.core.errors import KitError
+from autograder.graph.bag import Bag
 from autograder.graph.names import full_name
 from autograder.graph.patience import Patience
 from autograder.graph.recording import Recording, quiet_profile
@@ -58,12 +59,17 @@ class Observer:
     """
 
     def __init__(
-        self, domain_id: int, patience: Patience | None = None, left: Callable[[], None] | None = None
+        self,
+        domain_id: int,
+        patience: Patience | None = None,
+        left: Callable[[], None] | None = None,
+        bag: Bag | None = None,
     ) -> None:
         """Join the domain and start to spin in a thread of its own."""
         with contextlib.ExitStack() as leaving:  # nothing stays, wherever a beginning is broken off
             if left is not None:
                 leaving.callback(left)
+            self.bag = bag or Bag()
             self._join(leaving, domain_id, patience)
             self._leaving = leaving.pop_all()
 

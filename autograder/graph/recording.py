@@ -12,7 +12,7 @@ from rclpy.node import Node
 from rclpy.qos import QoSDurabilityPolicy, QoSHistoryPolicy, QoSPolicyKind, QoSProfile, QoSReliabilityPolicy
 from rclpy.serialization import deserialize_message
 
-from autograder.graph import bag
+from autograder.graph.bag import Bag
 
 _MESSAGE_OVERHEAD = 1024
 """Bytes that a message takes besides its own, about."""
@@ -24,6 +24,8 @@ class Recorder(Protocol):
     """Who records: an observer."""
 
     node: Node
+    bag: Bag
+    """Keeps what is received."""
 
     def room_for(self, size: int, kept: int) -> bool:
         """Take room for one more message of `size` bytes, for a recording that keeps `kept` bytes; False if none."""
@@ -115,7 +117,7 @@ class Recording:
         except Exception:  # whatever a program sends that is no such message
             return
         stamp = info["source_timestamp"]
-        bag.current.add(self.topic, self.msg_type, stamp, data)
+        self._observer.bag.add(self.topic, self.msg_type, stamp, data)
         self._messages.append(Received(msg, time.monotonic(), stamp * 1e-9, info["publication_sequence_number"]))
 
     def _refused(self, event: Any) -> None:

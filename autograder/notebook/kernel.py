@@ -104,8 +104,8 @@ class Kernel:
 
     def _end_block(self) -> None:
         """No launch of a block outlives its cell, wherever that was left."""
-        runtime = sys.modules.get("autograder.checks.runtime")
-        block = runtime.current.block if runtime is not None else None
+        check = _current_check()
+        block = check.block if check is not None else None
         if block is not None:
             block.stop()
 
@@ -284,9 +284,15 @@ def _hold_interrupts(shell: Any) -> None:
     interrupts.begin(shell.user_ns)
 
 
+def _current_check() -> Any:
+    """The check that runs; None before somebody has imported the checks, and while that is under way."""
+    return getattr(sys.modules.get("autograder.checks.current"), "check", None)
+
+
 def _findings() -> Any:
-    """What the cell's checks have found; None before somebody has imported them, and while that is under way."""
-    return getattr(sys.modules.get("autograder.checks.findings"), "current", None)
+    """What the cell's checks have found so far, if there are any."""
+    check = _current_check()
+    return check.findings if check is not None else None
 
 
 def now() -> float:
@@ -297,13 +303,13 @@ def now() -> float:
 def _warm_up() -> None:
     """Load the launcher, the checks and the middleware, so that the first launch need not wait for them."""
     with contextlib.suppress(Exception):
-        from autograder.checks.runtime import current
+        from autograder.checks import current
         from autograder.graph.domains import claim_domain
         from autograder.graph.observer import Observer
         from autograder.sandbox.environment import profile_environment
 
         os.environ.update(profile_environment())
         os.environ.pop("ROS_AUTOMATIC_DISCOVERY_RANGE", None)
-        _ = current.sandbox
+        _ = current.check.sandbox
         domain = claim_domain()
         Observer(domain.id, left=domain.release).close()

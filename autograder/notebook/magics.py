@@ -62,10 +62,10 @@ def _run_ros2(kernel: Kernel, line: str) -> int:
         print(f"The line cannot be parsed: {error}. Probably a quotation mark is missing.")
         return 2
     kernel.ready()
-    from autograder.checks.runtime import current
+    from autograder.checks import current
     from autograder.ros2.main import TimeIsUp, run
 
-    running = current.running
+    running = current.check.running
     looks = bool(words) and words[0] != "interface" and "--help" not in words and "-h" not in words
     if running is None:
         if looks:
@@ -219,15 +219,15 @@ def _programs(kernel: Kernel) -> list[str]:
 
 def _ros2_words(before: list[str]) -> list[str]:
     """The commands, the verbs of a command, and then what is on the graph of the programs that run."""
-    from autograder.checks.runtime import current
+    from autograder.checks import current
     from autograder.ros2.main import COMMANDS, verbs_of
 
     if not before:
         return list(COMMANDS)
     if len(before) == 1:
         return verbs_of(before[0])
-    if current.running is None:
+    if current.check.running is None:
         return []
-    watched = current.running.observer
+    watched = current.check.running.observer
     of = {"topic": watched.topics, "service": watched.services, **dict.fromkeys(_ABOUT_NODES, watched.nodes)}
     return sorted(of[before[0]]()) if before[0] in of else []

@@ -8,7 +8,7 @@ from typing import Any
 
 from autograder.arguments import params_file, remap_rules
 from autograder.arguments.remap_rules import PARAMETER_VALUE
-from autograder.checks import runtime
+from autograder.checks import current
 from autograder.checks.program import Program
 from autograder.checks.running import Running
 from autograder.graph import parameters
@@ -127,7 +127,7 @@ def _given(launched: Program, node: str) -> Iterator[str]:
             yield parameter
     for option, file in itertools.pairwise(launched.arguments()):
         if option == "--params-file":
-            yield from params_file.names_for(params_file.text_of(runtime.current.folder, file), node)
+            yield from params_file.names_for(params_file.text_of(current.check.folder, file), node)
 
 
 def _no_such_argument(running: Running, found: Any) -> Reason | None:
@@ -153,7 +153,7 @@ def _file_for_others(running: Running, node: str) -> Reason | None:
         for option, file in itertools.pairwise(launched.arguments()):
             if option != "--params-file":
                 continue
-            because = params_file.why_not_reached(params_file.text_of(runtime.current.folder, file), node)
+            because = params_file.why_not_reached(params_file.text_of(current.check.folder, file), node)
             if because:
                 hint = "The key is the node's full name, namespace included; `/**/NAME` is a node in every namespace."
                 return PARAMS_FILE_KEY(because, hint)

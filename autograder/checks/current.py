@@ -1,4 +1,4 @@
-"""Where the programs of this process run: their folder, their sandbox, their domains, and the values that vary.
+"""The check that runs in this process: where its programs run, the values that vary, and what it has found out.
 
 The grading worker says all that once; in a student's notebook the programs lie beside it and run without isolation
 from oneself.
@@ -12,10 +12,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Protocol
 
-from autograder.checks import findings
+from autograder.checks.findings import Findings
 from autograder.core import front_end
 from autograder.core.front_end import FrontEnd
 from autograder.core.results import Isolation
+from autograder.graph.bag import Bag
 from autograder.graph.observer import Observer
 from autograder.packages.workspace import SOURCES, Workspace
 from autograder.sandbox.build import BuildRun
@@ -36,11 +37,15 @@ class Launched(Protocol):
         """End it."""
 
 
-class Runtime:
-    """The sandbox that the programs of all launches run in, and what it was made with."""
+class CurrentCheck:
+    """What belongs to the check that runs: its programs' folder and sandbox, its launch, and what it has found out."""
 
     def __init__(self) -> None:
         """Start as a student's notebook does."""
+        self.findings = Findings()
+        """What has been found out since the last score."""
+        self.bag = Bag()
+        """The messages that it receives, where somebody wants to look at them."""
         self._folder: Path | None = None
         self._answers: Mapping[str, bool] = {}
         self._built: Mapping[str, BuildRun] = {}
@@ -93,7 +98,7 @@ class Runtime:
 
     def use(self, file_name: str) -> Path:
         """Return where a file of the student's is, and note that the check uses it."""
-        findings.current.used.add(file_name)
+        self.findings.used.add(file_name)
         return self.folder / file_name
 
     def has(self, file_name: str) -> bool:
@@ -103,7 +108,7 @@ class Runtime:
 
     def blank_answers(self) -> dict[str, bool]:
         """Of the answers that the check uses, whether each is still as students receive it."""
-        used = findings.current.used
+        used = self.findings.used
         if self.front_end is not None:
             return self.front_end.blank(used)
         return {name: blank for name, blank in self._answers.items() if name in used}
@@ -131,7 +136,7 @@ class Runtime:
         """Note that the check uses the files of a package."""
         folder = self.folder / SOURCES / name
         paths = sorted(path for path in folder.rglob("*") if path.is_file())
-        findings.current.used |= {str(path.relative_to(self.folder)) for path in paths}
+        self.findings.used |= {str(path.relative_to(self.folder)) for path in paths}
 
     def close(self) -> None:
         """End every program and the sandbox."""
@@ -143,5 +148,6 @@ class Runtime:
             self._sandbox = None
 
 
-current = Runtime()
-atexit.register(current.close)
+check = CurrentCheck()
+"""One process runs one check cell at a time."""
+atexit.register(check.close)
