@@ -313,6 +313,9 @@ class Launch(Facts):
     def activity(self, topic: str) -> Activity:
         """Callbacks that publish `NAME begin` and `NAME end` (`std_msgs/String`) when they begin and end.
 
+        Record the topic from the start, with `launch(…, listen=[(topic, String)])`: an end whose begin was missed could
+        be taken for that of a later run.
+
         Args:
             topic: full name of the topic on which they do.
 
