@@ -37,7 +37,7 @@ doctor: setup ## say what this machine offers, and what to do if something is mi
 	@$(RUN) autograder doctor $(ARGS)
 
 grade: setup ## grade a class: the sample class, or SUBMISSIONS=folder-or-zip
-	@$(if $(SUBMISSIONS),:,$(RUN) python tests/sample_class.py $(LAB) >/dev/null)
+	@$(if $(SUBMISSIONS),:,$(RUN) python tests/support/sample_class.py $(LAB) >/dev/null)
 	@$(RUN) autograder grade $(LAB) $(if $(SUBMISSIONS),"$(SUBMISSIONS)") $(ARGS)
 
 check: setup ## check one notebook and print a report: NB=path/to/notebook.ipynb
@@ -79,20 +79,20 @@ lint: setup-dev ## check the code with ruff, its formatter, mypy --strict and im
 	@$(RUN) lint-imports --no-cache --no-logo
 
 soak: setup-dev ## grade every sample student N=20 times, half of them under load; no score may differ
-	@$(RUN) python tests/soak.py --times $(N) $(if $(filter command line,$(origin LAB)),--lab $(LAB)) $(ARGS)
+	@$(RUN) python tests/tools/soak.py --times $(N) $(if $(filter command line,$(origin LAB)),--lab $(LAB)) $(ARGS)
 
 machines: setup-dev ## grade LAB's sample students with half and a quarter of a CPU, and beside 30 busy loops; no verdict may differ
-	@$(RUN) python tests/machines.py $(LAB) $(ARGS)
+	@$(RUN) python tests/tools/machines.py $(LAB) $(ARGS)
 
 margins: setup-dev ## say how far each bound on time in a check is from the sample students, on a quiet and on a busy machine
-	@$(RUN) python tests/margins.py $(if $(filter command line,$(origin LAB)),--lab $(LAB)) $(ARGS)
+	@$(RUN) python tests/tools/margins.py $(if $(filter command line,$(origin LAB)),--lab $(LAB)) $(ARGS)
 
 mutants: setup-dev ## change LAB's solution by rule, one change at a time, and grade each; a change that keeps its points may lack a check
-	@$(RUN) python tests/mutants.py $(LAB) $(ARGS)
+	@$(RUN) python tests/tools/mutants.py $(LAB) $(ARGS)
 
 bench: setup-dev ## measure this grader against stock nbgrader, and how it scales with jobs, classes and Dask
-	@$(RUN) python tests/bench.py $(ARGS)
-	@$(RUN) python tests/bench_scale.py
+	@$(RUN) python tests/tools/bench.py $(ARGS)
+	@$(RUN) python tests/tools/bench_scale.py
 
 lock: setup-dev ## pin the newest versions of pyproject.toml's dependencies, with hashes
 	@$(RUN) sh -euc 'compile="uv pip compile pyproject.toml --quiet --universal --python-version 3.11 --generate-hashes \

@@ -11,7 +11,10 @@ from typing import Any
 
 import kill_matrix
 import pytest
+from crowded_cpu import crowded_cpu  # noqa: F401  a fixture
+from graded_cell import grade  # noqa: F401  a fixture
 from hypothesis import HealthCheck, settings
+from started_processes import started  # noqa: F401  a fixture
 
 from autograder.sandbox.environment import profile_environment
 
@@ -94,7 +97,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
     """Print which mistake is caught by which check, where the sample classes were graded."""
     reports = terminalreporter.getreports("passed") + terminalreporter.getreports("failed")
-    if any(report.nodeid.startswith("tests/test_classes.py") for report in reports):
+    if any("/test_classes.py::" in report.nodeid for report in reports):
         terminalreporter.write_line(kill_matrix.page())
 
 

@@ -2,7 +2,7 @@
 
 In the text the role {measured}`key` follows such a statement. A cell of the page says `assert ..., "key"`. A key that
 stands only on one side is a warning, which ends the build. That each assertion fails when its statement is made false
-is held by tests/test_lecture_claims.py.
+is held by tests/lectures/test_lecture_claims.py.
 """
 
 from __future__ import annotations

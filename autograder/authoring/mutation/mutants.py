@@ -1,6 +1,6 @@
 """The mutants of a lab, and which checks each of them can reach.
 
-`tests/test_classes.py` shows that nothing else reaches them: without the files that are said not to reach a check, the
+`tests/grading/test_classes.py` shows that nothing else reaches them: without the files that are said not to reach a check, the
 solution passes it all the same.
 """
 

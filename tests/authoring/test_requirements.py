@@ -1,0 +1,32 @@
+"""Every sentence of a task is held by a check, and every check by a sample student who breaks just that sentence."""
+
+from __future__ import annotations
+
+import pytest
+import requirements
+from places import ROOT
+
+from autograder.course.lab import load_lab
+
+LABS = requirements.labs()
+
+
+@pytest.mark.parametrize("name", LABS)
+def test_every_sentence_of_a_task_is_a_requirement_or_said_to_be_none(name: str) -> None:
+    assert requirements.uncovered(load_lab(ROOT, name)) == []
+
+
+@pytest.mark.parametrize("name", LABS)
+def test_every_requirement_is_in_the_text_held_by_a_check_and_broken_by_a_student(name: str) -> None:
+    assert requirements.defects(load_lab(ROOT, name)) == []
+
+
+@pytest.mark.parametrize("name", LABS)
+def test_every_check_holds_a_requirement(name: str) -> None:
+    assert requirements.unheld(load_lab(ROOT, name)) == []
+
+
+def test_the_table_of_requirements_is_up_to_date() -> None:
+    assert requirements.PAGE.read_text(encoding="utf-8") == requirements.page(), (
+        "run `python tests/tools/requirements.py`"
+    )

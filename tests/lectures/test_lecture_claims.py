@@ -1,0 +1,109 @@
+"""What a lecture says was measured: each such assertion fails when the statement is made false.
+
+Beside each lecture lies a table of mutants, `tests/lecture_mutants/LECTURE.yaml`: for each statement a change that
+makes it false. One run of the page with changed programs shows for all of them at once whether their assertions notice.
+"""
+
+from __future__ import annotations
+
+import ast
+import json
+import os
+import re
+import sys
+from pathlib import Path
+from typing import Any
+
+import nbformat
+import pytest
+import yaml
+from nbclient import NotebookClient
+from places import ROOT
+
+LECTURES = ROOT / "lectures"
+TABLES = sorted((ROOT / "tests" / "lecture_mutants").glob("*.yaml"))
+CELL = re.compile(r"^```\{code-cell\}[^\n]*\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+OPTIONS = re.compile(r"\A(?:---\n.*?\n---\n|(?::\w[^\n]*\n)+\n?)", re.DOTALL)
+HELD = "HELD "
+"""What stands before the result in the last cell's output."""
+
+
+class _Collected(ast.NodeTransformer):
+    """Every `assert condition, "key"` notes its result; whatever goes wrong with it counts as false."""
+
+    def visit_Assert(self, node: ast.Assert) -> ast.stmt:
+        key = ast.unparse(node.msg) if node.msg else "'no key'"
+        text = f"try:\n    _held[{key}] = bool({ast.unparse(node.test)})\nexcept Exception:\n    _held[{key}] = False"
+        return ast.parse(text).body[0]
+
+
+def cells_of(page: Path) -> list[str]:
+    """The code cells of a page, without their options."""
+    return [OPTIONS.sub("", cell) for cell in CELL.findall(page.read_text(encoding="utf-8"))]
+
+
+def collecting(source: str) -> str:
+    """A cell in which no statement but the last one's failure ends the run."""
+    if source.lstrip().startswith("%") or "assert " not in source:
+        return source
+    return ast.unparse(_Collected().visit(ast.parse(source)))
+
+
+def held(sources: list[str], folder: Path) -> dict[str, bool]:
+    """Run cells in a kernel as the build does; for each statement whether its assertion held."""
+    sources = ["_held = {}", *map(collecting, sources), f"import json\nprint({HELD!r} + json.dumps(_held))"]
+    notebook = nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell(source) for source in sources])
+    path = os.pathsep.join([str(LECTURES / "_lib"), os.environ.get("PYTHONPATH", "")])
+    client = NotebookClient(
+        notebook, timeout=300, allow_errors=True, kernel_name="python3", resources={"metadata": {"path": str(folder)}}
+    )
+    client.execute(env={**os.environ, "PYTHONPATH": path, "LECTURES": str(LECTURES)})
+    said: list[Any] = [output.get("text", "") for output in notebook.cells[-1].outputs]
+    return dict(json.loads(next(text for text in said if text.startswith(HELD)).removeprefix(HELD)))
+
+
+def keys_of(page: Path) -> set[str]:
+    """The statements that a page asserts."""
+    return set(re.findall(r'^assert .*?, "([a-z0-9-]+)"$', page.read_text(encoding="utf-8"), re.MULTILINE))
+
+
+def mutated(sources: list[str], changes: list[dict[str, Any]]) -> list[str]:
+    """The cells with every change made; a change that fits no cell, or several, is a mistake in the table."""
+    sources = list(sources)
+    for change in changes:
+        fitting = [
+            number
+            for number, source in enumerate(sources)
+            if change["old"] in source
+            and source.startswith((f"%%node {change['cell']}\n", f"%%file {change['cell']}\n"))
+        ]
+        assert len(fitting) == 1, f"{change} fits {len(fitting)} cells"
+        sources[fitting[0]] = sources[fitting[0]].replace(change["old"], change["new"])
+    return sources
+
+
+@pytest.mark.parametrize("table", TABLES, ids=lambda path: path.stem)
+def test_each_statement_has_a_mutant(table: Path) -> None:
+    changes = yaml.safe_load(table.read_text(encoding="utf-8"))
+    page = LECTURES / f"{table.stem}.md"
+    assert {key for change in changes for key in change["breaks"]} == keys_of(page)
+    mutated(cells_of(page), changes)
+
+
+@pytest.mark.parametrize("table", TABLES, ids=lambda path: path.stem)
+def test_each_assertion_fails_when_its_statement_is_false(table: Path, tmp_path: Path) -> None:
+    changes = yaml.safe_load(table.read_text(encoding="utf-8"))
+    page = LECTURES / f"{table.stem}.md"
+    found = held(mutated(cells_of(page), changes), tmp_path)
+    assert found.keys() == keys_of(page)
+    assert [key for key, holds in found.items() if holds] == [], "these assertions do not notice"
+
+
+if (
+    __name__ == "__main__"
+):  # python tests/lectures/test_lecture_claims.py 02_executors: which statements hold as the page is
+    import tempfile
+
+    for name in sys.argv[1:]:
+        with tempfile.TemporaryDirectory() as place:
+            print(json.dumps(held(cells_of(LECTURES / f"{name}.md"), Path(place)), indent=1))

@@ -1,0 +1,20 @@
+"""Processes that a test starts, and that end with it."""
+
+from __future__ import annotations
+
+import subprocess
+from collections.abc import Iterator
+
+import pytest
+
+WITHIN = 120
+"""Far beyond what a start takes on a busy machine, in seconds."""
+
+
+@pytest.fixture
+def started() -> Iterator[list[subprocess.Popen[str]]]:
+    processes: list[subprocess.Popen[str]] = []
+    yield processes
+    for process in processes:
+        process.kill()
+        process.communicate()

@@ -1,0 +1,95 @@
+"""The requirements of a lab: every sentence of a task, the check that holds it, and the student who breaks just that.
+
+`tests/classes/<lab>/requirements.yaml` says which words of the task's text are a requirement, which check (and which
+part of it) holds them, and which sample student breaks them; and which sentences only explain. The test of this module
+fails for a sentence that is in neither list. As a script it writes `tests/classes/REQUIREMENTS.md`.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "support"))
+
+import kill_matrix
+import sample_class
+from places import ROOT
+
+from autograder.authoring.requirements import Requirements
+from autograder.authoring.requirements import read as read_file
+from autograder.course.lab import Lab, load_lab
+
+PAGE = ROOT / "tests" / "classes" / "REQUIREMENTS.md"
+
+
+def read(lab: str) -> Requirements:
+    """A lab's requirements."""
+    return read_file(sample_class.class_folder(lab) / "requirements.yaml")
+
+
+def uncovered(lab: Lab) -> list[str]:
+    """Sentences of tasks that are neither a requirement nor said to be none."""
+    return read(lab.name).uncovered(lab)
+
+
+def defects(lab: Lab) -> list[str]:
+    """What is wrong with a lab's table, as lines to read."""
+    told = read(lab.name)
+    checks = {check.grade_id: check for check in lab.checks}
+    found = [f"not in the lab's text: {text!r}" for text in told.strangers(lab)]
+    for one in told.required:
+        if one.check not in checks:
+            found.append(f"{one.text!r}: the lab has no check `{one.check}`")
+        elif one.student not in sample_class.students(lab.name):
+            found.append(f"{one.text!r}: the class has no student `{one.student}`")
+        else:
+            student = sample_class.expected(lab, one.student)
+            lost = student.lost.get(one.check, [])
+            if one.check not in kill_matrix.lost(lab, student):
+                found.append(f"{one.text!r}: `{one.student}` does not fail `{one.check}`")
+            elif one.part and student.points[one.check] and one.part not in lost:
+                found.append(f"{one.text!r}: `{one.student}` does not lose the part {one.part!r}, but {lost}")
+    return found
+
+
+def unheld(lab: Lab) -> list[str]:
+    """Checks that hold no requirement."""
+    return read(lab.name).unheld(lab)
+
+
+def labs() -> list[str]:
+    """Labs that have a sample class."""
+    return kill_matrix.labs()
+
+
+def page() -> str:
+    """The whole page."""
+    lines = [
+        "# Requirement, check, mistake",
+        "",
+        "Made by `python tests/tools/requirements.py`. Each line: words of the lab, the check (and its part) that",
+        "holds them, and the sample student who breaks just that.",
+        "",
+    ]
+    for name in labs():
+        lines += [f"## {name}", "", "| requirement | check | part | broken by |", "|---|---|---|---|"]
+        for one in read(name).required:
+            text = one.text.replace("|", "\\|")
+            lines.append(f"| {text} | `{one.check}` | {one.part} | {one.student} |")
+        lines.append("")
+    return "\n".join(lines)
+
+
+if __name__ == "__main__":
+    if len(sys.argv) > 1:
+        lab = load_lab(ROOT, sys.argv[1])
+        for title, lines in (
+            ("uncovered", uncovered(lab)),
+            ("wrong", defects(lab)),
+            ("without requirement", unheld(lab)),
+        ):
+            print(f"{title}: {len(lines)}", *[f"  {line}" for line in lines], sep="\n")
+    else:
+        PAGE.write_text(page(), encoding="utf-8")
+        print(PAGE.relative_to(ROOT))
