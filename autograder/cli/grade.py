@@ -114,7 +114,9 @@ def _places(course: Path | None, lab: str, submissions: Path | None) -> tuple[Pa
     if not source.exists():
         raise KitError(
             f"There are no submissions at {source}.",
-            "Name a folder or zip." if submissions else f"Build the sample class: python tests/support/sample_class.py {lab}",
+            "Name a folder or zip."
+            if submissions
+            else f"Build the sample class: python tests/support/sample_class.py {lab}",
         )
     if submissions is None:
         from autograder.authoring.courses import sample_course

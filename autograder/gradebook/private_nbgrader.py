@@ -1,6 +1,7 @@
 """What the kit uses of nbgrader and nbgrader has not promised to keep; of its validator see `grading/validate.py`.
 
-`tests/gradebook/test_private_names.py` says which of these an update has moved; pyproject.toml keeps untested ones away.
+`tests/gradebook/test_private_names.py` says which of these an update has moved; pyproject.toml keeps untested ones
+away.
 """
 
 from __future__ import annotations

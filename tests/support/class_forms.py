@@ -1,7 +1,7 @@
 """Builds classes of every form that intake takes, with unlucky and hostile names in what students wrote.
 
-As a script, `python tests/support/class_forms.py 10000` takes in as many classes, and says of each in which somebody was
-lost, swapped or replaced; a number behind that is the first seed.
+As a script, `python tests/support/class_forms.py 10000` takes in as many classes, and says of each in which somebody
+was lost, swapped or replaced; a number behind that is the first seed.
 """
 
 from __future__ import annotations

@@ -1,7 +1,8 @@
 """Builds the sample class of a lab from `tests/classes/<lab>` and says what grading must make of it.
 
 As a script: `python tests/support/sample_class.py lab2_executors` writes
-`build/sample/classes/lab2_executors/<student>/…` for as many students as it takes to show every kind of outcome. The tests grade them all.
+`build/sample/classes/lab2_executors/<student>/…` for as many students as it takes to show every kind of outcome. The
+tests grade them all.
 """
 
 from __future__ import annotations

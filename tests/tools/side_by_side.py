@@ -1,8 +1,8 @@
 """Runs many notebooks side by side, of several users, and notes every name that a launch saw and that was not its own.
 
 `python tests/tools/side_by_side.py` runs 20 kernels, each with the solution of a lab, all labs; as root of four users,
-else of one. Meanwhile each user has a program in a terminal that goes from domain to domain, and kernels that are killed
-while their robots run. Exit status 1 if anybody heard anybody else, or a cell of a solution failed.
+else of one. Meanwhile each user has a program in a terminal that goes from domain to domain, and kernels that are
+killed while their robots run. Exit status 1 if anybody heard anybody else, or a cell of a solution failed.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """The mutants of a lab, and which checks each of them can reach.
 
-`tests/grading/test_classes.py` shows that nothing else reaches them: without the files that are said not to reach a check, the
-solution passes it all the same.
+`tests/grading/test_classes.py` shows that nothing else reaches them: without the files that are said not to reach a
+check, the solution passes it all the same.
 """
 
 from __future__ import annotations
