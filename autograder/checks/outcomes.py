@@ -7,7 +7,7 @@ import contextlib
 import linecache
 import re
 import sys
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from pathlib import Path
 from types import FrameType
 from typing import NoReturn
@@ -297,7 +297,7 @@ def _rest_not_checked(whole: bool = False, standing: Collection[str] = ()) -> No
     hidden = hidden_lines(_lines(frame))
     for node, part in _expectations(block, current.check.findings.part):
         if (whole and part not in standing) or (not whole and node.lineno > frame.f_lineno):
-            text = " ".join(ast.unparse(node).removeprefix("ros.").split())
+            text = " ".join(_in_words(node, frame.f_globals).split())
             current.check.findings.outcomes.append(
                 Outcome(
                     status=Status.NOT_CHECKED,
@@ -313,6 +313,20 @@ def _expectations(node: ast.AST, part: str) -> Iterator[tuple[ast.Call, str]]:
     """The calls of expectations below a node, each with the title of its part, in the order of the source."""
     for child in ast.iter_child_nodes(node):
         inside = (isinstance(child, ast.With) and _part_title(child)) or part
-        if isinstance(child, ast.Call) and isinstance(child.func, ast.Attribute) and _EXPECTS.match(child.func.attr):
+        if isinstance(child, ast.Call) and _EXPECTS.match(_called(child)):
             yield child, part
         yield from _expectations(child, inside)
+
+
+def _called(call: ast.Call) -> str:
+    """The name of the method or function that is called."""
+    if isinstance(call.func, ast.Attribute):
+        return call.func.attr
+    return call.func.id if isinstance(call.func, ast.Name) else ""
+
+
+def _in_words(call: ast.Call, names: Mapping[str, object]) -> str:
+    """What an expectation asks: one of the lab's own says it itself in its first sentence."""
+    own = names.get(_called(call)) if isinstance(call.func, ast.Name) else None
+    said = (getattr(own, "__doc__", None) or "").strip().split("\n")[0].removesuffix(".")
+    return said or ast.unparse(call).removeprefix("ros.")

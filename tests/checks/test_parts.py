@@ -349,3 +349,21 @@ def test_a_helper_that_fails_outside_the_parts_takes_all_of_its_launch(grade: Gr
     result = grade(HELPERS.format(first=True, second=False), talker__py=TALKER)
     assert earned(result) == {"first": 0.0, "second": 0.0, "third": 0.0}
     assert [o.part for o in result.outcomes if o.status is Status.NOT_CHECKED] == ["third"]
+
+
+def test_an_expectation_of_the_labs_own_is_told_in_its_own_words_where_it_was_not_checked(grade: Grade) -> None:
+    check = """\
+        def expect_words(ros):
+            '''It says its words, again and again.'''
+            ros.topic("/chatter", String).expect_messages(at_least=2)
+
+        with launch("broken") as ros:
+            with ros.part("the name"):
+                ros.node("/broken").expect()
+            with ros.part("the words"):
+                expect_words(ros)
+        ros.score({"the name": 1, "the words": 1})
+        """
+    result = grade(check, broken__py="raise ValueError(1)\n")
+    left = {outcome.part: outcome.title for outcome in result.outcomes if outcome.status is Status.NOT_CHECKED}
+    assert left == {"the name": "node('/broken').expect()", "the words": "It says its words, again and again"}
