@@ -1,0 +1,256 @@
+"""What a check cell may ask and do with `ros`: its nouns, such as `ros.topic`, and its verbs, such as `ros.wait`."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from functools import cached_property
+from typing import Any
+
+from rclpy.qos import QoSProfile
+
+from autograder.checks import seen
+from autograder.checks.expect.action import Action
+from autograder.checks.expect.activity import Activity
+from autograder.checks.expect.draw import Draw
+from autograder.checks.expect.expectations import WITHIN
+from autograder.checks.expect.facts import Facts
+from autograder.checks.expect.graph import Graph
+from autograder.checks.expect.lifecycle import Lifecycle
+from autograder.checks.expect.node import Node
+from autograder.checks.expect.program import StartedProgram
+from autograder.checks.expect.publisher import RELIABLE_DEEP, Publisher
+from autograder.checks.expect.qos import Qos
+from autograder.checks.expect.server import Server
+from autograder.checks.expect.service import Service
+from autograder.checks.expect.topic import Topic
+from autograder.checks.misuse import Misuse
+from autograder.checks.program import Program
+from autograder.checks.waiting import waits_for
+from autograder.graph.lifecycle import Change, in_order
+from autograder.graph.publishing import ClockDriver
+from autograder.pictures import Runs
+
+
+class Ros(Facts, ABC):
+    """What can be asked of a launch that runs."""
+
+    @abstractmethod
+    def _start(self, node: Program | str) -> None:
+        """Start one more program."""
+
+    def topic(self, name: str, msg_type: type | None = None) -> Topic:
+        """A topic: who publishes and subscribes, and what arrives.
+
+        Args:
+            name: full name.
+            msg_type: message class; only `expect_unused` and counts of 0 do without.
+
+        Example:
+            `chatter = ros.topic("/chatter", String)`
+        """
+        return Topic(self._running, name, msg_type)
+
+    def publisher(self, name: str, msg_type: type, qos: QoSProfile | int = RELIABLE_DEEP) -> Publisher:
+        """A publisher of the check's own, made when it is first used.
+
+        Args:
+            name: full name of the topic.
+            msg_type: message class.
+            qos: what is offered, a profile or a depth.
+
+        Example:
+            `numbers = ros.publisher("/numbers", Int64)`
+        """
+        return Publisher(self._running, name, msg_type, qos)
+
+    def qos(self, topic: str) -> Qos:
+        """The QoS of a topic.
+
+        Args:
+            topic: full name.
+
+        Example:
+            `ros.qos("/map").expect(durability="transient_local")`
+        """
+        return Qos(self._running, topic)
+
+    def node(self, name: str) -> Node:
+        """A node: whether it is there, its parameters and what it logs.
+
+        Args:
+            name: full name.
+
+        Example:
+            `ros.node("/talker").expect()`
+        """
+        return Node(self._running, name)
+
+    def lifecycle(self, node: str) -> Lifecycle:
+        """The state machine of a lifecycle node.
+
+        Args:
+            node: full name.
+
+        Example:
+            `ros.lifecycle("/camera").expect_state("active")`
+        """
+        return Lifecycle(self._running, node)
+
+    def service(self, name: str, srv_type: type) -> Service:
+        """A service of the student's.
+
+        Args:
+            name: full name.
+            srv_type: service class.
+
+        Example:
+            `total = ros.service("/add", AddTwoInts).call(AddTwoInts.Request(a=1, b=2)).sum`
+        """
+        return Service(self._running, name, srv_type)
+
+    def server(
+        self,
+        name: str,
+        srv_type: type | None = None,
+        answer: Callable[[Any, Any], Any] | None = None,
+        delay: float = 0.0,
+    ) -> Server:
+        """A service that the check offers to the student's client, from the first call of this on.
+
+        Args:
+            name: full name.
+            srv_type: service class; not needed for a service that is offered already.
+            answer: is given a request and a response, and returns the response.
+            delay: seconds from the arrival of a request to its answer.
+
+        Example:
+            `ros.server("/gate", Trigger, lambda request, response: response, delay=0.2)`
+        """
+        return Server(self._running, name, srv_type, answer, delay)
+
+    def action(self, name: str, action_type: type) -> Action:
+        """An action of the student's.
+
+        Args:
+            name: full name.
+            action_type: action class.
+
+        Example:
+            `goal = ros.action("/dock", Fibonacci).send_goal(Fibonacci.Goal(order=5), accepted=True)`
+        """
+        return Action(self._running, name, action_type)
+
+    def activity(self, topic: str) -> Activity:
+        """Callbacks that publish `NAME begin` and `NAME end` (`std_msgs/String`) when they begin and end.
+
+        Record the topic from the start, with `launch(…, listen=[(topic, String)])`: an end whose begin was missed could
+        be taken for that of a later run.
+
+        Args:
+            topic: full name of the topic on which they do.
+
+        Example:
+            `ros.activity("/activity").expect_overlap(["camera", "planner"])`
+        """
+        return Activity(self._running, topic)
+
+    def program(self, name: str) -> StartedProgram:
+        """A program that was started; a missing one is a failed outcome.
+
+        Args:
+            name: of the program, or of its node as the launch names it: that tells several runs of one program apart.
+
+        Example:
+            `ros.program("talker").expect_clean_end(by="SIGTERM")`
+
+        Codes:
+            `program-missing`, `nothing-started`.
+        """
+        return StartedProgram(self._running, name, self._start)
+
+    @property
+    def graph(self) -> Graph:
+        """What is on the graph at this moment.
+
+        Example:
+            `ros.graph.nodes()`
+        """
+        return Graph(self._running)
+
+    @property
+    def draw(self) -> Draw:
+        """Pictures of what happened, for a notebook.
+
+        Example:
+            `ros.draw.timeline(seconds=2)`
+        """
+        return Draw(self._running)
+
+    @cached_property
+    def clock(self) -> ClockDriver:
+        """Simulated time of this launch (`use_sim_time=True`).
+
+        Example:
+            `ros.clock.advance(1.0, lambda: heard.count > 0)`
+        """
+        return ClockDriver(self._observer)
+
+    @waits_for("what `ros.wait` asks for")
+    def wait(
+        self, ready: Callable[[], object], within: float = WITHIN, needs: Callable[[], object] | None = None
+    ) -> bool:
+        """Wait until something is so, and tell whether it is: this records no outcome.
+
+        Args:
+            ready: what is waited for; anything true will do. It is asked again and again.
+            within: seconds until it must have come. The wait ends earlier when every program has ended.
+            needs: whether that is on the graph without which it cannot come. Once nothing new appears on the graph
+                and it is still missing, the wait ends.
+
+        Example:
+            `came = ros.wait(lambda: heard.count >= 3, within=5)`
+        """
+        return self._wait(ready, within, needs)
+
+    def pause(self, for_seconds: float) -> None:
+        """Let the programs run for exactly so long: for experiments in which the length of a time matters.
+
+        Args:
+            for_seconds: how long, in seconds. To wait for something, use `wait` or an expectation.
+
+        Example:
+            `ros.pause(0.5)`
+        """
+        if for_seconds < 0:
+            raise Misuse(f"pause: {for_seconds!r} is no time; it is a number of seconds, 0 or more.")
+        self._observer.pause(for_seconds)
+
+    def changes(self, *nodes: str) -> list[Change]:
+        """State changes of lifecycle nodes so far, in the order of publication.
+
+        Args:
+            nodes: full names; by default all nodes that are watched.
+
+        Example:
+            `steps = [change.step for change in ros.changes("/camera")]`
+        """
+        return in_order([self._running.lifecycle_client(node) for node in nodes or self._running.lifecycle_clients])
+
+    def runs(self) -> Runs:
+        """What the programs' callbacks did so far, run by run: when, how long, on which thread, in which group.
+
+        Seen from inside the programs, the first 2000 runs of each; a moment old.
+
+        Example:
+            `print(ros.runs().longest_pause("heartbeat"))`
+        """
+        return seen.runs(self._insides())
+
+    def programs(self) -> list[Program]:
+        """What this launch was asked to start, or what its launch file starts: programs with their arguments.
+
+        Example:
+            `starts = len(ros.programs())`
+        """
+        return list(self._running.described)
