@@ -660,6 +660,8 @@ def test_names_keep_their_capitals_and_an_end_that_is_not_there_has_its_nearest_
         ('ros.activity("/activity").expect_overlap("tick", itself=True)', "no list"),
         ('ros.activity("/activity").expect_period(["tick"], 0.5, runs=2)', "begins late"),
         ('ros.node("/talker").expect_log("x", level="WARNING")', "none of DEBUG"),
+        ('name = "talker"; ros.node(name).expect()', "no full name"),
+        ('ros.program(Program("talker")).expect_running()', "is no full name"),
         ('with launch("talker") as second: pass', "inside another one"),
         ("with ros: pass", "inside another one"),
         ('launch("talker", ros_arguments="-r a:=b")', "ros_arguments='-r a:=b' is one text"),

@@ -192,8 +192,17 @@ class Expectations:
 class Noun(Expectations):
     """One thing of a launch that has a name, such as a topic, and what can be asked of it."""
 
+    _full_name = True
+    """Whether its name has a namespace, as those of nodes and topics do."""
+
     def __init__(self, running: Running, name: str) -> None:
-        """Ask about what has this name in this launch."""
+        """Ask about what has this name in this launch.
+
+        Raises:
+            Misuse: it is no name, or no full one.
+        """
+        if not isinstance(name, str) or (self._full_name and not name.startswith("/")):
+            raise Misuse(f"{name!r} is no full name; write it with its namespace, as in '/front/camera'.")
         super().__init__(running)
         self.name = name
 

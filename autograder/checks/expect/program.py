@@ -82,6 +82,8 @@ def _comes_back(where: str, never_spun: bool) -> str:
 class StartedProgram(Noun):
     """A program that the launch has started; after a restart, its last run."""
 
+    _full_name = False
+
     def __init__(self, running: Running, name: str, start: Callable[[Program], None]) -> None:
         """Ask about the program of this name; that there is none is a failed outcome.
 
