@@ -32,7 +32,8 @@ _BOTTOM = """
 - After you have changed a cell, run the cell again, and then its check.
 - The checks are folded, and the sentence above a check says what it looks at. Shift+Enter runs a folded cell as it runs
   any other; a click opens it. The arrow keys pass over it.
-- After a restart of the kernel, run the first code cell again, and then the cells of your programs.
+- After a restart of the kernel, run the first code cell and the folded cell below it again, and then the cells of your
+  programs.
 - Your programs are in the folder `nodes` of the lab, below the name of the notebook. Only what you write in cells is
   graded; a file that you put into that folder yourself stays there, but is not handed in.
 - `%%node?` and `%%file?` show an example. The tab key completes the names of your programs after `launch("`, commands
