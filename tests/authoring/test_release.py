@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import functools
 import json
 from itertools import pairwise
@@ -65,3 +66,21 @@ def test_a_check_is_folded_below_a_sentence_that_says_what_it_looks_at(lab: str)
             assert cell["metadata"]["jupyter"] == {"source_hidden": True}, marks["grade_id"]
         else:
             assert "jupyter" not in cell["metadata"]
+
+
+@pytest.mark.parametrize("lab", LABS)
+def test_a_check_and_each_function_that_it_uses_fit_on_a_screen(lab: str) -> None:
+    cells = json.loads((ROOT / "solutions" / lab / f"{lab}.ipynb").read_text(encoding="utf-8"))["cells"]
+    long = []
+    for cell in cells:
+        source = "".join(cell["source"])
+        if (
+            cell["cell_type"] == "code"
+            and cell["metadata"].get("nbgrader", {}).get("grade")
+            and source.count("\n") >= 40
+        ):
+            long.append(cell["id"])
+        for one in ast.walk(ast.parse(source)) if for_checks(cell) else ():
+            if isinstance(one, ast.FunctionDef) and (one.end_lineno or 0) - one.lineno >= 40:
+                long.append(one.name)
+    assert long == []

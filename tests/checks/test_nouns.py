@@ -114,7 +114,7 @@ LINES = {
         ("ros.topic('/ticks').expect_unused(within=0.3)", "topic-present"),
         ("ros.topic('/ticks', Int64).expect_last(7, times=3)", ""),
         ("ros.topic('/ticks', Int64).expect_last(8, within=0.5)", "content"),
-        ("ros.topic('/ticks', Int64).expect_last(8, within=0.5, code='own-code', because='It is 7.')", "own-code"),
+        ("ros.topic('/ticks', Int64).expect_last(8, within=0.5, code='own-code', because='It is {said}.')", "own-code"),
         ("ros.topic('/ticks', Int64).expect_silence(for_seconds=1)", "not-silent"),
         ("ros.require('messages' in ros.topic('/ticks', Int64).account(), 'It is told')", ""),
         ("ros.activity('/activity').expect_runs(['slow', 'read'], runs=2)", ""),

@@ -372,7 +372,7 @@ class Topic(Sources):
             title: what is required, as a sentence without its full stop.
             times: so many of the last messages say it, one after the other.
             within: seconds until they must.
-            because: what is wrong if they do not; by default what the last one says.
+            because: what is wrong if they do not, with `{said}` for what the last one says; by default just that.
             code: of that reason.
             evident: as for `ros.require`, like `node`.
             node: full name of a node: what its program waits for is a reason.
@@ -396,7 +396,7 @@ class Topic(Sources):
             title or f"`{self.name}` says `{value}`",
             expected=str(value) + f", {times} times" * (times > 1),
             observed=said,
-            because=because or f"After {within:g} s, the last of its messages says `{said}`.",
+            because=because.replace("{said}", said) or f"After {within:g} s, the last of its messages says `{said}`.",
             code=code,
             evident=evident,
             node=node,
