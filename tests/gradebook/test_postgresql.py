@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 import toy
-from places import ROOT
+from places import ROOT, TESTS
 
 from autograder.course.lab import load_lab
 from autograder.gradebook.own_courses import TEMPLATE, trust
@@ -80,7 +80,7 @@ def serve(folder: Path) -> Iterator[str]:
 
 
 def python(code: str, *arguments: str | Path) -> str:
-    path = os.pathsep.join((str(ROOT), str(ROOT / "tests")))
+    path = os.pathsep.join((str(ROOT), str(TESTS / "support")))
     done = subprocess.run(
         [sys.executable, "-c", code, *arguments],
         env=os.environ | {"PYTHONPATH": path}, capture_output=True, text=True, timeout=300, check=False,

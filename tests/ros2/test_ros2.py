@@ -426,7 +426,7 @@ def test_nothing_is_left_running_when_the_kernel_ends(tmp_path: Path) -> None:
     made = Notebook(tmp_path)
     made.run(SET_UP)
     made.run(TALKER, "talker")
-    pid = made.run('robot = launch("talker").start()\nrobot.program("talker").pid').text.split()[-1]
+    pid = made.run('robot = launch("talker").start()\nrobot.program("talker")._program.pid').text.split()[-1]
     assert Path(f"/proc/{pid}").exists()
     made.close()
     deadline = time.monotonic() + WITHIN

@@ -19,7 +19,7 @@ from typing import Any
 
 import pytest
 from boxes import ATTACKS, RUN_STDIN, as_ordinary_user, in_sandbox
-from places import ROOT
+from places import TESTS
 
 from autograder.sandbox.isolation import preflight
 
@@ -44,8 +44,8 @@ def report(request: pytest.FixtureRequest) -> dict[str, dict[str, Any]]:
         pytest.skip(preflight().why_not_full)
     with socket.create_server(("127.0.0.1", 0)) as listener:
         given = f"ATTACKS = {ATTACKS!r}\nHOST_PORT = {listener.getsockname()[1]}\n"
-        driver = (ROOT / "tests" / "attack_driver.py").read_text().replace("from __future__ import annotations\n", "")
-        source = given + driver
+        driver = (TESTS / "support" / "attack_driver.py").read_text()
+        source = given + driver.replace("from __future__ import annotations\n", "")
         if request.param == "own user":
             said = in_sandbox(source, RUN)
             text = said.stdout + said.stderr

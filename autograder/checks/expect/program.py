@@ -50,6 +50,10 @@ _UNTAKEN += "signals, but not for a context of your own and not with `SignalHand
 _SPINS_WITHIN = 3.0
 """Seconds for which a program is let alone until it spins: before that it has not reached what catches the signal."""
 
+_COMES_TO_REST = 0.1
+"""Seconds in which a program that has just answered waits again. A signal that comes before that lets `spin` return
+without an exception, and then nothing is seen of what the program does with one."""
+
 _CONTEXT_GONE = "the given context is not valid"
 _RACE_OF_RCLPY = re.compile(rf", in _wait_for_ready_callbacks\n(?: .*\n)+\S+: .*{_CONTEXT_GONE}")
 """What rclpy raises once in a while if the signal comes just when it begins to wait: no mistake of the program's.
@@ -296,6 +300,7 @@ class StartedProgram(Noun):
         program = self._program
         self._running.may_end.append(program)
         self._observer.wait(lambda: self._spun(program) or not program.running(), _SPINS_WITHIN)
+        self._observer.pause(_COMES_TO_REST)
         said_before = len(program.output())
         program.signal(getattr(signal, by))
         if not self._observer.wait(lambda: not program.running(), within) and self._woke_too_soon(program, by):
