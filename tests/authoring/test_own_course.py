@@ -238,6 +238,8 @@ def test_outside_of_a_course_nbgrader_executes_nothing(environment: Environment,
     [
         ("check_greeter", ").expect()", ").expct()", "there is no `expct`; `expect` may be meant"),
         ("check_greeter", "ros.node", "ros.nod", "there is no `nod`; `node` may be meant"),
+        ("check_greeter", "ros.node(", "one, two = ros.node('/one'), 2; one.expct(); ros.node(", "there is no `expct`"),
+        ("check_greeter", "with launch(", "def own(ros):\n    ros.nod('/one')\n\nwith launch(", "there is no `nod`"),
         ("check_greeter", "at_least=3", "at_last=3", "`expect_messages` has no argument `at_last`; `at_least` may be"),
         (
             "check_greeter",

@@ -235,20 +235,39 @@ def _unknown_expectations(tree: ast.AST) -> Iterator[str]:
 
 
 def _nouns_of(tree: ast.AST) -> dict[str, type]:
-    """The names of a cell that stand for a noun: `ros` of a block, and what was assigned from one."""
-    names: dict[str, type] = {}
+    """The names of a cell that stand for a noun: `ros` of a block or a function, and what was assigned from one."""
+    names: dict[str, type] = {
+        node.arg: Launch for node in ast.walk(tree) if isinstance(node, ast.arg) and node.arg == "ros"
+    }
     for node in ast.walk(tree):
         if isinstance(node, ast.withitem) and isinstance(node.optional_vars, ast.Name):
             call = node.context_expr
             if isinstance(call, ast.Call) and isinstance(call.func, ast.Name) and call.func.id in _BLOCKS:
                 names[node.optional_vars.id] = _BLOCKS[call.func.id]
-    bound: dict[str, set[type | None]] = {}
+    values: dict[str, list[ast.expr]] = {}
+    for name, value in _assigned(tree):
+        values.setdefault(name, []).append(value)
+    # What is also bound in another way, by a loop or as an argument, is another thing there.
+    times = Counter(_bound(tree))
+    for name, of in values.items():
+        nouns = {_noun_of(value, names) for value in of}
+        noun = nouns.pop() if len(nouns) == 1 and times[name] == len(of) else None
+        if noun is not None:
+            names[name] = noun
+    return names
+
+
+def _assigned(tree: ast.AST) -> Iterator[tuple[str, ast.expr]]:
+    """Each name that is assigned to, with its value: `a = …`, and `a, b = …, …`."""
     for node in ast.walk(tree):
-        if isinstance(node, ast.Assign):
-            for target in node.targets:
-                if isinstance(target, ast.Name):
-                    bound.setdefault(target.id, set()).add(_noun_of(node.value, names))
-    return names | {name: one for name, found in bound.items() if len(found) == 1 and (one := next(iter(found)))}
+        if not isinstance(node, ast.Assign):
+            continue
+        for target in node.targets:
+            if isinstance(target, ast.Tuple) and isinstance(node.value, ast.Tuple):
+                pairs = list(zip(target.elts, node.value.elts, strict=False))
+            else:
+                pairs = [(target, node.value)]
+            yield from ((one.id, value) for one, value in pairs if isinstance(one, ast.Name))
 
 
 def _noun_of(value: ast.expr, names: Mapping[str, type]) -> type | None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 import re
 from collections.abc import Callable
 from dataclasses import replace
@@ -154,27 +153,10 @@ class Expectations:
             self._running.settle_programs()
             self._fail(title, diagnose(), expected=expected, observed=text, hint=hint)
 
-    def _require(
-        self,
-        condition: object,
-        title: str,
-        *,
-        expected: str = "",
-        observed: str = "",
-        because: str = "",
-        hint: str = "",
-        code: str = "",
-        evident: object = False,
-        node: str = "",
-        goal: Goal | None = None,
-    ) -> None:
-        """State a fact that the check has established; `ros.require` says what the arguments mean."""
-        if inspect.isroutine(condition):
-            raise Misuse("require: its condition is a function, and a function is always true; call it.")
-        if condition:
-            outcomes.passed(title, expected=expected, observed=observed)
-            return
-        self._running.settle_programs()
+    def _why_not(
+        self, because: str, *, code: str = "", evident: object = False, node: str = "", goal: Goal | None = None
+    ) -> Reason | None:
+        """Why a fact does not hold that the check has established; `ros.require` says what the arguments mean."""
         scene = self._scene()
         found = (
             diagnosis.program_trouble(scene),
@@ -185,8 +167,7 @@ class Expectations:
         vague = (EXITED, NOT_SPINNING, SPINNING_ENDED) if because else ()
         trouble = next((one for one in found if one and one.kind not in vague), None)
         kind = kind_of_lab(code) if code else REQUIRED
-        reason = trouble or (kind(because) if because else None)
-        self._fail(title, reason, expected=expected, observed=observed, hint=hint)
+        return trouble or (kind(because) if because else None)
 
 
 class Noun(Expectations):

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import inspect
 from typing import TYPE_CHECKING, Any
 
 from autograder.checks import outcomes
 from autograder.checks.expect.expectations import Expectations
 from autograder.checks.expect.topic import CONTENT
+from autograder.checks.misuse import Misuse
 from autograder.reasons import Group, Kind
 
 if TYPE_CHECKING:
@@ -58,17 +60,16 @@ class Facts(Expectations):
         Codes:
             `code`, by default `required` with a reason and `failed` without.
         """
-        self._require(
+        if inspect.isroutine(condition):
+            raise Misuse("require: its condition is a function, and a function is always true; call it.")
+        seen = goal.seen if goal is not None else None
+        self._expect_that(
             condition,
             title,
+            lambda: self._why_not(because, code=code, evident=evident, node=node, goal=seen),
             expected=expected,
             observed=observed,
-            because=because,
             hint=hint,
-            code=code,
-            evident=evident,
-            node=node,
-            goal=goal.seen if goal is not None else None,
         )
 
     def require_equal(

@@ -391,15 +391,13 @@ class Topic(Sources):
 
         came = self._wait(lambda: last() == [value] * times, within)
         said = ", ".join(map(str, last())) or "nothing"
-        self._require(
+        because = because.replace("{said}", said) or f"After {within:g} s, the last of its messages says `{said}`."
+        self._expect_that(
             came,
             title or f"`{self.name}` says `{value}`",
+            lambda: self._why_not(because, code=code, evident=evident, node=node),
             expected=str(value) + f", {times} times" * (times > 1),
             observed=said,
-            because=because.replace("{said}", said) or f"After {within:g} s, the last of its messages says `{said}`.",
-            code=code,
-            evident=evident,
-            node=node,
             hint=hint,
         )
 
