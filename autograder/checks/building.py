@@ -9,14 +9,17 @@ from dataclasses import replace
 from typing import NoReturn
 
 from autograder.checks import current, outcomes
-from autograder.checks.parts import part
-from autograder.checks.scoring import Score, score
+from autograder.checks.scoring import Score, part, score
 from autograder.graph.names import nearest
-from autograder.packages.built import Built
-from autograder.packages.executables import why_no_executable, why_other_target
+from autograder.packages.built import (
+    Built,
+    InterfaceError,
+    imported_interfaces,
+    interface_parts,
+    why_no_executable,
+    why_other_target,
+)
 from autograder.packages.explain import PACKAGE_XML, needed_packages, not_described, why_not_built
-from autograder.packages.imports import imported_interfaces
-from autograder.packages.interfaces import InterfaceError, interface_parts
 from autograder.packages.workspace import missing_tools
 from autograder.reasons import Group, Kind, Reason
 
@@ -46,7 +49,7 @@ class Package:
         return outcomes.ends_block(error, ran=not missing_tools())
 
     def part(self, title: str) -> AbstractContextManager[None]:
-        """A block whose expectations give points of their own; see `autograder.checks.parts`.
+        """A block whose expectations give points of their own; see `autograder.checks.scoring`.
 
         Args:
             title: what the part is called in the score and in the report.

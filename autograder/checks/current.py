@@ -8,19 +8,77 @@ from __future__ import annotations
 
 import atexit
 import random
+import time
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
-from autograder.checks.findings import Findings
 from autograder.core import front_end
 from autograder.core.front_end import FrontEnd
-from autograder.core.results import Isolation
-from autograder.graph.bag import Bag
+from autograder.core.results import Isolation, NodeLog, Outcome
 from autograder.graph.observer import Observer
+from autograder.graph.patience import Patience
+from autograder.graph.recording import Bag
 from autograder.packages.workspace import SOURCES, Workspace
 from autograder.sandbox.build import BuildRun
 from autograder.sandbox.node_sandbox import NodeSandbox
+
+
+@dataclass(frozen=True)
+class Asked:
+    """Something that the check sent to the programs."""
+
+    when: float
+    """Seconds on the monotonic clock, just before it was sent."""
+    what: str
+    """The full name of a topic or service, or "parameter"."""
+    parts: frozenset[str]
+    """Titles of the parts that this launch had finished with before."""
+
+
+class Findings:
+    """One cell's findings."""
+
+    def __init__(self) -> None:
+        """Begin with none."""
+        self.alone = False
+        """Whether these checks are run again, with nothing else of this kit beside them."""
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget the findings so far: a new cell begins."""
+        self.outcomes: list[Outcome] = []
+        self.part = ""
+        """Title of the part of the check that is being looked at."""
+        self.lost_parts: set[str] = set()
+        """Parts of launches that failed as a whole, or outside of any part."""
+        self.block_began = 0
+        """Number of the first outcome of the current launch or table."""
+        self.asked: list[Asked] = []
+        """What the current launch has been sent."""
+        self.finished: set[str] = set()
+        """Titles of the parts that the current launch has finished with."""
+        self.used: set[str] = set()
+        """Names of the student's files that the check uses."""
+        self.flags: list[str] = []
+        """Contradictions between what the graph showed and what was seen inside the programs."""
+        self.logs: list[NodeLog] = []
+        self.patience = Patience(self.alone)
+        """How much longer the waits of this check may still take on a busy machine."""
+        self.starved = 0.0
+        """Seconds that others withheld from the programs when something was decided against them."""
+        self._began = time.monotonic()
+
+    def begin_block(self) -> None:
+        """A launch or a table begins."""
+        self.block_began = len(self.outcomes)
+        self.asked, self.finished = [], set()
+
+    @property
+    def seconds(self) -> float:
+        """How long ago the cell, or what comes after its last score, began."""
+        return time.monotonic() - self._began
 
 
 class Launched(Protocol):

@@ -14,8 +14,7 @@ from autograder.checks.expect.node import Node
 from autograder.checks.expect.program import StartedProgram
 from autograder.checks.expect.publisher import Publisher
 from autograder.checks.expect.qos import Qos
-from autograder.checks.expect.server import Server
-from autograder.checks.expect.service import Service
+from autograder.checks.expect.service import Server, Service
 from autograder.checks.expect.topic import Topic
 from autograder.checks.launch import Launch
 

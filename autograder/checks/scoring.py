@@ -2,11 +2,50 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import contextlib
+import time
+from collections.abc import Iterator, Mapping, Sequence
 
 from autograder.checks import current, outcomes
+from autograder.checks.current import Asked
 from autograder.core import interrupts
 from autograder.core.results import CellResult, Outcome, Part, Status
+
+
+@contextlib.contextmanager
+def part(title: str) -> Iterator[None]:
+    """Count what is found out inside the block for the part `title` of the score.
+
+    Raises:
+        ValueError: parts do not nest, and each has a title.
+    """
+    if current.check.findings.part or not title:
+        raise ValueError(f"part({title!r}): parts have a title and do not nest.")
+    current.check.findings.part = title
+    try:
+        yield
+    except outcomes.LaunchEnded:
+        raise
+    except outcomes.CheckEnded:
+        pass
+    except Exception as error:
+        if not outcomes.ends_part(error):
+            raise
+    finally:
+        current.check.findings.part = ""
+    current.check.findings.finished.add(title)
+
+
+def asked(what: str) -> None:
+    """Note that the check is about to send something: on this topic, to this service, or a "parameter"."""
+    findings = current.check.findings
+    findings.asked.append(Asked(time.monotonic(), what, frozenset(findings.finished)))
+
+
+def before(what: str, when: float) -> frozenset[str]:
+    """Titles of the parts that were finished before the check sent what led to a callback for `what` at this moment."""
+    sent = [one for one in current.check.findings.asked if one.when < when and one.what == what]
+    return sent[-1].parts if sent else frozenset()
 
 
 class Score:

@@ -12,7 +12,7 @@ import time
 from collections import Counter
 from collections.abc import Sequence
 
-from autograder.diagnosis.events import read
+from autograder.diagnosis.inside import read
 from autograder.graph.names import node_of
 from autograder.graph.observer import Observer
 from autograder.sandbox.inside.probe.events import Event, ExecutorSeen, NodeSeen, ProbeFailed, Thing

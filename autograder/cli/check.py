@@ -17,8 +17,8 @@ from autograder.core.results import Isolation  # its values stand in the command
 
 if TYPE_CHECKING:
     from autograder.core.results import SubmissionResult
-    from autograder.course.book import Book
     from autograder.course.lab import Lab
+    from autograder.course.settings import Book
     from autograder.grading.runner import Settings
     from autograder.report.audience import Audience
 
@@ -55,8 +55,8 @@ def check(
     """
     if not notebook.is_file():
         raise KitError(f"There is no notebook {notebook}.", "Name an .ipynb file.")
-    from autograder.course.book import read_book
-    from autograder.course.folder import trusted_course
+    from autograder.course.paths import trusted_course
+    from autograder.course.settings import read_book
     from autograder.grading.runner import Settings
     from autograder.submission.reader import lab_of
 
@@ -89,7 +89,7 @@ def isolation_for(wanted: Isolation | None) -> Isolation:
     Raises:
         KitError: this machine does not offer it.
     """
-    from autograder.course.folder import is_students_kit
+    from autograder.course.paths import is_students_kit
     from autograder.sandbox.isolation import choose, most
 
     if wanted is not None or not is_students_kit():
@@ -113,7 +113,7 @@ def checked(
         audience: for whom the report is printed, each verdict as soon as it is there; None prints none.
     """
     from autograder.grading.runner import WORKERS_FOR_ONE, run_submission
-    from autograder.report.live_report import LiveReport
+    from autograder.report.terminal import LiveReport
 
     student = notebook.parent.resolve().name
     with LiveReport([check.grade_id for check in lab.checks], audience, book) as report:

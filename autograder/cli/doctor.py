@@ -17,7 +17,7 @@ from rich.text import Text
 
 from autograder.core.errors import KitError
 from autograder.core.version import VERSION
-from autograder.course.folder import course_root
+from autograder.course.paths import course_root
 from autograder.sandbox.environment import profile_environment
 from autograder.setup.environment import digest, read_marker
 from autograder.setup.interpreter import NEWEST, OLDEST

@@ -26,9 +26,8 @@ def explain(
 
     To get the messages, the check is run once more, with the same values.
     """
-    from autograder.course.book import read_book
-    from autograder.course.folder import course_root
-    from autograder.course.paths import CoursePaths
+    from autograder.course.paths import CoursePaths, course_root
+    from autograder.course.settings import read_book
     from autograder.report.terminal import console, evidence_view, submission_view
 
     root = course_root(course)
@@ -96,8 +95,7 @@ def _messages(root: Path, result: SubmissionResult, check: CheckResult, bag: Pat
     from autograder.course.paths import CoursePaths
     from autograder.grading.messages import received, write_mcap
     from autograder.grading.runner import Settings
-    from autograder.report.live_report import working
-    from autograder.report.terminal import console
+    from autograder.report.terminal import console, working
     from autograder.sandbox.isolation import choose
     from autograder.submission.reader import read_submission
 

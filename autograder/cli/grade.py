@@ -107,7 +107,7 @@ def _places(course: Path | None, lab: str, submissions: Path | None) -> tuple[Pa
     Raises:
         KitError: there are none, or they hold the course.
     """
-    from autograder.course.folder import course_root
+    from autograder.course.paths import course_root
 
     root = course_root(course)
     source = submissions or CoursePaths(root).sample_class(lab)

@@ -39,7 +39,7 @@ def new_course(
 @app.command()
 def trust(folder: Annotated[Path, typer.Argument(metavar="DIR", help="The folder of a course of yours.")]) -> None:
     """Register a folder as a course of yours, so that its nbgrader_config.py, which is a program, may run."""
-    from autograder.course.folder import course_root
+    from autograder.course.paths import course_root
     from autograder.gradebook.own_courses import trust as note
 
     root = course_root(folder)
@@ -54,7 +54,7 @@ def new_lab(
 ) -> None:
     """Write a small, complete lab with checks into the course, which you change into your own."""
     from autograder.authoring.courses import new_lab as write
-    from autograder.course.folder import course_root
+    from autograder.course.paths import course_root
 
     for path in write(course_root(course), name):
         print(path)
@@ -71,9 +71,8 @@ def lint(
     """Say what is wrong with a lab: in its cells and checks, in what students would receive, and when it runs."""
     from autograder.authoring.lint.runs import run_findings
     from autograder.authoring.lint.static import course_findings, read_findings, release_findings
-    from autograder.course.folder import course_root
     from autograder.course.lab import lab_names, load_lab
-    from autograder.course.paths import CoursePaths
+    from autograder.course.paths import CoursePaths, course_root
     from autograder.gradebook.release import released_files
     from autograder.grading.canaries import known_answers
     from autograder.sandbox.isolation import choose
@@ -110,8 +109,8 @@ def release(
     from autograder.authoring.release import START_PAGE, start_page
     from autograder.authoring.release import release as generate
     from autograder.core.files import write_beside
-    from autograder.course.folder import course_root
     from autograder.course.lab import lab_names
+    from autograder.course.paths import course_root
 
     root = course_root(course)
     for name in [lab] if lab else lab_names(root):
@@ -129,8 +128,7 @@ def kit(
 ) -> None:
     """Write what students get into build/release, as a folder and a zip: labs, a lock, the kit without solutions."""
     from autograder.authoring.student_kit import write_kit
-    from autograder.course.folder import course_root
-    from autograder.course.paths import CoursePaths
+    from autograder.course.paths import CoursePaths, course_root
 
     root = course_root(course)
     pages = book or CoursePaths(root).book
@@ -148,6 +146,6 @@ def gradescope(
 ) -> None:
     """Write a lab's autograder for Gradescope: a zip to upload, which checks each submission when it is handed in."""
     from autograder.authoring.gradescope import write_gradescope
-    from autograder.course.folder import course_root
+    from autograder.course.paths import course_root
 
     print(write_gradescope(course_root(course), lab, file))

@@ -25,8 +25,7 @@ def jupyter(
 ) -> None:
     """Open the course's labs in JupyterLab, with the settings that students work with."""
     from autograder.core.errors import KitError
-    from autograder.course.folder import course_root, is_students_kit
-    from autograder.course.paths import CoursePaths
+    from autograder.course.paths import CoursePaths, course_root, is_students_kit
     from autograder.notebook import JUPYTER_SETTINGS
     from autograder.setup.labs import put_labs
 

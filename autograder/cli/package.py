@@ -23,8 +23,8 @@ def package(
     """Write a lab's programs and launch files as packages for an installed ROS 2."""
     if notebook is not None and not notebook.is_file():
         raise KitError(f"There is no notebook {notebook}.", "Name an .ipynb file.")
-    from autograder.course.folder import course_root
     from autograder.course.lab import load_lab
+    from autograder.course.paths import course_root
     from autograder.packages.ament_package import lab_files, packages_in, write_packages
 
     found = load_lab(course_root(course), lab)

@@ -24,8 +24,7 @@ def report(course: CourseOption = None) -> None:
     """Write a page about the class for each lab, build/report/LAB.html, for instructors and not for students."""
     import datetime
 
-    from autograder.course.folder import course_root
-    from autograder.course.paths import CoursePaths
+    from autograder.course.paths import CoursePaths, course_root
     from autograder.gradebook.grades import class_entries
     from autograder.report.class_page import write_class_page
 
@@ -53,7 +52,7 @@ def export(
     Exit status: 0, or 3 if somebody is not in the export; the command names them and says why.
     """
     from autograder.core.files import write_beside
-    from autograder.course.folder import course_root
+    from autograder.course.paths import course_root
     from autograder.gradebook.grades import class_entries
 
     if form not in FORMATS:
@@ -102,9 +101,8 @@ def similar(
     import json
     from dataclasses import asdict
 
-    from autograder.course.folder import course_root
     from autograder.course.lab import load_lab
-    from autograder.course.paths import CoursePaths
+    from autograder.course.paths import CoursePaths, course_root
     from autograder.grading.store import ResultStore
     from autograder.report.terminal import console, similar_view
     from autograder.submission.reader import read_submission

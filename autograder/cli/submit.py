@@ -40,7 +40,7 @@ def submit(
     if not notebook.is_file():
         raise KitError(f"There is no notebook {notebook}.", "Name an .ipynb file.")
     from autograder.core.files import write_beside
-    from autograder.course.folder import course_root, trusted_course
+    from autograder.course.paths import course_root, trusted_course
     from autograder.notebook.hand_in import look_over
     from autograder.report.terminal import console, plain
     from autograder.submission.notebook_file import NOTEBOOK_BYTES
@@ -77,9 +77,9 @@ def submit(
 def _checks(packed: Path, lab: str, isolation: Isolation | None, course: Path | None, gap: bool) -> str:
     """Run the visible checks on what is handed in, show a line for each, and return the points in words."""
     from autograder.cli.check import checked, isolation_for
-    from autograder.course.book import read_book
-    from autograder.course.folder import trusted_course
     from autograder.course.lab import load_lab
+    from autograder.course.paths import trusted_course
+    from autograder.course.settings import read_book
     from autograder.grading.runner import Settings
     from autograder.report.terminal import console, summary_view
     from autograder.report.words import total

@@ -11,7 +11,7 @@ threads' stacks) is used here for the *reason* only; points never depend on it, 
 has ended, what was seen before stands where its probe tells that the check's own message or request ended it.
 """
 
-from autograder.diagnosis.callbacks import called_from_outside, failed_in_a_callback
+from autograder.diagnosis.callbacks import called_from_outside, failed_in_a_callback, why_all_alike
 from autograder.diagnosis.chain import inside_reason, reason_inside
 from autograder.diagnosis.diagnosed import DiagnosedProgram
 from autograder.diagnosis.goals import (
@@ -24,10 +24,8 @@ from autograder.diagnosis.goals import (
     why_waits_for_a_goal,
     why_wrong_feedback,
 )
-from autograder.diagnosis.loops import why_all_alike
-from autograder.diagnosis.matching import why_not_matched
 from autograder.diagnosis.names import why_doubled, why_no_endpoint, why_no_node, why_no_service, why_topic_present
-from autograder.diagnosis.programs import program_trouble, shut_down_inside
+from autograder.diagnosis.programs import program_trouble, shut_down_inside, thread_left
 from autograder.diagnosis.scene import Scene
 from autograder.diagnosis.silence import (
     SILENT,
@@ -36,9 +34,9 @@ from autograder.diagnosis.silence import (
     nothing_due,
     paces,
     why_no_answer,
+    why_not_matched,
     why_silent,
 )
-from autograder.diagnosis.spinning import thread_left
 from autograder.diagnosis.together import (
     layout,
     waits_for_its_group,

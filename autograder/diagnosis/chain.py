@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
-from autograder.diagnosis import blocked, callbacks, spinning
+from autograder.diagnosis import blocked, callbacks, programs
 from autograder.diagnosis.scene import Scene, first
 from autograder.reasons import Reason
 
@@ -33,12 +33,12 @@ SEEN: tuple[Link, ...] = (
     blocked.await_same_group,
     blocked.busy_wait,
     blocked.rate_unspun,
-    spinning.in_the_constructor,
-    spinning.not_added,
-    spinning.never_spun,
-    spinning.pulled_down,
-    spinning.thread_left,
-    spinning.no_longer_spun,
+    programs.in_the_constructor,
+    programs.not_added,
+    programs.never_spun,
+    programs.pulled_down,
+    programs.thread_left,
+    programs.no_longer_spun,
     blocked.takes_turn,
     blocked.stuck,
 )

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import re
 import time
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import TypeVar
+from typing import Annotated, Any, TypeVar
+
+from pydantic import Field, TypeAdapter, ValidationError
 
 from autograder.arguments.rule_effect import full_name
 from autograder.diagnosis import sources
 from autograder.diagnosis.diagnosed import DiagnosedProgram
-from autograder.diagnosis.events import read
 from autograder.graph.observer import Observer
 from autograder.sandbox.inside.probe.events import (
     Attached,
@@ -24,6 +25,20 @@ from autograder.sandbox.inside.probe.events import (
     ProbeFailed,
     Thing,
 )
+
+_READER: TypeAdapter[Event] = TypeAdapter(Annotated[Event, Field(discriminator="e")])
+
+
+def read(lines: Iterable[dict[str, Any]]) -> list[Event]:
+    """The events that have the form of one, in their order."""
+    found = []
+    for line in lines:
+        try:
+            found.append(_READER.validate_python(line))
+        except ValidationError:
+            continue
+    return found
+
 
 _T = TypeVar("_T")
 

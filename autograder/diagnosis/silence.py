@@ -6,10 +6,9 @@ from collections.abc import Sequence
 
 from rclpy.qos import DurabilityPolicy, QoSProfile
 
-from autograder.diagnosis import callbacks, spinning
+from autograder.diagnosis import callbacks, programs
 from autograder.diagnosis.chain import inside_reason
 from autograder.diagnosis.inside import Inside, called, listed
-from autograder.diagnosis.matching import why_not_matched
 from autograder.diagnosis.names import why_no_endpoint
 from autograder.diagnosis.programs import program_trouble
 from autograder.diagnosis.scene import Scene, first
@@ -18,6 +17,40 @@ from autograder.graph import qos
 from autograder.graph.names import node_of, type_name
 from autograder.reasons import Group, Kind, Reason
 from autograder.sandbox.inside.probe.events import LifecyclePublishOff, Thing
+
+QOS_RELIABILITY = Kind("qos-reliability", "offered and requested reliability do not match", Group.SILENCE, "qos")
+QOS_DURABILITY = Kind("qos-durability", "offered and requested durability do not match", Group.SILENCE, "qos")
+QOS_DEADLINE = Kind("qos-deadline", "offered and requested deadline do not match", Group.SILENCE, "qos")
+QOS_LIVELINESS = Kind("qos-liveliness", "offered and requested liveliness do not match", Group.SILENCE, "qos")
+QOS_LEASE = Kind("qos-lease", "offered and requested lease do not match", Group.SILENCE, "qos")
+
+MISMATCH = {
+    "reliability": QOS_RELIABILITY,
+    "durability": QOS_DURABILITY,
+    "deadline": QOS_DEADLINE,
+    "liveliness": QOS_LIVELINESS,
+    "lease": QOS_LEASE,
+}
+"""The kinds by the policies over which two ends do not match."""
+
+
+def why_not_matched(scene: Scene, topic: str, profile: QoSProfile, kind: str) -> Reason | None:
+    """Must have seen: a `kind` of the student's on the topic whose QoS does not match an endpoint with `profile`."""
+    ends = scene.observer.publishers(topic) if kind == "publisher" else scene.observer.subscriptions(topic)
+    for end in ends:
+        offered, requested = (end.qos_profile, profile) if kind == "publisher" else (profile, end.qos_profile)
+        policy = qos.first_mismatch(offered, requested)
+        if policy:
+            words = policy.split()[0] if policy != "liveliness lease" else "lease"
+            gives, wants = qos.describe(offered)[words], qos.describe(requested)[words]
+            owner = node_of(end)
+            return MISMATCH[words](
+                f"The {policy} of the publisher on `{topic}` does not match that of the subscription: offered is "
+                f"{qos.in_words(gives)}, requested is {qos.in_words(wants)}. The {kind} belongs to `{owner}`.",
+                "A subscription must not request more than the publisher offers.",
+            )
+    return None
+
 
 NO_ANSWER = Kind("no-answer", "no reason was established: what was seen is said", Group.SILENCE)
 TIMER_PERIOD = Kind(
@@ -212,7 +245,7 @@ def why_no_answer(scene: Scene, name: str) -> Reason:
     if found:
         return found
     insides = [inside for inside in scene.inside_of(_owner(scene, name)) if inside.alive]
-    found = first((spinning.cannot_answer,), insides) or why_starved(scene)
+    found = first((programs.cannot_answer,), insides) or why_starved(scene)
     if found:
         return found
     for inside in insides:

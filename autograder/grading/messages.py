@@ -18,7 +18,7 @@ from autograder.core.results import CheckResult
 from autograder.course.lab import Lab
 from autograder.grading.runner import Settings, job_of
 from autograder.grading.supervisor import limit
-from autograder.graph.bag import BagMessage
+from autograder.graph.recording import BagMessage
 from autograder.ros2.interfaces import source_of
 from autograder.sandbox.grading_sandbox import run_in_sandbox
 from autograder.submission.reader import read_submission

@@ -15,7 +15,7 @@ from typing import Any
 
 from autograder.core.errors import KitError
 from autograder.core.results import Isolation, Outcome, Status
-from autograder.course.folder import is_students_kit, trusted_course
+from autograder.course.paths import is_students_kit, trusted_course
 from autograder.grading.runner import WORKERS_FOR_ONE, Settings, run_submission
 from autograder.report import words
 from autograder.report.audience import result_for

@@ -24,10 +24,9 @@ from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from autograder.core import interrupts
 from autograder.core.errors import KitError
-from autograder.graph.bag import Bag
 from autograder.graph.names import full_name
 from autograder.graph.patience import Patience
-from autograder.graph.recording import Recording, quiet_profile
+from autograder.graph.recording import Bag, Recording, quiet_profile
 
 POLL = 0.02
 """Seconds between two looks at the graph while waiting: rclpy reports messages, but not every graph change."""

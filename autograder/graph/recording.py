@@ -2,17 +2,64 @@
 
 from __future__ import annotations
 
+import base64
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Protocol
 
+from pydantic import BaseModel, ConfigDict
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.qos import QoSDurabilityPolicy, QoSHistoryPolicy, QoSPolicyKind, QoSProfile, QoSReliabilityPolicy
 from rclpy.serialization import deserialize_message
 
-from autograder.graph.bag import Bag
+_ROOM = 16 * 1024 * 1024
+"""Bytes of messages that are kept for one check."""
+
+
+class BagMessage(BaseModel):
+    """One message, serialised."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    grade_id: str
+    """The check that received it."""
+    topic: str
+    type: str
+    """Such as `std_msgs/msg/String`."""
+    stamp: int
+    """When it was published, in nanoseconds on the publisher's system clock."""
+    data: str
+    """Its CDR, in base64."""
+
+
+class Bag:
+    """Keeps messages for one check after the other."""
+
+    def __init__(self) -> None:
+        """Keep nothing before somebody asks for it."""
+        self.wanted = False
+        self._taken: list[tuple[str, str, int, bytes]] = []
+        self._room = _ROOM
+
+    def add(self, topic: str, msg_type: type, stamp: int, data: bytes) -> None:
+        """Keep a message, if anybody wants it and there is room."""
+        if self.wanted and len(data) <= self._room:
+            self._room -= len(data)
+            package, kind, *_ = msg_type.__module__.split(".")
+            self._taken.append((topic, f"{package}/{kind}/{msg_type.__name__}", stamp, data))
+
+    def empty(self, grade_id: str) -> list[BagMessage]:
+        """Return what was kept, as that of a check, and begin anew."""
+        taken, self._taken, self._room = self._taken, [], _ROOM
+        return [
+            BagMessage(
+                grade_id=grade_id, topic=topic, type=name, stamp=stamp, data=base64.b64encode(data).decode("ascii")
+            )
+            for topic, name, stamp, data in taken
+        ]
+
 
 _MESSAGE_OVERHEAD = 1024
 """Bytes that a message takes besides its own, about."""

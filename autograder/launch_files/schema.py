@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from autograder.core import student_yaml
-from autograder.launch_files import opening, substitutions, values, words
+from autograder.launch_files import files, substitutions, texts, values
 from autograder.launch_files.errors import Place
 from autograder.launch_files.texts import Text, parse, unescaped
 from autograder.reasons import Refused
@@ -49,7 +49,7 @@ def read_file(path: Path) -> list[Action]:
         Refused: it is missing, is no launch file, or has what `ros2 launch` refuses or what is not covered.
     """
     place = Place(path.name, path.resolve().parent)
-    body = opening.content(path, place)
+    body = files.content(path, place)
     if isinstance(body, dict) and set(body) <= {"children", "deprecated"} and "children" in body:
         if not isinstance(body.get("deprecated", ""), str):
             raise place.at("deprecated").error("a text is expected here.")
@@ -168,7 +168,7 @@ def _escaped(value: Any, place: Place) -> str:
 
 
 def _command_line(value: Any, place: Place) -> list[Text]:
-    found: list[Text] = refusing(place, lambda: words.split(_text(value, place)))
+    found: list[Text] = refusing(place, lambda: texts.split(_text(value, place)))
     return found
 
 

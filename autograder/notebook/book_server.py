@@ -11,7 +11,7 @@ from typing import Any
 from jupyter_server.base.handlers import AuthenticatedFileHandler
 from jupyter_server.utils import url_path_join
 
-from autograder.course.folder import book_of_kit
+from autograder.course.paths import book_of_kit
 
 ROUTE = "lectures"
 

@@ -2,8 +2,14 @@
 
 from __future__ import annotations
 
+import ast
+import difflib
+import re
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
+
+from autograder.reasons import Group, Kind, Reason
 
 
 @dataclass(frozen=True)
@@ -36,3 +42,133 @@ class Built:
     def text(self, path: str) -> str:
         """Return an installed file as text; empty if there is none."""
         return (self.folder / path).read_text("utf-8", "replace") if path in self.files else ""
+
+
+ENTRY_POINT = Kind("entry-point", "setup.py has no entry point of this name", Group.BUILT)
+ENTRY_POINT_TARGET = Kind(
+    "entry-point-target", "the entry point leads to a module or function that is not installed", Group.BUILT
+)
+EXECUTABLE_PLACE = Kind("executable-place", "the executable is installed, and not where `ros2 run` looks", Group.BUILT)
+
+_MISSPELT = 0.85
+"""How alike two names of programs have to be for one to be the other misspelt: `speed_sensor` is no `speed_monitor`."""
+
+
+def why_no_executable(built: Built, name: str) -> Reason | None:
+    """Why `ros2 run` finds no executable of a name; None if it does."""
+    if name in built.executables:
+        return None
+    places = (path.rpartition("/")[0] for path in sorted(built.files) if path.endswith(f"/{name}"))
+    where = next((place for place in places if place.split("/")[0] in ("bin", "lib") and "python" not in place), "")
+    points = _entry_points(built)
+    if where or name in points:
+        because = f"`{name}` is installed in {f'`{where}`' if where else 'another place'}."
+        because += f" `ros2 run` looks in `lib/{built.name}` only."
+        wanted = f"setup.cfg says where scripts go, below `[install]`: `install_scripts=$base/lib/{built.name}`."
+        return EXECUTABLE_PLACE(because, wanted)
+    near = next(iter(difflib.get_close_matches(name, points, 1, _MISSPELT)), "")
+    has = ", ".join(f"`{one}`" for one in sorted(points)) or "none"
+    because = f"setup.py has no entry point of the name `{name}`; its console_scripts are: {has}."
+    return ENTRY_POINT(because + (f" Is `{near}` meant to be it?" if near else ""))
+
+
+def why_other_target(built: Built, name: str, wanted: str = "") -> Reason | None:
+    """Why an executable does not lead to its function; None if it does, or to something that is made at run time.
+
+    Args:
+        built: the package.
+        name: of the executable.
+        wanted: as `module:function`; without it, any function that is there will do.
+    """
+    target = re.sub(r"\s|\[.*", "", _entry_points(built).get(name, ""))
+    module, _, function = target.partition(":")
+    path = next((one for one in built.files if one.endswith(f"/site-packages/{module.replace('.', '/')}.py")), "")
+    first = re.escape(function.partition(".")[0])
+    defined = rf"^((def|class) {first}\b|{first}\s*=|.*\bimport\b.*\b{first}\b)"
+    if target and ":" not in target:
+        because = f"The entry point `{name}` leads to `{target}`, which has no `:` between module and function."
+    elif not path:
+        because = f"The entry point names the module `{module}`, and no such module is installed."
+        where = "Only the folders of code that `packages` in setup.py names are installed."
+        return ENTRY_POINT_TARGET(because, where)
+    elif not re.search(defined, built.text(path), re.MULTILINE):
+        because = f"The entry point names `{function}`, and the module `{module}` has no function of that name."
+    elif wanted and target != wanted:
+        because = f"The entry point `{name}` leads to `{target}`, not to `{wanted}`."
+    else:
+        return None
+    return ENTRY_POINT_TARGET(because)
+
+
+def _entry_points(built: Built) -> dict[str, str]:
+    """The console scripts that setup.py names, as `module:function` by name."""
+    for path in built.files:
+        if path.endswith("/entry_points.txt"):
+            section = built.text(path).partition("[console_scripts]")[2].partition("\n[")[0]
+            pairs = (line.partition("=") for line in section.splitlines() if "=" in line)
+            return {name.strip(): target.strip() for name, _, target in pairs}
+    return {}
+
+
+def imported_interfaces(sources: Path) -> dict[str, str]:
+    """Return the packages whose messages, services or actions are imported, each with the first module that does.
+
+    Args:
+        sources: the package's folder below `src`. What is no Python in it imports nothing.
+    """
+    found: dict[str, str] = {}
+    for path in sorted(sources.rglob("*.py")):
+        try:
+            tree = ast.parse(path.read_text("utf-8", "replace"))
+        except (SyntaxError, ValueError):
+            continue
+        for name in (name for node in ast.walk(tree) for name in _imported(node)):
+            package, kind = name.split(".")[0], name.split(".")[1:2]
+            if kind in (["msg"], ["srv"], ["action"]):
+                found.setdefault(package, path.name)
+    return found
+
+
+def _imported(node: ast.AST) -> list[str]:
+    if isinstance(node, ast.Import):
+        return [alias.name for alias in node.names]
+    if isinstance(node, ast.ImportFrom) and not node.level:
+        return [f"{node.module}.{alias.name}" for alias in node.names]
+    return []
+
+
+class InterfaceError(ValueError):
+    """An interface file cannot be read; the message says why."""
+
+
+def interface_parts(package: str, name: str, text: str) -> list[dict[str, str]]:
+    """Return the fields of a message, of a service's request and response, or of an action's goal, result and feedback.
+
+    Args:
+        package: that the interface is of; its own messages are named without it.
+        name: such as `msg/DetectedObject`.
+        text: of the file.
+
+    Raises:
+        InterfaceError: it cannot be read.
+    """
+    from rosidl_adapter import parser
+
+    kind, _, base = name.partition("/")
+    try:
+        if kind == "msg":
+            found = [parser.parse_message_string(package, base, text)]
+        elif kind == "srv":
+            service = parser.parse_service_string(package, base, text)
+            found = [service.request, service.response]
+        else:
+            action = parser.parse_action_string(package, base, text)
+            found = [action.goal, action.result, action.feedback]
+    except Exception as error:  # the parser has a dozen kinds, some of them Python's own
+        raise InterfaceError(f"`{name}` cannot be read: {error}.") from error
+    return [{field.name: _type(field.type, package) for field in part.fields} for part in found]
+
+
+def _type(kind: Any, package: str) -> str:
+    """A field's type as it is written in a file: `DetectedObject[]`, `std_msgs/Header`."""
+    return str(kind).removeprefix(f"{package}/")

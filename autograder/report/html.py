@@ -6,7 +6,9 @@ colour vision. Only symbols and borders are coloured, with Okabe and Ito's colou
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
@@ -14,12 +16,40 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
 from autograder.core.output import last_lines, plain
-from autograder.core.results import CellResult, Status
-from autograder.course.book import NO_BOOK, Book
+from autograder.core.results import CellResult, Outcome, Status
+from autograder.course.settings import NO_BOOK, Book, Section
 from autograder.report import words
 from autograder.report.audience import Audience, check_for
-from autograder.report.hints import hints
 from autograder.report.words import Verdict
+
+_PIECE = re.compile(r";\s+|(?<=[.?!])\s+(?=[A-Z`])")
+
+
+@dataclass(frozen=True)
+class Hint:
+    """One hint; the next one tells more."""
+
+    text: str
+    section: Section | None = None
+    """Where to read on."""
+
+
+def hints(outcome: Outcome, book: Book) -> list[Hint]:
+    """Return an outcome's hints, the one that tells least first: where to read on, then what to look at or to do."""
+    pieces = [piece.strip() for piece in _PIECE.split(outcome.hint) if piece.strip()]
+    pointing = [(piece, book.named_in(piece)) for piece in pieces]
+    read = [Hint(_sentence(text), section) for text, section in pointing if section is not None]
+    section = book.sections.get(outcome.code)
+    if not read and section is not None:
+        read = [Hint(f"{section}.", section)]
+    named = {hint.text for hint in read}
+    return [*read, *(Hint(text) for text in map(_sentence, pieces) if text not in named)]
+
+
+def _sentence(text: str) -> str:
+    text = text[:1].upper() + text[1:]
+    return text if text.endswith((".", "?", "!", ":", "…", "`")) else f"{text}."
+
 
 _LOOK = {
     Verdict.PASSED: {"colour": "#009e73", "border": "3px solid"},

@@ -155,9 +155,8 @@ def _linked(word: re.Match[str]) -> str:
 def check_api() -> str:
     """The page of the check API: what `autograder.checks` offers, then what `ros` does, group by group."""
     from autograder import checks
-    from autograder.checks.answers import Answers
+    from autograder.checks.answers import Answers, seal
     from autograder.checks.building import Package
-    from autograder.checks.forms import seal
     from autograder.checks.nouns import NOUNS
 
     lines = ["## What a check cell imports", ""]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from autograder.course.book import Book, read_book
+from autograder.course.settings import Book, read_book
 from autograder.reasons import Group, Kind, all_kinds
 
 ROOT = Path(__file__).resolve().parent.parent.parent

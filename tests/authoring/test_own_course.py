@@ -290,7 +290,7 @@ def test_a_setting_that_there_is_not_is_refused(tmp_path: Path) -> None:
 
 def test_sections_name_lectures_that_there_are_and_each_code_once(tmp_path: Path) -> None:
     from autograder.core.errors import KitError
-    from autograder.course.book import read_book
+    from autograder.course.settings import read_book
 
     (tmp_path / "course.toml").write_text(
         '[lectures]\n"Week 3" = "names"\n[sections."Week 3"]\n"Two names?" = ["duplicate-node"]\n'

@@ -10,7 +10,7 @@ from graded_cell import TALKER
 from hypothesis import given
 from hypothesis import strategies as st
 
-from autograder.checks.forms import allowed, plain, same, seal
+from autograder.checks.answers import allowed, plain, same, seal
 from autograder.core.results import CheckResult, Status
 from autograder.course.cells import MORE_AT_GRADING, without_hidden_tests
 

@@ -16,7 +16,7 @@ import autograder.diagnosis
 from autograder.checks import Program, current, launch
 from autograder.core.results import Isolation
 from autograder.diagnosis import Scene
-from autograder.diagnosis.events import read
+from autograder.diagnosis.inside import read
 from autograder.reasons import Group, Reason, all_kinds
 
 TOGETHER = 8

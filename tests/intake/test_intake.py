@@ -22,8 +22,8 @@ from hypothesis import strategies as st
 from places import TESTS
 
 from autograder.checks import current
+from autograder.checks.answers import NAME_OR_NONE
 from autograder.checks.command_line import command_line
-from autograder.checks.forms import NAME_OR_NONE
 from autograder.core.errors import KitError
 from autograder.core.results import Isolation, Status
 from autograder.course.cells import grade_id_of

@@ -19,7 +19,7 @@ import reason_codes
 import reference
 
 from autograder.checks.nouns import NOUNS
-from autograder.course.book import read_book
+from autograder.course.settings import read_book
 from autograder.reasons import KINDS, Group, Kind, all_kinds, kind_of_lab
 
 BOOK = read_book(ROOT)

@@ -17,15 +17,14 @@ from rich.console import Console
 
 from autograder.core.grades import CellGrade, Grade
 from autograder.core.results import CheckResult, Isolation, NodeLog, Outcome, Part, Status, SubmissionResult
-from autograder.course.book import NO_BOOK, read_book
+from autograder.course.settings import NO_BOOK, read_book
 from autograder.report.audience import Audience, result_for
 from autograder.report.export.csv_table import to_csv
 from autograder.report.export.entry import Entry
 from autograder.report.export.gradescope import results_json
 from autograder.report.export.junit import junit_xml
 from autograder.report.feedback_page import Heading, Task, feedback_html
-from autograder.report.hints import hints
-from autograder.report.html import check_html
+from autograder.report.html import check_html, hints
 from autograder.report.terminal import check_text, check_view, class_view, submission_view, undecided_view
 
 BOOK = read_book(ROOT)

@@ -26,7 +26,7 @@ from test_msgs.msg import BoundedSequences, UnboundedSequences
 
 from autograder.graph.domains import claim_domain
 from autograder.graph.observer import Observer
-from autograder.ros2 import discovery
+from autograder.ros2 import session
 from autograder.ros2.main import COMMANDS, TimeIsUp, run
 from autograder.ros2.messages import Shape, to_csv, to_yaml
 from autograder.ros2.options import to_match
@@ -256,10 +256,10 @@ def test_what_a_newcomer_has_not_heard_of_yet_is_known_to_be_missing(
 ) -> None:
     observer = Observer(ten_nodes[1])
     try:
-        assert observer.wait(lambda: len(discovery.look(observer.node).ends) == 181, WITHIN)
-        assert observer.wait(lambda: discovery.look(observer.node).is_complete(), WITHIN)
-        seen = discovery.look(observer.node)
-        assert len(seen.nodes) == 10 and seen.participants == discovery.participants_here(ten_nodes[1]) == 2
+        assert observer.wait(lambda: len(session.look(observer.node).ends) == 181, WITHIN)
+        assert observer.wait(lambda: session.look(observer.node).is_complete(), WITHIN)
+        seen = session.look(observer.node)
+        assert len(seen.nodes) == 10 and seen.participants == session.participants_here(ten_nodes[1]) == 2
         # Writers come in the order of their numbers, readers in that of theirs: the end of a list is what is missing.
         readers = sorted(end.number for end in seen.ends.values() if not end.writes)
         for heard in readers[:-1]:
@@ -286,7 +286,7 @@ def test_a_command_waits_for_a_program_that_is_slow_to_answer(ten_nodes: tuple[s
         command, env={**environment, "ROS_DOMAIN_ID": str(domain)}, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
         text=True,
     )  # fmt: skip
-    assert until(lambda: discovery.participants_here(domain) == 2)
+    assert until(lambda: session.participants_here(domain) == 2)
     with pytest.raises(subprocess.TimeoutExpired):
         listed.wait(4)  # longer than where there is nothing
     made.send_signal(signal.SIGCONT)

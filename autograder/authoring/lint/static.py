@@ -20,7 +20,6 @@ from autograder.checks.building import Package
 from autograder.checks.launch import Launch
 from autograder.checks.nouns import noun_given
 from autograder.core.errors import KitError
-from autograder.course.book import read_book
 from autograder.course.cells import (
     FOR_CHECKS,
     MARK,
@@ -33,7 +32,7 @@ from autograder.course.cells import (
 )
 from autograder.course.lab import Cell, Lab, lab_names, load_lab
 from autograder.course.paths import CoursePaths
-from autograder.course.settings import SETTINGS_FILE, read_settings
+from autograder.course.settings import SETTINGS_FILE, read_book, read_settings
 from autograder.grading.canaries import known_answers, wrong_answers
 from autograder.reasons import all_kinds
 

@@ -8,13 +8,12 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from autograder import diagnosis
-from autograder.checks import outcomes, parts, seen
+from autograder.checks import outcomes, scoring, seen
 from autograder.checks.misuse import Misuse
 from autograder.checks.running import Running
 from autograder.diagnosis import Scene
 from autograder.diagnosis.inside import Inside
-from autograder.diagnosis.programs import EXITED
-from autograder.diagnosis.spinning import NOT_SPINNING, SPINNING_ENDED
+from autograder.diagnosis.programs import EXITED, NOT_SPINNING, SPINNING_ENDED
 from autograder.graph.observer import Observer
 from autograder.reasons import Group, Kind, Reason, kind_of_lab
 
@@ -109,7 +108,7 @@ class Expectations:
         """Record a failure with the first broken link as its reason, and end the block.
 
         Where a program has ended that had to go on, or is bound to, the whole launch has failed, but for the parts
-        before that with which the check itself brought it about; see `autograder.checks.parts`.
+        before that with which the check itself brought it about; see `autograder.checks.scoring`.
         """
         self._running.settle_programs()
         gone = self._running.gone_program() or diagnosis.failed_in_a_callback(self._scene())
@@ -132,7 +131,7 @@ class Expectations:
             expected="running",
             observed=gone.stopped_by()
             or ("an error in a callback" if gone.running() else f"ended with status {gone.exit_status()}"),
-            standing=parts.before(*led_to) if led_to else (),
+            standing=scoring.before(*led_to) if led_to else (),
         )
 
     def _expect_that(

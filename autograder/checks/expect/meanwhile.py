@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable
 
 from autograder import diagnosis
 from autograder.checks import outcomes
-from autograder.checks.expect.sources import Sources
+from autograder.checks.expect.endpoints import Sources
 from autograder.checks.expect.topic import Topic
 from autograder.reasons import Group, Kind, Reason
 

@@ -9,7 +9,7 @@ from rcl_interfaces.srv import ListParameters
 
 from autograder.checks.expect.expectations import Noun
 from autograder.checks.settling import shows_all
-from autograder.diagnosis.events import read
+from autograder.diagnosis.inside import read
 from autograder.graph.services import ServiceMissing, call_all
 from autograder.sandbox.inside.probe.events import Event, NodeSeen, ProbeFailed
 

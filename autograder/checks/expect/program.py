@@ -17,8 +17,7 @@ from autograder.checks.running import Running
 from autograder.checks.waiting import waits_for
 from autograder.core.output import tidy
 from autograder.diagnosis import last_traceback
-from autograder.diagnosis.programs import EXITED
-from autograder.diagnosis.spinning import NOT_SPINNING, SPINNING_ENDED
+from autograder.diagnosis.programs import EXITED, NOT_SPINNING, SPINNING_ENDED
 from autograder.reasons import Group, Kind, Reason
 from autograder.sandbox.running_program import RunningProgram
 

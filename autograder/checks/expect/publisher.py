@@ -10,8 +10,8 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from autograder import diagnosis
 from autograder.checks.expect.expectations import WITHIN
 from autograder.checks.expect.meeting import Meeting
-from autograder.checks.parts import asked
 from autograder.checks.running import Running
+from autograder.checks.scoring import asked
 from autograder.checks.waiting import waits_for
 from autograder.graph.names import node_of
 from autograder.graph.publishing import Stream

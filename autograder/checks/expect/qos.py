@@ -11,7 +11,7 @@ from autograder.checks.expect.endpoints import End, Ends
 from autograder.checks.expect.expectations import WITHIN
 from autograder.checks.misuse import Misuse
 from autograder.checks.waiting import waits_for
-from autograder.diagnosis.matching import MISMATCH
+from autograder.diagnosis.silence import MISMATCH
 from autograder.graph import qos
 from autograder.graph.names import node_of
 from autograder.reasons import Group, Kind

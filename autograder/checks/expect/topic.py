@@ -12,11 +12,10 @@ from rclpy.qos import QoSProfile
 from autograder import diagnosis
 from autograder.checks import outcomes
 from autograder.checks.expect import rates
-from autograder.checks.expect.endpoints import End
+from autograder.checks.expect.endpoints import End, Sources
 from autograder.checks.expect.expectations import GONE_WITHIN, WITHIN, objection
 from autograder.checks.expect.meeting import MATCHES_WITHIN
 from autograder.checks.expect.rates import RATE
-from autograder.checks.expect.sources import Sources
 from autograder.checks.message_text import in_words, int_in_float, shorten
 from autograder.checks.misuse import Misuse
 from autograder.checks.running import Running

@@ -8,5 +8,5 @@ version of rclpy is said by a `probe_failed` event, and then nothing is conclude
 There are two kinds of lines. *Events* happen: an error in a callback, a wrong return value. *Records* stand for things
 (a node, an executor, a timer, a call that may block) with what has become of them so far: how often, on how many
 threads, since when. A record has a `key` and is written again when it has changed, soon but not at once; only its last
-line counts. `events.py` defines both; `autograder/diagnosis/events.py` reads them.
+line counts. `events.py` defines both; `autograder/diagnosis/inside.py` reads them.
 """
