@@ -1,6 +1,7 @@
 """Tables of answers: a `%%file NAME.yaml` cell of plain `question: answer` lines.
 
-Each question is a part of its own: a wrong line costs that line's share of the points.
+Each question is a part of its own: a wrong line costs that line's share of the points. An answer is read as the student
+means it: how it is spelt does not matter.
 """
 
 from __future__ import annotations

@@ -38,7 +38,11 @@ class Asked:
 
 
 class Findings:
-    """One cell's findings."""
+    """What has been found out since the last score: outcomes and logs.
+
+    A check cell may launch several times; its score speaks for all of them. The collection is started afresh for each
+    cell.
+    """
 
     def __init__(self) -> None:
         """Begin with none."""

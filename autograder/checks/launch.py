@@ -1,4 +1,7 @@
-"""`ros` in a check cell: a student's programs and an observer, on a ROS domain of their own."""
+"""`launch` and `launch_file`, and what they give: the student's programs and an observer, on a domain of their own.
+
+The arguments are those of a ROS launch description: program, namespace, name, remappings, parameters.
+"""
 
 from __future__ import annotations
 
@@ -10,15 +13,15 @@ from dataclasses import replace
 from types import TracebackType
 from typing import Any, Self
 
-from autograder.checks import contradictions, current, outcomes, seen
+from autograder.checks import contradictions, current, outcomes, picture_data
 from autograder.checks.building import why_no_package, why_not_found
 from autograder.checks.command_line import CommandLine
-from autograder.checks.launched_file import LaunchedFile
+from autograder.checks.launch_file import LaunchFile
 from autograder.checks.misuse import Misuse, refuse_text
 from autograder.checks.program import Program, file_of, refuse_to_start, why_missing, words_of
-from autograder.checks.robot import Log, Robot, log_of, make_room, try_out
+from autograder.checks.robot import Log, Robot, end_robot, log_of, try_out
 from autograder.checks.ros import Ros
-from autograder.checks.running import Running
+from autograder.checks.running_launch import RunningLaunch
 from autograder.checks.scoring import Score, part, score
 from autograder.checks.waiting import NotLaunchedError
 from autograder.core.processes import no_threads
@@ -28,7 +31,7 @@ from autograder.launch_files import remove_written
 from autograder.packages.workspace import INSTALLED
 from autograder.reasons import Reason, Refused
 from autograder.sandbox.environment import profile_environment, remove_logs
-from autograder.sandbox.program_group import ProgramGroup
+from autograder.sandbox.running_programs import RunningPrograms
 
 
 class Launch(Ros):
@@ -40,17 +43,17 @@ class Launch(Ros):
         listen: Iterable[tuple[str, type]],
         serve: Iterable[tuple[Any, ...]],
         lifecycle: Iterable[str],
-        file: LaunchedFile | None = None,
+        file: LaunchFile | None = None,
         packages: Sequence[str] = (),
     ) -> None:
         """Use `launch` or `launch_file`."""
-        super().__init__(Running())
+        super().__init__(RunningLaunch())
         refuse_text("launch", listen=listen, serve=serve, lifecycle=lifecycle)
         self._packages = [*packages, *(file.packages() if file else ())]
         self._running.described = list(nodes)
         self._file = file
         self._listen, self._serve, self._lifecycle = list(listen), list(serve), list(lifecycle)
-        self._group: ProgramGroup | None = None
+        self._group: RunningPrograms | None = None
         self._robot: Robot | None = None
         self._entered = self._over = False
 
@@ -133,7 +136,7 @@ class Launch(Ros):
         """
         if node is None:
             refuse_to_start(self._running.described)
-            make_room()
+            end_robot()
             current.check.robot = robot = self._enter()
             try:
                 robot.wait_for_nodes()
@@ -269,7 +272,7 @@ class Launch(Ros):
         """Keep what only the running programs show: in a notebook for a picture, else what contradicts itself."""
         if current.check.front_end is not None:
             with contextlib.suppress(ForgedGraph):
-                self._running.graph = seen.graph(self._observer)
+                self._running.graph = picture_data.graph(self._observer)
             return
         varied = [node.may_vary_names() for node, _ in self._running.programs]
         current.check.findings.flags += contradictions.flags(self._scene(), self._running.overlaps, varied)
@@ -372,7 +375,5 @@ def launch_file(
         listen: (topic, message class) to record from before the start.
         lifecycle: full names of lifecycle nodes whose transition events are recorded from before the start.
     """
-    described = LaunchedFile(
-        file, dict(arguments or {}), package, dict(programs or {}), dict(includes or {}), namespace
-    )
+    described = LaunchFile(file, dict(arguments or {}), package, dict(programs or {}), dict(includes or {}), namespace)
     return Launch([], listen, (), lifecycle, described)

@@ -1,4 +1,4 @@
-"""A launch that goes on from cell to cell, until it is stopped: to be looked at, and played with, by hand."""
+"""A launch to look at and play with by hand: it runs for a moment, or goes on from cell to cell until it is stopped."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 
 from autograder.checks import current
 from autograder.checks.misuse import Misuse
-from autograder.checks.running import Running
+from autograder.checks.running_launch import RunningLaunch
 from autograder.core.output import tidy
 from autograder.graph.names import node_of
 from autograder.graph.observer import Observer
@@ -36,7 +36,7 @@ def log_of(programs: Sequence[RunningProgram], name: str) -> Log:
     return Log("\n".join(f"--- {p.name}\n{tidy(p.output())}" if many else tidy(p.output()).rstrip() for p in chosen))
 
 
-def try_out(running: Running) -> str:
+def try_out(running: RunningLaunch) -> str:
     """Let a launch run for a few seconds, while its programs print, and tell what was on the graph."""
     observer = running.observer
     observer.wait(running.all_ended, TRIAL)
@@ -65,7 +65,7 @@ class Robot:
         stop: ends it.
     """
 
-    def __init__(self, running: Running, stop: Callable[[], None]) -> None:
+    def __init__(self, running: RunningLaunch, stop: Callable[[], None]) -> None:
         """Note what the programs were started from."""
         self._running = running
         self._begun_with = {node.program: _written(node.program) for node in running.described}
@@ -120,8 +120,8 @@ class Robot:
         )
 
 
-def make_room() -> None:
-    """End what went on from cell to cell before.
+def end_robot() -> None:
+    """End the launch that goes on from cell to cell, if there is one.
 
     Raises:
         Misuse: nothing can go on from here.

@@ -1,4 +1,4 @@
-"""What a check cell may ask and do with `ros`: its nouns, such as `ros.topic`, and its verbs, such as `ros.wait`."""
+"""What a check cell may ask and do with `ros`: its nouns, such as `ros.topic`, and its verbs, such as `ros.require`."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from rclpy.qos import QoSProfile
 
-from autograder.checks import outcomes, seen
+from autograder.checks import outcomes, picture_data
 from autograder.checks.expect.action import Action
 from autograder.checks.expect.activity import Activity
 from autograder.checks.expect.draw import Draw
@@ -359,7 +359,7 @@ class Ros(Facts, ABC):
         Example:
             `print(ros.runs().longest_pause("heartbeat"))`
         """
-        return seen.runs(self._insides())
+        return picture_data.runs(self._insides())
 
     def programs(self) -> list[Program]:
         """What this launch was asked to start, or what its launch file starts: programs with their arguments.

@@ -1,4 +1,18 @@
-"""The score of a check cell."""
+"""The score of a check cell, and its parts: requirements that give points of their own, whatever becomes of the others.
+
+    with launch("talker") as ros:
+        with ros.part("the name"):
+            ros.node("/talker").expect()
+        with ros.part("the numbers"):
+            ros.topic("/numbers", Int64).expect_messages(at_least=5)
+    ros.score({"the name": 1, "the numbers": 2})
+
+What fails inside a part ends that part only. What fails outside takes every part of its launch.
+
+So does a program that ends although it had to go on: when it ended is a matter of luck, and so is what was seen before.
+It is not where the callback that failed had been called by the check itself, which sent a message or a request, or set
+a parameter. Then what the parts before that came to stands.
+"""
 
 from __future__ import annotations
 

@@ -14,7 +14,7 @@ from autograder.cli.app import CourseOption, ForceOption, IsolationOption, JsonO
 from autograder.core.errors import KitError
 from autograder.core.results import Isolation
 from autograder.course.paths import CoursePaths
-from autograder.intake.asked import Accepted, FormatName
+from autograder.intake.options import Accepted, FormatName
 
 if TYPE_CHECKING:
     from autograder.core.grades import Grade

@@ -55,7 +55,11 @@ def _named(folder: Path) -> Path:
 
 
 def is_students_kit() -> bool:
-    """Whether this is the environment of a student's kit, which has no solutions and grades nobody."""
+    """Whether this is the environment of a student's kit, which has no solutions and grades nobody.
+
+    Such a kit has two courses: `labs/`, where the student works, and below `kit/` the labs as they were handed out,
+    whose checks are run.
+    """
     return _is_course(ROOT / KIT_FOLDER)
 
 

@@ -1,4 +1,7 @@
-"""A course's settings, `course.toml`. What concerns nbgrader stands in nbgrader's own file, `nbgrader_config.py`."""
+"""A course's settings, `course.toml`: with the sections of its lectures that explain the reasons.
+
+What concerns nbgrader stands in nbgrader's own file, `nbgrader_config.py`.
+"""
 
 from __future__ import annotations
 

@@ -13,7 +13,6 @@ has ended, what was seen before stands where its probe tells that the check's ow
 
 from autograder.diagnosis.callbacks import called_from_outside, failed_in_a_callback, why_all_alike
 from autograder.diagnosis.chain import inside_reason, reason_inside
-from autograder.diagnosis.diagnosed import DiagnosedProgram
 from autograder.diagnosis.goals import (
     why_no_action,
     why_no_feedback,
@@ -48,7 +47,6 @@ from autograder.diagnosis.traces import last_traceback
 
 __all__ = [
     "SILENT",
-    "DiagnosedProgram",
     "Scene",
     "account",
     "called_from_outside",

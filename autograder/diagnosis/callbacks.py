@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import re
 
-from autograder.diagnosis.diagnosed import DiagnosedProgram
 from autograder.diagnosis.inside import Inside, read
 from autograder.diagnosis.scene import Scene, first
 from autograder.diagnosis.traces import CRASHED, KNOWN_ERRORS, PARAMETER_NOT_DECLARED, PARAMETER_TYPE, quoted
 from autograder.reasons import Group, Kind, Reason
 from autograder.sandbox.inside.probe.events import BadMessage, BadReturn, CallbackError, Event, Thing, ThreadError
+from autograder.sandbox.running_program import RunningProgram
 
 NEVER_AWAITED = Kind(
     "never-awaited",
@@ -104,7 +104,7 @@ def never_awaited(inside: Inside) -> Reason | None:
     )
 
 
-def failed_in_a_callback(scene: Scene) -> DiagnosedProgram | None:
+def failed_in_a_callback(scene: Scene) -> RunningProgram | None:
     """A program with an error in a callback, which ends it.
 
     A lifecycle node outlives its own. A node outlives a parameter callback that returns nothing, too: the value is
@@ -122,7 +122,7 @@ def failed_in_a_callback(scene: Scene) -> DiagnosedProgram | None:
     return None
 
 
-def called_from_outside(program: DiagnosedProgram) -> tuple[str, float] | None:
+def called_from_outside(program: RunningProgram) -> tuple[str, float] | None:
     """What the first callback with an error answered, a topic, a service or a "parameter", and when it failed.
 
     Must have seen: that such a callback was the first thing that went wrong. A timer's fails at a moment of its own.

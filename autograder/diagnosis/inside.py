@@ -13,7 +13,6 @@ from pydantic import Field, TypeAdapter, ValidationError
 
 from autograder.arguments.rule_effect import full_name
 from autograder.diagnosis import sources
-from autograder.diagnosis.diagnosed import DiagnosedProgram
 from autograder.graph.observer import Observer
 from autograder.sandbox.inside.probe.events import (
     Attached,
@@ -25,12 +24,13 @@ from autograder.sandbox.inside.probe.events import (
     ProbeFailed,
     Thing,
 )
+from autograder.sandbox.running_program import RunningProgram
 
 _READER: TypeAdapter[Event] = TypeAdapter(Annotated[Event, Field(discriminator="e")])
 
 
 def read(lines: Iterable[dict[str, Any]]) -> list[Event]:
-    """The events that have the form of one, in their order."""
+    """The lines that have the form of an event, in their order; a program can write others, which are ignored."""
     found = []
     for line in lines:
         try:
@@ -46,7 +46,7 @@ _T = TypeVar("_T")
 class Inside:
     """One program as its probe shows it. Where the probe could not attach, nothing is known and nothing is said."""
 
-    def __init__(self, program: DiagnosedProgram, folder: Path, observer: Observer) -> None:
+    def __init__(self, program: RunningProgram, folder: Path, observer: Observer) -> None:
         """Read the program's events; its source lies in `folder`, its launch's graph is what `observer` sees."""
         self.folder, self.observer = folder, observer
         self.program = program

@@ -1,4 +1,4 @@
-"""Link one of every chain: is every program there, and alive?"""
+"""The first links of every chain: is every program there and alive, and does it spin its nodes?"""
 
 from __future__ import annotations
 

@@ -7,10 +7,10 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 
-from autograder.diagnosis.diagnosed import DiagnosedProgram
 from autograder.diagnosis.inside import Inside
 from autograder.graph.observer import Observer
 from autograder.reasons import Reason
+from autograder.sandbox.running_program import RunningProgram
 
 RECORDS_FOLLOW = 0.3
 """Seconds after which what the probes have counted is written."""
@@ -21,7 +21,7 @@ class Scene:
     """The launch that is looked at."""
 
     observer: Observer
-    programs: Sequence[DiagnosedProgram]
+    programs: Sequence[RunningProgram]
     missing: Sequence[str]
     """Programs that should have been launched, but that no cell defines."""
     folder: Path
@@ -34,7 +34,7 @@ class Scene:
     """The names of the parameters given to each of the programs by the check."""
     trouble: Sequence[Reason] = field(default=())
     """What kept programs from being started at all."""
-    stopped: Sequence[DiagnosedProgram] = ()
+    stopped: Sequence[RunningProgram] = ()
     """Programs that the check itself has ended."""
 
     @cached_property
@@ -44,7 +44,7 @@ class Scene:
             self.observer.pause(RECORDS_FOLLOW)
         return [self.inside(program) for program in self.programs]
 
-    def inside(self, program: DiagnosedProgram) -> Inside:
+    def inside(self, program: RunningProgram) -> Inside:
         """What one program's probe says now."""
         return Inside(program, self.folder, self.observer)
 

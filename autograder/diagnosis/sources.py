@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from autograder.diagnosis.diagnosed import DiagnosedProgram
+from autograder.sandbox.running_program import RunningProgram
 
 LOOKS = 4
 """How often the stacks are looked at: a busy loop is in another of its lines each time."""
@@ -47,7 +47,7 @@ class Place:
         return f"line {self.first} (`{self.code}`)" if self.code else f"line {self.first}"
 
 
-def look(program: DiagnosedProgram, times: int = LOOKS) -> list[Stacks]:
+def look(program: RunningProgram, times: int = LOOKS) -> list[Stacks]:
     """Look at the stacks of a program several times; each look takes about 50 ms."""
     return [found for found in (parse(program.stacks(1.0)) for _ in range(times)) if found]
 

@@ -25,8 +25,8 @@ from autograder.grading.canaries import Canaries, known_answers
 from autograder.grading.class_runner import run_class
 from autograder.grading.runner import Settings
 from autograder.grading.store import ResultStore
-from autograder.intake.asked import Accepted
 from autograder.intake.collect import Collected, collect
+from autograder.intake.options import Accepted
 from autograder.intake.words import count
 from autograder.report.terminal import plain
 

@@ -14,7 +14,7 @@ from autograder.gradebook.autograde import AUTOGRADE, SANITIZE, SubmissionExport
 from autograder.gradebook.exchange_files import CollectNotebooks
 from autograder.gradebook.feedback import FeedbackExporter
 from autograder.gradebook.released_notebook import RELEASE, WITHOUT_GRADEBOOK
-from autograder.grading.validate import HEADING
+from autograder.grading.nbgrader_validate import HEADING
 from autograder.intake.record import left_class
 
 

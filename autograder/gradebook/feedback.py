@@ -19,7 +19,7 @@ from autograder.core.results import SubmissionResult
 from autograder.course.cells import headings
 from autograder.course.lab import Lab, load_lab
 from autograder.gradebook.exchange_files import complete, only_notebooks
-from autograder.gradebook.grades import read_grade
+from autograder.gradebook.queries import read_grade
 from autograder.grading.store import ResultStore
 from autograder.intake.roster import FILE_NAME, read_roster
 from autograder.report.feedback_page import Heading, Task, feedback_html

@@ -11,7 +11,7 @@ from autograder.gradebook.config import configure
 from autograder.gradebook.database import make_folder
 from autograder.gradebook.private_nbgrader import replace_execution
 from autograder.gradebook.release import register
-from autograder.grading.validate import not_checked, verdicts
+from autograder.grading.nbgrader_validate import not_checked, verdicts
 
 
 def take_over(config: Any, root: Path) -> None:

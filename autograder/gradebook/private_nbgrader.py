@@ -1,4 +1,4 @@
-"""What the kit uses of nbgrader and nbgrader has not promised to keep; of its validator see `grading/validate.py`.
+"""What the kit uses of nbgrader that nbgrader has not promised to keep; `grading/nbgrader_validate.py` has the rest.
 
 `tests/gradebook/test_private_names.py` says which of these an update has moved; pyproject.toml keeps untested ones
 away.
@@ -19,7 +19,7 @@ from nbgrader.converters.generate_solution import GenerateSolution
 from nbgrader.dbutil import ALEMBIC_DIR
 from nbgrader.preprocessors import Execute, SaveAutoGrades, SaveCells
 
-from autograder.grading.validate import Verdicts, replace_validator
+from autograder.grading.nbgrader_validate import Verdicts, replace_validator
 
 
 def in_first_pass(autograde: Autograde) -> bool:

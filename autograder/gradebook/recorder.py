@@ -20,7 +20,8 @@ from autograder.course.paths import CoursePaths
 from autograder.gradebook import own_tables
 from autograder.gradebook.api import answered, last_error, open_api
 from autograder.gradebook.database import make_folder
-from autograder.gradebook.grades import ask, digests
+from autograder.gradebook.grades import ask
+from autograder.gradebook.queries import digests
 from autograder.gradebook.release import register
 from autograder.gradebook.settings import gradebook_place
 from autograder.submission import exchange_secret

@@ -10,12 +10,12 @@ from autograder.core.results import SubmissionResult
 from autograder.course.lab import Lab
 from autograder.course.paths import CoursePaths
 from autograder.course.settings import read_settings
-from autograder.grading import executors, validation
+from autograder.grading import executors, trusted_result
 from autograder.grading.canaries import Canaries
 from autograder.grading.job import Job
 from autograder.grading.runner import Settings, job_of, stored, without_running
 from autograder.grading.store import ResultStore
-from autograder.grading.validation import lacks_a_result, validated
+from autograder.grading.trusted_result import lacks_a_result, validated
 from autograder.submission.answers import Submission
 from autograder.submission.reader import read_submission
 
@@ -119,18 +119,18 @@ def _believed(
         for result in ran:
             job = by_student[result.student]
             believed = validated(result, job.checks)
-            if validation.open_checks(job, believed) is None:
+            if trusted_result.open_checks(job, believed) is None:
                 yield believed
                 continue
             to_run_again[job.student] = believed
             if job.student in students:
                 stores.first.save(believed)
     for student, first in to_run_again.items():
-        again = validation.open_checks(by_student[student], first)
+        again = trusted_result.open_checks(by_student[student], first)
         assert again is not None
         with closing(executor.run([again], started)) as ran:
             for result in ran:
-                yield validation.settled(again, first, validated(result, again.checks))
+                yield trusted_result.settled(again, first, validated(result, again.checks))
 
 
 class _Stores:
@@ -176,7 +176,12 @@ class _Stores:
         """Return what a job came to when it was run first, if an interrupted run was to run checks of it again."""
         settings = self._settings
         result = self.first.fitting(self._lab, job.student, job.digest, settings.isolation, settings.seed)
-        if result is None or settings.force or lacks_a_result(result) or validation.open_checks(job, result) is None:
+        if (
+            result is None
+            or settings.force
+            or lacks_a_result(result)
+            or trusted_result.open_checks(job, result) is None
+        ):
             return None
         return result
 

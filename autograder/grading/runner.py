@@ -16,7 +16,7 @@ from autograder.course.lab import Lab
 from autograder.grading.job import Job
 from autograder.grading.store import ResultStore
 from autograder.grading.supervisor import Follower, run_in_workers
-from autograder.grading.validation import all_for_one_reason, lacks_a_result
+from autograder.grading.trusted_result import all_for_one_reason, lacks_a_result
 from autograder.submission.answers import Submission
 from autograder.submission.reader import read_submission
 

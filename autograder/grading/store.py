@@ -8,7 +8,7 @@ from pathlib import Path
 from autograder.core.results import SCHEMA_VERSION, Isolation, SubmissionResult
 from autograder.course.lab import Lab
 from autograder.course.paths import CoursePaths
-from autograder.grading.validation import validated
+from autograder.grading.trusted_result import validated
 from autograder.intake.record import left_class
 
 

@@ -13,10 +13,10 @@ from pydantic import ValidationError
 
 from autograder.core.results import CheckResult, Outcome, SubmissionResult
 from autograder.course.lab import Cell
-from autograder.grading import validation
+from autograder.grading import trusted_result
 from autograder.grading.builds import with_interfaces
 from autograder.grading.job import CELL_SECONDS, STUCK_SECONDS, Job
-from autograder.grading.validation import believed, is_open, undecided, validated, was_killed
+from autograder.grading.trusted_result import believed, is_open, undecided, validated, was_killed
 from autograder.graph.patience import ALONE
 from autograder.reasons import KINDS, Group, Kind
 from autograder.sandbox.grading_sandbox import SandboxRun, run_in_sandbox
@@ -142,7 +142,7 @@ def run_in_workers(job: Job, workers: int, follower: Follower | None = None) -> 
             given_up.set()
             raise
     result = _result(job, checks, began)
-    again = validation.open_checks(job, result)
+    again = trusted_result.open_checks(job, result)
     return result if again is None else _again(again, result, follower)
 
 
@@ -150,7 +150,7 @@ def _again(job: Job, first: SubmissionResult, follower: Follower | None) -> Subm
     """Run the open checks of a result once more, now that nothing else runs."""
     if follower is not None:
         follower.at(0, "once more, alone: " + ", ".join(cell.title or cell.grade_id for cell in job.checks))
-    result = validation.settled(job, first, run_in_worker(job))
+    result = trusted_result.settled(job, first, run_in_worker(job))
     for check in result.checks:
         if follower is not None and check.run_again:
             follower.decided(check)

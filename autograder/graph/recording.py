@@ -1,4 +1,4 @@
-"""What arrived on one topic."""
+"""What arrived on one topic; and the bag, in which messages are kept as they came over the wire, if asked."""
 
 from __future__ import annotations
 

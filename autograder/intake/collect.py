@@ -19,15 +19,15 @@ from autograder.core.errors import KitError
 from autograder.core.files import read_plain, write_beside
 from autograder.course.lab import lab_names
 from autograder.course.paths import CoursePaths
-from autograder.intake.asked import Accepted
-from autograder.intake.choosing import Chosen, beside, choose, read
 from autograder.intake.entries import Entry, NotUnderstoodError
 from autograder.intake.formats import PLAIN
 from autograder.intake.members import is_notebook
-from autograder.intake.reading import Known, Reading, read_class
+from autograder.intake.options import Accepted
 from autograder.intake.record import Taken, keep_class, known_persons, person
 from autograder.intake.record import read_class as taken_before
 from autograder.intake.roster import FILE_NAME, Roster, Student, file_name, named, read_roster
+from autograder.intake.which_format import Known, Reading, read_class
+from autograder.intake.which_notebook import Chosen, beside, choose, read
 from autograder.intake.words import count, some
 from autograder.submission import exchange_secret, timestamp
 from autograder.submission.notebook_file import NOTEBOOK_BYTES

@@ -14,11 +14,11 @@ from dataclasses import dataclass, replace
 
 import yaml
 
-from autograder.intake.asked import FormatName
-from autograder.intake.choosing import is_of_lab
 from autograder.intake.entries import Claim, Entry, Kind, NotUnderstoodError, Recognised
 from autograder.intake.members import is_hidden, is_notebook
+from autograder.intake.options import FormatName
 from autograder.intake.roster import FILE_NAME as ROSTER
+from autograder.intake.which_notebook import is_of_lab
 from autograder.submission.timestamp import moment
 
 _METADATA = "submission_metadata.yml"

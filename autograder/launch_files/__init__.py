@@ -9,7 +9,7 @@ that could grow has a limit.
 """
 
 from autograder.launch_files.errors import INCLUDE_DEPTH, MOST_NODES
-from autograder.launch_files.nodes import ForAll, Inline, LaunchedNode, ParamsFile, ParamsText, remove_written
+from autograder.launch_files.nodes import ForAll, Inline, NodeAction, ParamsFile, ParamsText, remove_written
 from autograder.launch_files.reader import declared_arguments, read_launch_file
 
 __all__ = [
@@ -17,7 +17,7 @@ __all__ = [
     "MOST_NODES",
     "ForAll",
     "Inline",
-    "LaunchedNode",
+    "NodeAction",
     "ParamsFile",
     "ParamsText",
     "declared_arguments",

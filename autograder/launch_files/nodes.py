@@ -46,7 +46,7 @@ class ParamsText(BaseModel):
     text: str
 
 
-class LaunchedNode(BaseModel):
+class NodeAction(BaseModel):
     """One program that a launch file starts, with every substitution done."""
 
     model_config = ConfigDict(extra="forbid")
@@ -122,7 +122,7 @@ class LaunchedNode(BaseModel):
 
 
 def remove_written(folder: Path) -> None:
-    """Remove the parameter files that `LaunchedNode.ros_arguments` wrote into a folder."""
+    """Remove the parameter files that `NodeAction.ros_arguments` wrote into a folder."""
     for path in folder.glob(WRITTEN):
         path.unlink(missing_ok=True)
 

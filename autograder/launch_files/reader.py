@@ -17,7 +17,7 @@ from autograder.graph.names import nearest
 from autograder.launch_files import substitutions, values
 from autograder.launch_files.errors import INCLUDE_DEPTH, MOST_ACTIONS, MOST_NODES, Place, refused
 from autograder.launch_files.files import Packages
-from autograder.launch_files.nodes import ForAll, Inline, LaunchedNode, ParamsFile, ParamsText
+from autograder.launch_files.nodes import ForAll, Inline, NodeAction, ParamsFile, ParamsText
 from autograder.launch_files.schema import Action, read_file, refusing
 from autograder.launch_files.substitutions import Context
 from autograder.launch_files.texts import Text, parse
@@ -28,7 +28,7 @@ NAMESPACE, RULES, PARAMETERS = "ros_namespace", "ros_remaps", "global_params"
 _KIT_VARIABLES = ("LD_", "PYTHON", "ROS_", "RMW_", "FASTRTPS_", "FASTDDS_", "AUTOGRADER", "_")
 
 
-class Doing:
+class ActionInContext:
     """One action and what is known when it runs."""
 
     def __init__(self, action: Action, context: Context) -> None:
@@ -128,7 +128,7 @@ class Doing:
             f"there is no file `{name}` there; a package of a lab has its files in `launch/`, and others are not read."
         )
 
-    def parameters(self, node: LaunchedNode) -> None:
+    def parameters(self, node: NodeAction) -> None:
         """Add the parameters of a node's own."""
         for number, entry in enumerate(self.given.get("param", []), start=1):
             place = self.place.at(f"param (entry {number})")
@@ -251,7 +251,7 @@ def read_launch_file(
     programs: Collection[str] | None = None,
     stand_ins: Mapping[str, str] | None = None,
     around: str = "",
-) -> list[LaunchedNode]:
+) -> list[NodeAction]:
     """Read a launch file and say what it starts, in its order.
 
     Args:
@@ -294,7 +294,7 @@ def declared_arguments(path: Path) -> list[str]:
 
 class _Reader:
     def __init__(self) -> None:
-        self.nodes: list[LaunchedNode] = []
+        self.nodes: list[NodeAction] = []
         self.actions = 0
 
     def file(self, path: Path, context: Context, given: set[str], place: Place, depth: int) -> None:
@@ -323,10 +323,10 @@ class _Reader:
             self.actions += 1
             if self.actions > MOST_ACTIONS:
                 raise action.place.error(f"more than {MOST_ACTIONS} actions.")
-            if Doing(action, context).condition():
-                getattr(self, f"_{action.kind.replace('-', '_')}")(Doing(action, context), depth)
+            if ActionInContext(action, context).condition():
+                getattr(self, f"_{action.kind.replace('-', '_')}")(ActionInContext(action, context), depth)
 
-    def _arg(self, do: Doing, depth: int) -> None:
+    def _arg(self, do: ActionInContext, depth: int) -> None:
         name, configurations = do.given["name"], do.context.configurations
         do.unreserved(name)
         if name not in configurations:
@@ -340,29 +340,29 @@ class _Reader:
         if choices and configurations[name] not in choices:
             raise do.place.error(f"`{name}` is `{configurations[name]}`, which is none of its choices.")
 
-    def _let(self, do: Doing, depth: int) -> None:
+    def _let(self, do: ActionInContext, depth: int) -> None:
         name = do.text("name")
         do.unreserved(name)
         do.context.configurations[name] = do.text("value")
 
-    def _group(self, do: Doing, depth: int) -> None:
+    def _group(self, do: ActionInContext, depth: int) -> None:
         context = do.context.scoped() if do.given.get("scoped", True) else do.context
         self.run(do.action.children, context, depth)
 
-    def _push_ros_namespace(self, do: Doing, depth: int) -> None:
+    def _push_ros_namespace(self, do: ActionInContext, depth: int) -> None:
         before = do.context.configurations.get(NAMESPACE)
         do.context.configurations[NAMESPACE] = namespace(before, do.text("namespace"), do.place)
 
-    def _set_remap(self, do: Doing, depth: int) -> None:
+    def _set_remap(self, do: ActionInContext, depth: int) -> None:
         do.context.configurations.setdefault(RULES, []).append((do.text("from"), do.text("to")))
 
-    def _set_parameter(self, do: Doing, depth: int) -> None:
+    def _set_parameter(self, do: ActionInContext, depth: int) -> None:
         place, text = do.place.at("value"), do.text("value")
         value = refusing(place, lambda: values.read_as_yaml(text or "''"))
         said = str(tuple(value)) if isinstance(value, list) else str(value)
         do.context.configurations.setdefault(PARAMETERS, []).append(ForAll(name=do.text("name"), text=said))
 
-    def _set_parameters_from_file(self, do: Doing, depth: int) -> None:
+    def _set_parameters_from_file(self, do: ActionInContext, depth: int) -> None:
         path = do.file("filename")
         if path is None:
             raise do.missing("filename")
@@ -370,18 +370,18 @@ class _Reader:
             ParamsFile(file=do.context.packages.called_in_words(path))
         )
 
-    def _set_env(self, do: Doing, depth: int) -> None:
+    def _set_env(self, do: ActionInContext, depth: int) -> None:
         name = do.text("name")
         do.settable(name)
         do.context.environment[name] = do.text("value")
 
-    def _unset_env(self, do: Doing, depth: int) -> None:
+    def _unset_env(self, do: ActionInContext, depth: int) -> None:
         do.context.environment[do.text("name")] = None
 
-    def _log(self, do: Doing, depth: int) -> None:
+    def _log(self, do: ActionInContext, depth: int) -> None:
         do.text("message")  # it may be refused; where the text goes is the kit's business
 
-    def _include(self, do: Doing, depth: int) -> None:
+    def _include(self, do: ActionInContext, depth: int) -> None:
         path = do.file("file")
         if path is None:
             raise do.missing("file")
@@ -396,7 +396,7 @@ class _Reader:
             do.context.configurations[name] = do.perform(pair["value"], do.place.at("arg"))
         self.file(path, do.context, given, do.place, depth + 1)
 
-    def _node(self, do: Doing, depth: int) -> None:
+    def _node(self, do: ActionInContext, depth: int) -> None:
         package, program = do.text("pkg"), do.text("exec")
         do.program(package, program)
         configurations = do.context.configurations
@@ -404,7 +404,7 @@ class _Reader:
         output = do.text("output") if "output" in do.given else "log"
         if output not in _OUTPUTS:
             raise do.place.at("output").error(f"`{output}` is none of {', '.join(_OUTPUTS)}.")
-        node = LaunchedNode(
+        node = NodeAction(
             package=package,
             program=program,
             namespace=namespace(configurations.get(NAMESPACE), own_namespace, do.place) or "",

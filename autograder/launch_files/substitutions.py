@@ -1,4 +1,7 @@
-"""What the substitutions of a launch file stand for."""
+"""What the substitutions of a launch file stand for.
+
+`$(eval …)` is worked out without running Python on what a student wrote: comparisons and arithmetic, and nothing else.
+"""
 
 from __future__ import annotations
 

@@ -142,7 +142,10 @@ class _Reader:
 
 
 def split(text: Text) -> list[Text]:
-    """Split a text into words.
+    """Split `args` or `ros_args`, one text, into the words of a command line.
+
+    `launch` splits what stands between the substitutions, before it does them: what a substitution stands for is never
+    split, so it may hold spaces or be empty.
 
     Raises:
         Refused: a quotation mark between two substitutions is not closed there.

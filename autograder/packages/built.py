@@ -1,4 +1,4 @@
-"""What came of building a package, and where what it installs lies."""
+"""What came of building a package: what it installs, its executables and interfaces, and those that it imports."""
 
 from __future__ import annotations
 

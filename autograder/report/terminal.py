@@ -1,4 +1,4 @@
-"""The terminal's view: one submission in full, or a class as a table."""
+"""The terminal's view: one submission in full, a class as a table, and each verdict as soon as it is there."""
 
 from __future__ import annotations
 

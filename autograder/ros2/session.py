@@ -57,7 +57,13 @@ class _End:
 
 @dataclass(frozen=True)
 class GraphView:
-    """All that a node has heard of the graph; what the kit's own nodes have is left out."""
+    """All that a node has heard of the graph; what the kit's own nodes have is left out.
+
+    A node that has just joined hears of the others piece by piece. Each participant, which is one process with all its
+    nodes, sends the list of its writers and that of its readers, each in the order in which they were made, and apart
+    from both which node has which of them. The pieces come in any order, and on a busy machine seconds apart: that
+    nothing has changed for a while does not mean that nothing is missing.
+    """
 
     nodes: list[str]
     """Full names."""

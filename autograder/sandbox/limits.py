@@ -3,7 +3,7 @@
 Nothing here is a statement about the machine. How long a program runs, how much it computes and how much it prints
 depends on how fast that is and on what else it does, so none of these ends a program: it runs until the end of its
 launch. One that computes on and on gives way to others (`running_program.py`), and one that prints without end is read
-no faster than a terminal would (`program_group.py`).
+no faster than a terminal would (`running_programs.py`).
 """
 
 from __future__ import annotations

@@ -21,7 +21,7 @@ from autograder.core.results import Isolation
 from autograder.sandbox.environment import INSIDE, python_environment
 from autograder.sandbox.limits import Limits
 from autograder.sandbox.loop import Loop
-from autograder.sandbox.program_group import GroupLost, ProgramGroup
+from autograder.sandbox.running_programs import GroupLost, RunningPrograms
 from autograder.sandbox.scratch import Scratch
 from autograder.sandbox.walls import bubblewrap, seccomp
 
@@ -49,7 +49,7 @@ class NodeSandbox:
         self.isolation = isolation
         self.limits = limits or Limits()
         self._lock = threading.Lock()
-        self._groups: list[ProgramGroup] = []
+        self._groups: list[RunningPrograms] = []
         self._launcher: subprocess.Popen[bytes] | None = None
         self._channel: socket.socket | None = None
         self._said = -1
@@ -64,7 +64,7 @@ class NodeSandbox:
             self.close()
             raise
 
-    def group(self) -> ProgramGroup:
+    def group(self) -> RunningPrograms:
         """Begin a launch: programs that are started in it find a fresh /tmp, and end with it and with no other.
 
         Raises:
@@ -105,7 +105,7 @@ class NodeSandbox:
         """Close it."""
         self.close()
 
-    def _new_group(self) -> ProgramGroup:
+    def _new_group(self) -> RunningPrograms:
         with self._lock:
             if self._closed or self._channel is None:
                 raise KitError("The node sandbox is closed.")
@@ -127,7 +127,7 @@ class NodeSandbox:
             try:
                 socket.send_fds(self._channel, [json.dumps(request).encode()], [theirs.fileno()])
                 inside = bubblewrap.STUDENT_FOLDER if full else str(self.folder)
-                group = ProgramGroup(self.folder, inside, self._environment(), self.limits, self._loop, ours)
+                group = RunningPrograms(self.folder, inside, self._environment(), self.limits, self._loop, ours)
             except BaseException:
                 ours.close()
                 raise

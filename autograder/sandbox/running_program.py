@@ -84,13 +84,13 @@ class RunningProgram:
     """A program that was started. Its output is read all the time by the sandbox's own thread.
 
     Attributes:
-        name: what `ProgramGroup.start` was asked for.
+        name: what `RunningPrograms.start` was asked for.
     """
 
     def __init__(
         self, name: str, limits: Limits, changed: threading.Condition, catch_up: Callable[[RunningProgram], None]
     ) -> None:
-        """Made by `ProgramGroup.start`."""
+        """Made by `RunningPrograms.start`."""
         self.name = name
         self._limits = limits
         self._changed = changed

@@ -32,10 +32,10 @@ from autograder.gradebook.own_courses import prepare_nbgrader
 from autograder.gradebook.settings import gradebook_address, gradebook_file
 from autograder.grading.executors import local
 from autograder.grading.runner import Settings
-from autograder.grading.validation import validated
-from autograder.intake.asked import Accepted
-from autograder.intake.reading import read_class
+from autograder.grading.trusted_result import validated
+from autograder.intake.options import Accepted
 from autograder.intake.roster import read_roster
+from autograder.intake.which_format import read_class
 from autograder.report.class_page import write_class_page
 from autograder.report.export import FORMATS
 from autograder.report.feedback_page import Heading, Task, feedback_html

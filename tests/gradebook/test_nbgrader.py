@@ -33,7 +33,7 @@ from autograder.grading import runner
 from autograder.grading.executors import local
 from autograder.grading.runner import Settings
 from autograder.grading.store import ResultStore
-from autograder.grading.validation import validated
+from autograder.grading.trusted_result import validated
 
 LIVE = (
     "<img src=x onerror=alert(1)> <ScRiPt>alert(2)</sCrIpT> <a href='javascript:alert(3)'>a</a>"

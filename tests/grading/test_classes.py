@@ -22,11 +22,11 @@ from places import ROOT
 from autograder.authoring.mutation.mutants import using
 from autograder.core.results import CheckResult, SubmissionResult
 from autograder.course.lab import Cell, Lab, load_lab
-from autograder.grading import validation
+from autograder.grading import trusted_result
 from autograder.grading.job import Job
 from autograder.grading.runner import Settings, job_of, without_running
 from autograder.grading.supervisor import run_in_worker
-from autograder.grading.validation import TOO_BUSY
+from autograder.grading.trusted_result import TOO_BUSY
 from autograder.submission.answers import Submission
 from autograder.submission.reader import read_submission
 
@@ -64,15 +64,15 @@ def grading(lab: Lab, student: str, complete: bool) -> Grade:
 def decided(job: Job, stop: threading.Event) -> SubmissionResult:
     """What a job comes to, with checks run again whose programs others kept from the CPUs."""
     first = run_in_worker(job, stop)
-    again = validation.open_checks(job, first)
+    again = trusted_result.open_checks(job, first)
     if again is None:
         return first
     for _ in range(TRIES_ALONE):  # other tests run beside it all the same
         with _one_alone:
             second = run_in_worker(again, stop)
-        if not any(map(validation.is_open, second.checks)):
+        if not any(map(trusted_result.is_open, second.checks)):
             break
-    return validation.settled(again, first, second)
+    return trusted_result.settled(again, first, second)
 
 
 def handed_in(lab: Lab, student: str) -> Submission:

@@ -14,11 +14,11 @@ import toy
 from autograder.core.results import CheckResult, Isolation, NodeLog, Outcome, Status, SubmissionResult
 from autograder.course.lab import load_lab
 from autograder.course.paths import CoursePaths
-from autograder.grading import executors, validation
+from autograder.grading import executors, trusted_result
 from autograder.grading.class_runner import run_class
 from autograder.grading.job import Cell, Job
 from autograder.grading.runner import Settings
-from autograder.grading.validation import TOO_BUSY, lacks_a_result
+from autograder.grading.trusted_result import TOO_BUSY, lacks_a_result
 from autograder.sandbox.isolation import preflight
 
 COMPUTES_FIRST = """
@@ -131,10 +131,10 @@ def test_a_class_runs_what_was_starved_again_at_its_end_one_by_one(
 
 def test_what_lost_nothing_is_not_run_again() -> None:
     check = CheckResult(grade_id="check", max_points=2, points=2, starved=9.0)
-    assert not validation.is_open(check)
-    assert validation.is_open(check.model_copy(update={"points": 1.0}))
-    assert validation.is_open(check.model_copy(update={"points": None}))
-    assert not validation.is_open(check.model_copy(update={"points": 0.0, "starved": 0.0}))
+    assert not trusted_result.is_open(check)
+    assert trusted_result.is_open(check.model_copy(update={"points": 1.0}))
+    assert trusted_result.is_open(check.model_copy(update={"points": None}))
+    assert not trusted_result.is_open(check.model_copy(update={"points": 0.0, "starved": 0.0}))
 
 
 def test_an_interruption_while_checks_are_run_again_loses_no_first_result(

@@ -16,7 +16,7 @@ from autograder.grading.executors import local
 from autograder.grading.job import Job
 from autograder.grading.runner import Settings, run_submission
 from autograder.grading.store import ResultStore
-from autograder.grading.validation import believed, validated
+from autograder.grading.trusted_result import believed, validated
 
 
 @pytest.mark.skipif(len(os.sched_getaffinity(0)) < 2, reason="one core cannot become fewer")

@@ -16,7 +16,7 @@ from autograder.core.results import Isolation, NodeLog
 from autograder.grading import supervisor, worker
 from autograder.grading.job import CELL_SECONDS, Cell, Job
 from autograder.grading.supervisor import run_in_worker, run_in_workers
-from autograder.grading.validation import lacks_a_result
+from autograder.grading.trusted_result import lacks_a_result
 from autograder.sandbox.isolation import preflight
 
 PASS = "from autograder.checks import outcomes\nfrom autograder.checks.scoring import score\n"

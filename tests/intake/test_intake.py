@@ -30,8 +30,8 @@ from autograder.course.cells import grade_id_of
 from autograder.course.lab import load_lab
 from autograder.grading.job import Cell, Job
 from autograder.grading.worker import run_job
-from autograder.intake.asked import Accepted
 from autograder.intake.collect import collect
+from autograder.intake.options import Accepted
 from autograder.launch_files import read_launch_file
 from autograder.reasons import Refused
 from autograder.report.terminal import plain

@@ -10,9 +10,9 @@ import pytest
 import toy
 
 from autograder.core.errors import KitError
-from autograder.intake.asked import Accepted
 from autograder.intake.collect import Collected, collect
 from autograder.intake.members import MOST
+from autograder.intake.options import Accepted
 
 
 def test_nobody_is_lost_swapped_or_replaced(request: pytest.FixtureRequest) -> None:

@@ -15,9 +15,9 @@ import pytest
 import toy
 
 from autograder.core.errors import KitError
-from autograder.intake.asked import Accepted
 from autograder.intake.collect import Collected
 from autograder.intake.collect import collect as taken_in
+from autograder.intake.options import Accepted
 from autograder.submission import timestamp
 
 ROSTER = """id,name,email,section,canvas_id,moodle_id,github

@@ -26,7 +26,7 @@ from rclpy.logging import LoggingSeverity, set_logger_level
 from rclpy.node import Node
 from rclpy.utilities import remove_ros_args
 
-from autograder.launch_files import LaunchedNode, read_launch_file
+from autograder.launch_files import NodeAction, read_launch_file
 from autograder.reasons import Refused
 
 CASES = TESTS / "launch_cases"
@@ -53,7 +53,7 @@ def full(text: str) -> str:
     return text.replace("<cam>", "pkg: lab, exec: cam")
 
 
-def read(folder: Path, text: str, given: dict[str, str] | None = None) -> list[LaunchedNode]:
+def read(folder: Path, text: str, given: dict[str, str] | None = None) -> list[NodeAction]:
     def find(package: str) -> Path:
         return {"lab": folder}[package]
 
@@ -61,7 +61,7 @@ def read(folder: Path, text: str, given: dict[str, str] | None = None) -> list[L
     return read_launch_file(folder / "main.launch.yaml", given or {}, find, ["cam", "camera_demo"])
 
 
-def run(node: LaunchedNode) -> dict[str, Any]:
+def run(node: NodeAction) -> dict[str, Any]:
     """What the real rclpy makes of a node's command line."""
     words = ["cam", *node.arguments, "--ros-args", *node.ros_arguments()]
     context = rclpy.Context()

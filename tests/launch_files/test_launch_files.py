@@ -15,7 +15,7 @@ from autograder.core.student_yaml import FILE_BYTES
 from autograder.course.cells import parse
 from autograder.course.lab import load_lab
 from autograder.launch_files import (
-    LaunchedNode,
+    NodeAction,
     ParamsFile,
     declared_arguments,
     read_launch_file,
@@ -26,7 +26,7 @@ from autograder.reasons import Refused
 CAMERA = '- node: {pkg: "camera_lab", exec: "camera_demo"'
 
 
-def read(folder: Path, text: str, **arguments: str) -> list[LaunchedNode]:
+def read(folder: Path, text: str, **arguments: str) -> list[NodeAction]:
     def find(package: str) -> Path:
         return {"camera_lab": folder}[package]
 

@@ -24,7 +24,7 @@ from autograder.sandbox.grading_sandbox import run_in_sandbox
 from autograder.sandbox.isolation import Preflight, choose, preflight
 from autograder.sandbox.limits import Limits
 from autograder.sandbox.node_sandbox import NodeSandbox
-from autograder.sandbox.program_group import ProgramGroup
+from autograder.sandbox.running_programs import RunningPrograms
 
 HONEST = "print('fine')\n"
 
@@ -275,13 +275,13 @@ def test_a_program_that_prints_without_end_waits_as_at_a_terminal(local: NodeSan
 def test_a_machine_that_looks_seldom_makes_no_program_wait_that_prints_a_lot(
     local: NodeSandbox, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    looks, over, watch = [], threading.Event(), ProgramGroup.watch
+    looks, over, watch = [], threading.Event(), RunningPrograms.watch
 
-    def look(group: ProgramGroup) -> None:
+    def look(group: RunningPrograms) -> None:
         if not over.is_set():
             looks.append(watch(group))
 
-    monkeypatch.setattr(ProgramGroup, "watch", look)
+    monkeypatch.setattr(RunningPrograms, "watch", look)
     monkeypatch.setattr(loop, "_LOOK_EVERY", 1.0)
     (local.folder / "prints.py").write_text(
         "import os, time\nwhile not os.path.exists('go'): time.sleep(0.01)\n"

@@ -68,14 +68,14 @@ def record(out: str, domains: int = 0) -> None:
     """
     from autograder.graph import domains as module
     from autograder.graph.observer import Observer
-    from autograder.sandbox.program_group import ProgramGroup
+    from autograder.sandbox.running_programs import RunningPrograms
 
     if domains:
         module.LAST = domains
     programs: list[Any] = []
-    begin, close, start = Observer.__init__, Observer.close, ProgramGroup.start
+    begin, close, start = Observer.__init__, Observer.close, RunningPrograms.start
 
-    def started(group: ProgramGroup, *arguments: Any, **more: Any) -> Any:
+    def started(group: RunningPrograms, *arguments: Any, **more: Any) -> Any:
         programs.append(start(group, *arguments, **more))
         return programs[-1]
 
@@ -110,7 +110,7 @@ def record(out: str, domains: int = 0) -> None:
         close(observer)
 
     Observer.__init__, Observer.close = begun, closed  # type: ignore[method-assign]
-    ProgramGroup.start = started  # type: ignore[method-assign]
+    RunningPrograms.start = started  # type: ignore[method-assign]
 
 
 # As a user.

@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING, Any
 
 from autograder import diagnosis
 from autograder.checks import outcomes
+from autograder.checks.expect.discovery import Discovery
 from autograder.checks.expect.expectations import WITHIN
-from autograder.checks.expect.meeting import Meeting
 from autograder.checks.message_text import set_fields
 from autograder.checks.misuse import Misuse
-from autograder.checks.running import Running
+from autograder.checks.running_launch import RunningLaunch
 from autograder.checks.waiting import waits_for
 from autograder.graph.services import ServiceMissing
 from autograder.reasons import Group, Kind
@@ -25,10 +25,10 @@ GOAL_REJECTED = Kind(
 GOALS_TOGETHER = Kind("goals-together", "the status topic showed two goals that were executed at once", Group.STATES)
 
 
-class Action(Meeting):
+class Action(Discovery):
     """An action of the student's: what its server decides about goals."""
 
-    def __init__(self, running: Running, name: str, action_type: type) -> None:
+    def __init__(self, running: RunningLaunch, name: str, action_type: type) -> None:
         """Ask about the action of this name and class."""
         super().__init__(running, name)
         self._type = action_type

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from autograder import pictures
-from autograder.checks import seen
+from autograder.checks import picture_data
 from autograder.checks.expect.expectations import Expectations
 from autograder.checks.misuse import Misuse
 from autograder.pictures import Picture
@@ -25,7 +25,7 @@ class Draw(Expectations):
         Example:
             `ros.draw.timeline(seconds=2)`
         """
-        return pictures.timeline(seen.runs(self._insides()).of(*callbacks), seconds=seconds, by=by)
+        return pictures.timeline(picture_data.runs(self._insides()).of(*callbacks), seconds=seconds, by=by)
 
     def graph(self) -> Picture:
         """A picture of the nodes and topics, with the quality of service of each end: now, or as it was at the end.
@@ -33,8 +33,8 @@ class Draw(Expectations):
         Example:
             `ros.draw.graph()`
         """
-        found = self._running.graph or seen.graph(self._observer)
-        return pictures.graph(found.nodes, found.endpoints, seen.mismatch)
+        found = self._running.graph or picture_data.graph(self._observer)
+        return pictures.graph(found.nodes, found.endpoints, picture_data.mismatch)
 
     def qos(self, topic: str = "") -> Picture:
         """A picture of which publishers and subscriptions of a topic match, and over which policy they do not.
@@ -45,9 +45,9 @@ class Draw(Expectations):
         Example:
             `ros.draw.qos("/frames")`
         """
-        found = self._running.graph or seen.graph(self._observer)
+        found = self._running.graph or picture_data.graph(self._observer)
         _refuse_unnamed("qos", topic, [end.topic for end in found.endpoints])
-        return pictures.qos(topic, [end for end in found.endpoints if end.topic == topic], seen.mismatch)
+        return pictures.qos(topic, [end for end in found.endpoints if end.topic == topic], picture_data.mismatch)
 
     def lifecycle(self, node: str) -> Picture:
         """A picture of the state machine, with the way that a node took through it.
@@ -76,9 +76,9 @@ class Draw(Expectations):
             `ros.draw.arrivals("/frames")`
         """
         if not topic:  # only then is the graph asked, of which an ended launch of grading keeps nothing
-            found = self._running.graph or seen.graph(self._observer)
+            found = self._running.graph or picture_data.graph(self._observer)
             _refuse_unnamed("arrivals", topic, [end.topic for end in found.endpoints])
-        return pictures.arrivals(topic, seen.traffic(self._insides(), topic), seconds=seconds)
+        return pictures.arrivals(topic, picture_data.traffic(self._insides(), topic), seconds=seconds)
 
 
 def _refuse_unnamed(picture: str, topic: str, there: Iterable[str]) -> None:

@@ -1,4 +1,4 @@
-"""Expectations of the ends of topics: publishers and subscriptions, and whose they are."""
+"""Expectations of the ends of topics: publishers and subscriptions, whose they are, and from whom messages come."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from autograder import diagnosis
 from autograder.checks import outcomes
-from autograder.checks.expect.meeting import Meeting
+from autograder.checks.expect.discovery import Discovery
 from autograder.checks.settling import shows_all
 from autograder.diagnosis.names import WRONG_NODE
 from autograder.graph.names import UNKNOWN_NODE, node_of, type_name
@@ -34,7 +34,7 @@ End = Literal["publisher", "subscription"]
 _PRESENT: dict[End, Kind] = {"publisher": PUBLISHER_PRESENT, "subscription": SUBSCRIPTION_PRESENT}
 
 
-class Ends(Meeting):
+class Ends(Discovery):
     """What ends a topic must have, and what not."""
 
     def _ends(self, topic: str, msg_type: type | None, kind: End, node: str) -> list[TopicEndpointInfo]:

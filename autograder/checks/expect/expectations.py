@@ -8,9 +8,9 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from autograder import diagnosis
-from autograder.checks import outcomes, scoring, seen
+from autograder.checks import outcomes, picture_data, scoring
 from autograder.checks.misuse import Misuse
-from autograder.checks.running import Running
+from autograder.checks.running_launch import RunningLaunch
 from autograder.diagnosis import Scene
 from autograder.diagnosis.inside import Inside
 from autograder.diagnosis.programs import EXITED, NOT_SPINNING, SPINNING_ENDED
@@ -55,7 +55,7 @@ def objection(verdict: object, otherwise: str) -> str:
 class Expectations:
     """A running launch, and what can be asked of it. Each noun adds what it asks."""
 
-    def __init__(self, running: Running) -> None:
+    def __init__(self, running: RunningLaunch) -> None:
         """Ask about this launch."""
         self._running = running
 
@@ -122,7 +122,7 @@ class Expectations:
         reason = reason or outcomes.FAILED("")
         reason = replace(reason, hint=f"{reason.hint} {where_to_read(hint)}" if reason.hint else hint)
         if gone is None:
-            picture = seen.explaining(reason, title, self._observer, self._insides())
+            picture = picture_data.explaining(reason, title, self._observer, self._insides())
             outcomes.failed(title, reason, expected=expected, observed=observed, picture=picture)
         led_to = diagnosis.called_from_outside(gone)
         outcomes.failed_as_a_whole(
@@ -175,7 +175,7 @@ class Noun(Expectations):
     _full_name = True
     """Whether its name has a namespace, as those of nodes and topics do."""
 
-    def __init__(self, running: Running, name: str) -> None:
+    def __init__(self, running: RunningLaunch, name: str) -> None:
         """Ask about what has this name in this launch.
 
         Raises:

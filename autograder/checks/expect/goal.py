@@ -13,7 +13,7 @@ from autograder.checks.expect.meanwhile import Meanwhile, published_during
 from autograder.checks.expect.rates import RATE
 from autograder.checks.expect.topic import CONTENT, Topic
 from autograder.checks.misuse import Misuse
-from autograder.checks.running import Running
+from autograder.checks.running_launch import RunningLaunch
 from autograder.checks.waiting import waits_for
 from autograder.graph.actions import Change, Goal
 from autograder.graph.recording import Received
@@ -34,7 +34,7 @@ _STEPS = 3
 class SentGoal(Meanwhile):
     """A goal that the check has sent, and what the server has said about it so far."""
 
-    def __init__(self, running: Running, seen: Goal) -> None:
+    def __init__(self, running: RunningLaunch, seen: Goal) -> None:
         """Follow this goal."""
         super().__init__(running, seen.name)
         self.seen = seen

@@ -8,8 +8,8 @@ from typing import NoReturn
 
 from autograder import diagnosis
 from autograder.checks import outcomes
+from autograder.checks.expect.discovery import Discovery
 from autograder.checks.expect.expectations import WITHIN
-from autograder.checks.expect.meeting import Meeting
 from autograder.checks.waiting import waits_for
 from autograder.graph.lifecycle import LifecycleClient, Requested
 from autograder.graph.parameters import NoAnswer
@@ -49,7 +49,7 @@ def _other_way(seen: Sequence[tuple[str, str]], wanted: Sequence[tuple[str, str]
     return f"`{callback}` returned SUCCESS." if callback else ""
 
 
-class Lifecycle(Meeting):
+class Lifecycle(Discovery):
     """The state machine of a lifecycle node: its state, its transitions, and the steps that it took."""
 
     @property

@@ -1,4 +1,4 @@
-"""`ros.node`: whether a node is there, its parameters, and what it logs."""
+"""`ros.node`: whether a node is there, its parameters and why one has another value, and what it logs."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from autograder import diagnosis
 from autograder.arguments import params_file, remap_rules
 from autograder.arguments.remap_rules import PARAMETER_VALUE
 from autograder.checks import current, outcomes
+from autograder.checks.expect.discovery import MATCHES_WITHIN, Discovery
 from autograder.checks.expect.expectations import WITHIN
-from autograder.checks.expect.meeting import MATCHES_WITHIN, Meeting
 from autograder.checks.misuse import Misuse
 from autograder.checks.program import Program
-from autograder.checks.running import SETTLE, Running
+from autograder.checks.running_launch import SETTLE, RunningLaunch
 from autograder.checks.scoring import asked
 from autograder.checks.waiting import waits_for
 from autograder.graph import parameters
@@ -65,7 +65,7 @@ def undeclared(node: str, name: str, declared: Collection[str]) -> Reason:
     )
 
 
-def why_other(running: Running, node: str, name: str, found: Any, wanted: Any) -> Reason:
+def why_other(running: RunningLaunch, node: str, name: str, found: Any, wanted: Any) -> Reason:
     """Why the parameter `name` of `node` is `found` and not `wanted`: a reason that is established, or what it is."""
     reasons: tuple[Callable[[], Reason | None], ...] = (
         lambda: _file_for_others(running, node),
@@ -78,7 +78,7 @@ def why_other(running: Running, node: str, name: str, found: Any, wanted: Any) -
     return next((reason for ask in reasons if (reason := ask())), None) or _other_value(found, wanted)
 
 
-def _given_as_a_rule(running: Running, name: str) -> Reason | None:
+def _given_as_a_rule(running: RunningLaunch, name: str) -> Reason | None:
     """Whether the parameter was given with `-r`, as if it were a name to be changed."""
     for launched, _ in running.programs:
         for text in launched.all_rules():
@@ -89,7 +89,7 @@ def _given_as_a_rule(running: Running, name: str) -> Reason | None:
     return None
 
 
-def _given_to_another(running: Running, node: str, name: str) -> Reason | None:
+def _given_to_another(running: RunningLaunch, node: str, name: str) -> Reason | None:
     """Whether `-p NODE:name:=value` was meant for this node: a node's name there is one in the namespace `/`."""
     for launched, _ in running.programs:
         for text in launched.parameter_rules():
@@ -101,7 +101,7 @@ def _given_to_another(running: Running, node: str, name: str) -> Reason | None:
     return None
 
 
-def _given_by_another_name(running: Running, node: str, name: str, found: Any) -> Reason | None:
+def _given_by_another_name(running: RunningLaunch, node: str, name: str, found: Any) -> Reason | None:
     """Whether values were given under names that the node has not declared, and none under this one."""
     given = {one for launched, _ in running.programs for one in _given(launched, node)}
     if name in given or not given:
@@ -122,7 +122,7 @@ def _given_by_another_name(running: Running, node: str, name: str, found: Any) -
     )
 
 
-def _given_twice(running: Running, node: str, name: str, found: Any) -> Reason | None:
+def _given_twice(running: RunningLaunch, node: str, name: str, found: Any) -> Reason | None:
     """Whether `-p` gives the parameter more than one value: unlike with remap rules, the last one counts."""
     for launched, _ in running.programs:
         given = [text for text in launched.parameter_rules() if text.partition(":=")[0] == name]
@@ -143,7 +143,7 @@ def _given(launched: Program, node: str) -> Iterator[str]:
             yield from params_file.names_for(params_file.text_of(current.check.folder, file), node)
 
 
-def _no_such_argument(running: Running, found: Any) -> Reason | None:
+def _no_such_argument(running: RunningLaunch, found: Any) -> Reason | None:
     """Whether the launch was given arguments that the launch file does not have."""
     unused = running.unused_arguments()
     if not unused:
@@ -155,7 +155,7 @@ def _no_such_argument(running: Running, found: Any) -> Reason | None:
     )
 
 
-def _file_for_others(running: Running, node: str) -> Reason | None:
+def _file_for_others(running: RunningLaunch, node: str) -> Reason | None:
     """Whether the parameter files of the launch have nothing for this node."""
     for launched, _ in running.programs:
         if launched.warnings:
@@ -201,7 +201,7 @@ _NO_RESULT = "Callback returned an invalid type"
 """What rclpy says in place of a reason."""
 
 
-class Node(Meeting):
+class Node(Discovery):
     """A node: whether it is there, what values its parameters have, and what it logs."""
 
     @waits_for("the node `{name}`")

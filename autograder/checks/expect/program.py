@@ -13,7 +13,7 @@ from autograder.checks import outcomes
 from autograder.checks.expect.expectations import WITHIN, Noun
 from autograder.checks.misuse import Misuse
 from autograder.checks.program import Program
-from autograder.checks.running import Running
+from autograder.checks.running_launch import RunningLaunch
 from autograder.checks.waiting import waits_for
 from autograder.core.output import tidy
 from autograder.diagnosis import last_traceback
@@ -87,7 +87,7 @@ class StartedProgram(Noun):
 
     _full_name = False
 
-    def __init__(self, running: Running, name: str, start: Callable[[Program], None]) -> None:
+    def __init__(self, running: RunningLaunch, name: str, start: Callable[[Program], None]) -> None:
         """Ask about the program of this name; that there is none is a failed outcome.
 
         Args:

@@ -8,9 +8,9 @@ from typing import Any
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 
 from autograder import diagnosis
+from autograder.checks.expect.discovery import Discovery
 from autograder.checks.expect.expectations import WITHIN
-from autograder.checks.expect.meeting import Meeting
-from autograder.checks.running import Running
+from autograder.checks.running_launch import RunningLaunch
 from autograder.checks.scoring import asked
 from autograder.checks.waiting import waits_for
 from autograder.graph.names import node_of
@@ -20,10 +20,12 @@ RELIABLE_DEEP = 1000
 """Depth of the check's own publishers, so that a burst of its own is never cut."""
 
 
-class Publisher(Meeting):
+class Publisher(Discovery):
     """A publisher of the check's own, which sends to the student's nodes."""
 
-    def __init__(self, running: Running, topic: str, msg_type: type, qos: QoSProfile | int = RELIABLE_DEEP) -> None:
+    def __init__(
+        self, running: RunningLaunch, topic: str, msg_type: type, qos: QoSProfile | int = RELIABLE_DEEP
+    ) -> None:
         """Describe the publisher; it is made when it is first used."""
         super().__init__(running, topic)
         self._type = msg_type

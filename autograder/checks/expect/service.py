@@ -1,4 +1,8 @@
-"""`ros.service`: whether a service is offered, and what it answers."""
+"""The two sides of a service.
+
+`ros.service` asks whether a service is offered and what it answers; `ros.server` is a service that the check itself
+offers to the student's clients.
+"""
 
 from __future__ import annotations
 
@@ -7,12 +11,12 @@ from typing import Any
 
 from autograder import diagnosis
 from autograder.checks import outcomes
+from autograder.checks.expect.discovery import Discovery
 from autograder.checks.expect.expectations import WITHIN
 from autograder.checks.expect.meanwhile import Meanwhile, published_during
-from autograder.checks.expect.meeting import Meeting
 from autograder.checks.expect.topic import Topic
 from autograder.checks.misuse import Misuse
-from autograder.checks.running import Running
+from autograder.checks.running_launch import RunningLaunch
 from autograder.checks.scoring import asked
 from autograder.checks.waiting import waits_for
 from autograder.graph.names import type_name
@@ -22,10 +26,10 @@ ANSWER_WITHIN = 5.0
 """Seconds that an answer may take: a local round trip takes 1 to 4 ms, a stuck node does not answer."""
 
 
-class Service(Meeting):
+class Service(Discovery):
     """A service of the student's: whether it is offered, and what it answers."""
 
-    def __init__(self, running: Running, name: str, srv_type: type) -> None:
+    def __init__(self, running: RunningLaunch, name: str, srv_type: type) -> None:
         """Ask about the service of this name and class."""
         super().__init__(running, name)
         self._type = srv_type
@@ -134,7 +138,7 @@ class Server(Meanwhile):
 
     def __init__(
         self,
-        running: Running,
+        running: RunningLaunch,
         name: str,
         srv_type: type | None = None,
         answer: Callable[[Any, Any], Any] | None = None,

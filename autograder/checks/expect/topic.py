@@ -12,13 +12,13 @@ from rclpy.qos import QoSProfile
 from autograder import diagnosis
 from autograder.checks import outcomes
 from autograder.checks.expect import rates
+from autograder.checks.expect.discovery import MATCHES_WITHIN
 from autograder.checks.expect.endpoints import End, Sources
 from autograder.checks.expect.expectations import GONE_WITHIN, WITHIN, objection
-from autograder.checks.expect.meeting import MATCHES_WITHIN
 from autograder.checks.expect.rates import RATE
 from autograder.checks.message_text import in_words, int_in_float, shorten
 from autograder.checks.misuse import Misuse
-from autograder.checks.running import Running
+from autograder.checks.running_launch import RunningLaunch
 from autograder.checks.waiting import waits_for
 from autograder.diagnosis.callbacks import MESSAGE_FIELD
 from autograder.graph.names import node_of
@@ -111,7 +111,7 @@ def _number(messages: int) -> str:
 class Topic(Sources):
     """A topic: who is at its ends, and what arrives on it."""
 
-    def __init__(self, running: Running, name: str, msg_type: type | None = None) -> None:
+    def __init__(self, running: RunningLaunch, name: str, msg_type: type | None = None) -> None:
         """Ask about the topic of this name; most questions need the class of its messages."""
         super().__init__(running, name)
         self._type = msg_type

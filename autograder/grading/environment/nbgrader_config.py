@@ -9,7 +9,7 @@ try:
     # nbgrader looks for modules in the working folder, which may hold anything.
     sys.path[:] = [folder for folder in sys.path if folder not in ("", str(Path.cwd()))]
 
-    from autograder.grading.validate import use_own_course
+    from autograder.grading.nbgrader_validate import use_own_course
 
     use_own_course(get_config())  # type: ignore[name-defined]  # noqa: F821  traitlets provides get_config
 except BaseException as error:

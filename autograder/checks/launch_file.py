@@ -13,7 +13,7 @@ from autograder.packages.built import Built
 
 
 @dataclass(frozen=True)
-class LaunchedFile:
+class LaunchFile:
     """What is read, and with what words."""
 
     name: str

@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
-from autograder.checks import current, seen
+from autograder.checks import current, picture_data
 from autograder.checks.concurrency import Concurrency
 from autograder.checks.program import Program
 from autograder.checks.settling import Settling
@@ -29,7 +29,7 @@ AFTER_EXIT = 0.3
 """Seconds that evidence may still be under way after the last program has ended."""
 
 
-class Running:
+class RunningLaunch:
     """What the expectations of one launch know of its programs.
 
     Its `observer` is there from the moment the launch begins.
@@ -71,7 +71,7 @@ class Running:
         """The check's own publishers, by topic and QoS profile."""
         self.known_publishers: list[Any] = []
         """Those of them that have been used: what subscribed by then knows them."""
-        self.graph: seen.Graph | None = None
+        self.graph: picture_data.Graph | None = None
         """The graph as it was when the launch ended."""
         self._ended: float | None = None
 

@@ -199,7 +199,7 @@ class GroupLost(Exception):
     """The group's first process has ended, or never began."""
 
 
-class ProgramGroup:
+class RunningPrograms:
     """The programs of one launch. Made by `NodeSandbox.group`; ended with `end`, or as a `with` block.
 
     Where there is full isolation, it is a PID namespace: when its first process is gone, everything in it is, whoever
@@ -242,7 +242,7 @@ class ProgramGroup:
         channel.setblocking(False)
         loop.do(lambda: loop.when_readable(channel.fileno(), self._on_channel))
 
-    def __enter__(self) -> ProgramGroup:
+    def __enter__(self) -> RunningPrograms:
         """Return itself."""
         return self
 

@@ -22,7 +22,7 @@ _ASKED = 16
 """So many nodes are asked at the most: a program may make any number of them."""
 
 
-class Meeting(Noun):
+class Discovery(Noun):
     """Nodes and the observer get to know each other."""
 
     def _settle(self, name: str) -> None:

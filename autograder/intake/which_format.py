@@ -11,11 +11,11 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from autograder.core.errors import KitError
-from autograder.intake.choosing import choose, is_of_lab
 from autograder.intake.entries import Claim, Entry, Kind, NotUnderstoodError, Recognised, listed
 from autograder.intake.formats import CLASSROOM, PLAIN, PLATFORMS, Format, by_lab, owner_of
 from autograder.intake.members import is_hidden, is_notebook
 from autograder.intake.roster import given_name
+from autograder.intake.which_notebook import choose, is_of_lab
 from autograder.intake.words import some
 
 _MOST_AROUND = 3

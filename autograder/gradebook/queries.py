@@ -1,0 +1,100 @@
+"""Reads grades from an open gradebook: in SQL, for nbgrader takes a second to load and asks for each by itself."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from autograder.core.grades import CellGrade, Grade
+
+if TYPE_CHECKING:
+    from sqlalchemy.engine import Connection
+
+_OF_SUBMISSION = """
+JOIN submitted_notebook sn ON x.notebook_id = sn.id
+JOIN submitted_assignment sa ON sn.assignment_id = sa.id
+JOIN assignment a ON sa.assignment_id = a.id
+JOIN base_cell bc ON x.cell_id = bc.id
+"""
+_GRADES = f"""
+SELECT sa.student_id, a.name AS lab, sn.late_submission_penalty AS penalty, bc.name AS cell, gc.max_score,
+       x.auto_score, x.manual_score, x.extra_credit, x.needs_manual_grade,
+       EXISTS (SELECT 1 FROM base_cell s WHERE s.name = bc.name AND s.notebook_id = bc.notebook_id
+               AND s.type = 'SolutionCell') AS is_answer
+FROM grade x {_OF_SUBMISSION} JOIN grade_cells gc ON gc.id = bc.id
+WHERE :lab IN ('', a.name) AND :student IN ('', sa.student_id)
+ORDER BY sa.student_id, a.name, bc.name
+"""
+_COMMENTS = f"""
+SELECT sa.student_id, a.name AS lab, bc.name AS cell, COALESCE(x.manual_comment, x.auto_comment, '') AS comment
+FROM comment x {_OF_SUBMISSION}
+WHERE :lab IN ('', a.name) AND :student IN ('', sa.student_id)
+"""
+
+
+def read_grade(address: str, lab: str, student: str) -> Grade:
+    """Return the grade of one submission, which the gradebook has.
+
+    Args:
+        address: of the gradebook.
+        lab: that was handed in.
+        student: who handed it in.
+    """
+    from sqlalchemy import create_engine
+
+    engine = create_engine(address)
+    try:
+        with engine.connect() as connection:
+            return grades_in(connection, lab, student)[0]
+    finally:
+        engine.dispose()
+
+
+def digests(connection: Connection, lab: str, student: str = "") -> dict[str, str]:
+    """Return by student what tells all that feedback shows of the gradebook from what it showed before."""
+    comments: dict[str, list[tuple[str, str]]] = {}
+    for (who, _, cell), comment in sorted(_comments(connection, lab, student).items()):
+        comments.setdefault(who, []).append((cell, comment))
+    found = {}
+    for grade in grades_in(connection, lab, student):
+        cells = [(cell.grade_id, cell.points, cell.max_points) for cell in grade.cells]
+        shown = json.dumps([grade.penalty, cells, comments.get(grade.student)])
+        found[grade.student] = hashlib.sha256(shown.encode()).hexdigest()
+    return found
+
+
+def grades_in(connection: Connection, lab: str, student: str = "") -> list[Grade]:
+    """Return the grades in a gradebook, sorted by student and lab; empty for `lab` or `student`: of all."""
+    cells: dict[tuple[str, str, float], list[CellGrade]] = {}
+    comments = _comments(connection, lab, student)
+    for row in _rows(connection, _GRADES, lab, student):
+        comment = comments.get((row.student_id, row.lab, row.cell), "")
+        cells.setdefault((row.student_id, row.lab, row.penalty or 0.0), []).append(_cell(row, comment))
+    return [Grade(who, name, tuple(found), penalty) for (who, name, penalty), found in cells.items()]
+
+
+def _cell(row: Any, comment: str) -> CellGrade:
+    given = row.auto_score if row.manual_score is None else row.manual_score
+    by_hand = row.manual_score is not None or row.extra_credit is not None
+    return CellGrade(
+        grade_id=row.cell,
+        points=None if given is None else given + (row.extra_credit or 0.0),
+        max_points=row.max_score,
+        is_check=not row.is_answer,
+        by_hand=by_hand,
+        comment=comment,
+        stale=by_hand and given is not None and bool(row.needs_manual_grade),
+    )
+
+
+def _comments(connection: Connection, lab: str, student: str) -> dict[tuple[str, str, str], str]:
+    rows = _rows(connection, _COMMENTS, lab, student)
+    return {(row.student_id, row.lab, row.cell): row.comment for row in rows}
+
+
+def _rows(connection: Connection, query: str, lab: str, student: str) -> Sequence[Any]:
+    from sqlalchemy import text
+
+    return connection.execute(text(query), {"lab": lab, "student": student}).all()
