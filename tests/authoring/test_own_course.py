@@ -276,38 +276,6 @@ def test_release_refuses_a_broken_cell_and_names_it(
     assert not (tmp_path / "course" / "labs").exists()
 
 
-def test_a_setting_that_there_is_not_is_refused(tmp_path: Path) -> None:
-    from autograder.core.errors import KitError
-    from autograder.course.settings import read_settings
-
-    (tmp_path / "course.toml").write_text('titel = "Robots"\n')
-    with pytest.raises(KitError, match=r"`titel`, which is no setting of a course[^\n]*\nSettings: title, labs"):
-        read_settings(tmp_path)
-    (tmp_path / "course.toml").write_text("labs = 3\n")
-    with pytest.raises(KitError, match="`labs` cannot be 3"):
-        read_settings(tmp_path)
-
-
-def test_sections_name_lectures_that_there_are_and_each_code_once(tmp_path: Path) -> None:
-    from autograder.core.errors import KitError
-    from autograder.course.settings import read_book
-
-    (tmp_path / "course.toml").write_text(
-        '[lectures]\n"Week 3" = "names"\n[sections."Week 3"]\n"Two names?" = ["duplicate-node"]\n'
-    )
-    book = read_book(tmp_path)
-    assert str(book.sections["duplicate-node"]) == "Week 3, section 'Two names?'"
-    assert book.sections["duplicate-node"].place == "names.html#two-names"
-    assert str(book.named_in("Compare them; week 3, section 'A topic'.")) == "Week 3, section 'A topic'"
-    assert book.named_in("Lecture 3, section 'A topic'") is None
-    (tmp_path / "course.toml").write_text('[sections."Week 3"]\nNames = ["duplicate-node"]\n')
-    with pytest.raises(KitError, match="a lecture that `lectures` does not have, 'Week 3'"):
-        read_book(tmp_path)
-    (tmp_path / "course.toml").write_text('[lectures]\nA = "a"\n[sections.A]\nB = ["x"]\nC = ["x"]\n')
-    with pytest.raises(KitError, match="the code 'x' in two sections"):
-        read_book(tmp_path)
-
-
 def test_labs_come_in_the_order_of_the_settings(course: Path, tmp_path: Path) -> None:
     from autograder.authoring.release import start_page
     from autograder.course.lab import lab_names

@@ -8,8 +8,6 @@ import os
 import shutil
 import subprocess
 import sys
-import tempfile
-import zipfile
 from pathlib import Path
 from typing import Any
 
@@ -19,16 +17,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from places import ROOT
 
-from autograder.core.errors import KitError
-from autograder.course.cells import BadNameError, grade_id_of, hidden_lines, parse, without_hidden_tests
+from autograder.course.cells import grade_id_of, parse
 from autograder.course.lab import Lab, load_lab
-from autograder.intake.collect import collect
 from autograder.submission.answers import OWN_FILES, Submission
 from autograder.submission.copies import told_of_copies
 from autograder.submission.notebook_file import NOTEBOOK_BYTES
 from autograder.submission.reader import PROBLEMS_KEPT, read_submission
-
-ORDINARY_USER = 12345
 
 
 @pytest.fixture
@@ -52,70 +46,6 @@ def by_id(cells: list[dict[str, Any]], grade_id: str) -> dict[str, Any]:
 
 def codes(submission: Submission) -> list[str]:
     return [problem.code for problem in submission.problems]
-
-
-@pytest.mark.parametrize(
-    ("source", "name"),
-    [
-        ("%%node talker\nx = 1", "talker.py"),
-        ("\n\n%%node talker_2  \nx", "talker_2.py"),
-        ("%%file a.yaml\nb: 1", "a.yaml"),
-        ("%%file camera.params.yml\n", "camera.params.yml"),
-        ("%%file Table-1.csv\n", "Table-1.csv"),
-    ],
-)
-def test_a_cell_names_its_file(source: str, name: str) -> None:
-    file = parse(source)
-    assert file is not None and file.file_name == name
-
-
-@pytest.mark.parametrize(
-    "source", ["", "x = 1", "# %%node talker", "x\n%%node talker", "%%nodes talker", "%node talker"]
-)
-def test_a_cell_without_the_magic_is_no_file(source: str) -> None:
-    assert parse(source) is None
-
-
-@pytest.mark.parametrize(
-    "line",
-    [
-        "%%node", "%%node ../talker", "%%node talker.py", "%%node Talker", "%%node 2talker", "%%node a b",
-        "%%node talker # mine", "%%node täl", "%%file", "%%file a.py", "%%file /etc/passwd.yaml", "%%file ../a.yaml",
-        "%%file a/b.yaml", "%%file a\\b.yaml", "%%file .yaml", "%%file .hidden.yaml", "%%file a.yaml.py",
-        "%%file -rf.yaml", "%%file a\x00.yaml", "%%file " + "a" * 300 + ".yaml",
-        "%%file a" + ".bbbbbbbb" * 28 + ".yaml", "%%node a" + " " * 60_000 + "b",
-    ],
-)  # fmt: skip
-def test_a_bad_name_is_refused_with_a_reason(line: str) -> None:
-    with pytest.raises(BadNameError, match="name"):
-        parse(f"{line}\nx")
-
-
-def test_the_lab_knows_its_cells(lab: Lab) -> None:
-    assert [(cell.grade_id, cell.title, cell.points) for cell in lab.cells] == [
-        ("setup", "A toy lab", None),
-        ("check_talker", "The talker", 3),
-        ("check_answers", "The table", 2),
-    ]
-    assert lab.given == {"helper.py": "# %%node helper\nprint('given')\n"}
-    assert list(lab.answers) == ["talker", "answers", "why"]
-    assert (lab.max_points, lab.answers["why"].points) == (5, 4)
-    assert "secret" in lab.checks[0].source
-    assert "secret" not in json.dumps(lab.released) and "hello" not in json.dumps(lab.released)
-
-
-def test_an_unknown_lab_is_named_with_those_there_are(lab: Lab) -> None:
-    with pytest.raises(KitError, match=r"no lab `nowhere`.*\n.*toy"):
-        load_lab(lab.notebook.parent.parent.parent, "nowhere")
-
-
-def test_without_solutions_the_released_lab_serves(lab: Lab, tmp_path: Path) -> None:
-    path = tmp_path / "student" / "labs" / "toy" / "toy.ipynb"
-    path.parent.mkdir(parents=True)
-    path.write_text(json.dumps(toy.notebook(list(lab.released))))
-    released = load_lab(tmp_path / "student", "toy")
-    assert [cell.grade_id for cell in released.cells] == [cell.grade_id for cell in lab.cells]
-    assert released.answers["talker"].blank == lab.answers["talker"].blank
 
 
 def test_answers_become_files(lab: Lab, tmp_path: Path) -> None:
@@ -305,12 +235,6 @@ def test_the_labs_own_source_is_a_notebook_without_defects(lab: Lab, tmp_path: P
     assert submission.readable and codes(submission) == []
 
 
-def test_lines_are_hidden_that_are_cut_from_what_students_receive() -> None:
-    source = "a\n# BEGIN HIDDEN TESTS\nb\n# END HIDDEN TESTS\nc"  # nbgrader asks for no more than these words
-    assert "b" not in without_hidden_tests(source).split("\n")
-    assert 3 in hidden_lines(source.split("\n")) and not {1, 5} & hidden_lines(source.split("\n"))
-
-
 def test_a_given_program_cannot_be_replaced(lab: Lab, tmp_path: Path) -> None:
     submission = read(lab, tmp_path, solved(lab, talker="%%node helper\nprint('mine')"))
     assert submission.files["helper.py"] == "# %%node helper\nprint('given')\n"
@@ -410,99 +334,3 @@ def test_no_notebook_can_stop_the_reader(cells: Any, tmp_path_factory: pytest.Te
     lab = load_lab(toy.make_course(folder / "course"), toy.LAB)
     submission = read(lab, folder, json.dumps({"nbformat": 4, "cells": cells}))
     assert submission.sources.keys() == lab.answers.keys()
-
-
-def make_zip(path: Path, members: dict[str, str]) -> Path:
-    with zipfile.ZipFile(path, "w") as archive:
-        for name, text in members.items():
-            archive.writestr(name, text)
-    return path
-
-
-@pytest.mark.parametrize("form", ["{}/toy.ipynb", "{}/toy/toy.ipynb", "class/{}/toy.ipynb", "{}/toy (1).ipynb"])
-def test_a_zip_is_taken_in(tmp_path: Path, form: str) -> None:
-    members = {form.format(name): name for name in ("ann", "bob")} | {"__MACOSX/ann/._toy.ipynb": "x"}
-    found = collect(make_zip(tmp_path / "in.zip", members), toy.LAB, tmp_path / "course").notebooks
-    assert {student: path.read_text() for student, path in found.items()} == {"ann": "ann", "bob": "bob"}
-
-
-@pytest.mark.parametrize("packing", [zipfile.ZIP_DEFLATED, zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA])
-@pytest.mark.parametrize("kept", [0, 12, 40])
-def test_a_damaged_member_of_a_zip_stops_nobody_else(tmp_path: Path, packing: int, kept: int) -> None:
-    archive = tmp_path / "in.zip"
-    with zipfile.ZipFile(archive, "w", packing) as made:
-        for student in ("ann", "bob"):
-            made.writestr(f"{student}/toy.ipynb", student + "".join(map(str, range(200))))
-        packed, size = made.getinfo("ann/toy.ipynb").header_offset, made.getinfo("ann/toy.ipynb").compress_size
-    content = bytearray(archive.read_bytes())
-    start = packed + 30 + len("ann/toy.ipynb")
-    content[start + kept : start + size] = b"\xff" * (size - kept)
-    archive.write_bytes(content)
-    collected = collect(archive, toy.LAB, tmp_path / "course")
-    assert {student: path.read_text()[:3] for student, path in collected.notebooks.items()} == {"bob": "bob"}
-    assert len(collected.refused) == 1 and "ann/toy.ipynb" in collected.refused[0]
-
-
-def test_a_zip_with_a_damaged_directory_is_a_sentence(tmp_path: Path) -> None:
-    archive = make_zip(tmp_path / "in.zip", {"ann/toy.ipynb": "ann", "bob/toy.ipynb": "bob"})
-    archive.write_bytes(archive.read_bytes().replace(b"PK\x01\x02", b"XX\x01\x02"))
-    with pytest.raises(KitError, match="nor a zip that can be read"):
-        collect(archive, toy.LAB, tmp_path / "course")
-
-
-def test_a_folder_that_may_not_be_entered_stops_nobody_else() -> None:
-    # Below a folder that everybody may enter, since root has to become somebody else to be refused anything.
-    folder = Path(tempfile.mkdtemp())
-    folder.chmod(0o777)
-    toy.hand_in(folder / "in", "ann", "ann")
-    closed = toy.hand_in(folder / "in", "bob", "bob").parent
-    closed.chmod(0)
-    was = os.geteuid()
-    os.seteuid(was or ORDINARY_USER)
-    try:
-        collected = collect(folder / "in", toy.LAB, folder / "course")
-        texts = {student: path.read_text() for student, path in collected.notebooks.items()}
-    finally:
-        os.seteuid(was)
-        closed.chmod(0o700)
-        shutil.rmtree(folder)
-    assert texts == {"ann": "ann"}
-    assert len(collected.refused) == 1 and "'bob' cannot be read" in collected.refused[0]
-
-
-def test_a_zip_cannot_write_elsewhere(tmp_path: Path) -> None:
-    members = {"../evil/toy.ipynb": "x", "/abs/toy.ipynb": "x", "a/../../evil/toy.ipynb": "x", "ann/toy.ipynb": "ok"}
-    archive = make_zip(tmp_path / "in.zip", members | {"ann/ipykernel_launcher.py": "x", "..\\evil\\toy.ipynb": "x"})
-    found = collect(archive, toy.LAB, tmp_path / "course").notebooks
-    assert list(found) == ["ann"]
-    written = sorted(str(path.relative_to(tmp_path)) for path in tmp_path.rglob("*") if path.is_file())
-    ours = ["nbgrader_config.py", "submitted/ann/toy/toy.ipynb", "taken/toy.json"]
-    assert written == [*(f"course/build/{name}" for name in ours), "in.zip"]
-
-
-def test_a_folder_is_taken_in_without_following_links(tmp_path: Path) -> None:
-    toy.hand_in(tmp_path / "in", "ann", "ann")
-    (tmp_path / "in" / "bob").mkdir()
-    secret = tmp_path / "secret.ipynb"
-    secret.write_text("secret")
-    (tmp_path / "in" / "eve").mkdir()
-    (tmp_path / "in" / "eve" / "toy.ipynb").symlink_to(secret)
-    (tmp_path / "in" / "mallory").symlink_to(tmp_path)
-    toy.hand_in(tmp_path / "in", "*", "glob")
-    toy.hand_in(tmp_path / "in" / "__MACOSX", "ann", "what a Mac packs")
-    collected = collect(tmp_path / "in", toy.LAB, tmp_path / "course")
-    texts = {student: path.read_text() for student, path in collected.notebooks.items()}
-    harmless = next(student for student in texts if student not in ("ann", "bob"))
-    assert texts == {"ann": "ann", "bob": "", harmless: "glob"} and "*" not in harmless
-    assert collected.notes == [f"'*' cannot be a file's name here; the student is called {harmless!r}."]
-    told = "\n".join(collected.refused)
-    assert len(collected.refused) == 2
-    assert "'eve/toy.ipynb', which cannot be read ('toy.ipynb' is a link" in told and "mallory is a link" in told
-
-
-def test_nothing_to_take_in_is_an_error(tmp_path: Path) -> None:
-    (tmp_path / "in").mkdir()
-    with pytest.raises(KitError, match="no submissions"):
-        collect(tmp_path / "in", toy.LAB, tmp_path)
-    with pytest.raises(KitError, match="neither a folder nor a zip"):
-        collect(tmp_path / "nothing", toy.LAB, tmp_path)
