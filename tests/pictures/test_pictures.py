@@ -94,6 +94,8 @@ def test_a_graph_and_a_table_of_pairs_cross_out_what_does_not_match() -> None:
     assert words(pairs).count("✗") == words(pairs).count("✓") == 1
     assert "there is no subscription" in words(qos("/frames", ENDS[:1], mismatch))
     assert "no node is on the graph" in words(graph([], []))
+    assert drawn.alt.startswith("Graph of 4 nodes: /camera, /lonely, /planner, /viewer.")
+    assert graph(["/camera"], []).alt.startswith("Graph of 1 node: /camera.")
 
 
 def test_nodes_in_a_circle_can_be_drawn() -> None:
