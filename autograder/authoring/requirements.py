@@ -52,12 +52,12 @@ class Requirements:
         return [unit for unit in tasks(lab) if not any(text in unit or unit in text for text in words)]
 
     def strangers(self, lab: Lab) -> list[str]:
-        """Words that do not stand in the lab's text."""
+        """Words that are not in the lab's text."""
         whole = plain(" ".join(source_of(cell) for cell in lab.released))
         return [text for text in [one.text for one in self.required] + self.remarks if text not in whole]
 
     def unheld(self, lab: Lab) -> list[str]:
-        """Checks that hold no requirement."""
+        """Checks that test no requirement."""
         held = {one.check for one in self.required}
         return [check.grade_id for check in lab.checks if check.grade_id not in held]
 

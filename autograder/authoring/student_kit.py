@@ -1,10 +1,11 @@
-"""Writes what students get: the labs, the lectures, and the kit as a wheel that can check and cannot tell.
+"""Writes what students get: the labs, the lectures, and the kit as a wheel without solutions or hidden tests.
 
-The labs lie below `kit` only. Set-up puts them where a student works, once: unpacking a new version replaces no work.
+The labs are in `kit` only. Set-up copies them once to where a student works, so that unpacking a new version never
+replaces a student's work.
 
-Neither a solution nor a hidden test is in it, and nothing of the kit that only instructors use. What was written is
-searched for both before it is given out: for each hidden test, solution and mark scheme as it is in the lab's source,
-whatever the spaces, and except for a marked solution also for each of its lines that is long enough to be recognised.
+Before the files are given out, they are searched for every hidden test, solution and mark scheme of the labs' sources.
+Spaces do not count. Except for a marked solution, each single line is searched for as well. Texts shorter than 24
+characters are skipped, and so is whatever students receive in the released lab anyway.
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ from autograder.setup.places import KIT_FOLDER, ROOT, STUDENT_LOCK
 _REGION = re.compile(r"BEGIN (HIDDEN TESTS|SOLUTION|MARK SCHEME)[^\n]*\n(.*?)^[^\n]*END \1", re.DOTALL | re.MULTILINE)
 _MARK = re.compile(r"#+ (BEGIN|END) (HIDDEN TESTS|SOLUTION|MARK SCHEME)$")
 _TELLING = 24
-"""Characters without spaces from which on a text stands for itself: shorter ones occur everywhere."""
+"""Minimum length, without spaces, of a text that is searched for. Shorter ones occur everywhere."""
 _PACKED = (".whl", ".zip")
 
 
@@ -46,7 +47,7 @@ class Secret:
 
 
 def secrets_of(root: Path, labs: Sequence[str]) -> list[Secret]:
-    """Return what of these labs may not be given out; what students receive of the lab anyway is no secret."""
+    """Return the texts of these labs that students must not receive, except those that the released lab contains."""
     paths = CoursePaths(root)
     found: dict[str, Secret] = {}
     for lab in labs:
@@ -194,7 +195,7 @@ def _settings_file(settings: CourseSettings, names: Sequence[str]) -> str:
 
 
 def _toml(value: str | list[str]) -> str:
-    """A text, or a list of texts, as TOML has them: as JSON has them."""
+    """Format a text or a list of texts for TOML, which writes them as JSON does."""
     return json.dumps(value, ensure_ascii=False)
 
 

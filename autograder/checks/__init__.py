@@ -1,10 +1,10 @@
 """What a check cell uses: `launch`, the expectations, the values that vary."""
 
 from autograder.checks import vary
-from autograder.checks.answers import NAME_OR_NONE, answers
+from autograder.checks.answers import FULL_NAME, NAME_OR_NONE, answers
 from autograder.checks.building import build
 from autograder.checks.command_line import command_line
 from autograder.checks.launch import launch, launch_file
 from autograder.checks.program import Program
 
-__all__ = ["NAME_OR_NONE", "Program", "answers", "build", "command_line", "launch", "launch_file", "vary"]
+__all__ = ["FULL_NAME", "NAME_OR_NONE", "Program", "answers", "build", "command_line", "launch", "launch_file", "vary"]

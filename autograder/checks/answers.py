@@ -1,7 +1,7 @@
 """Tables of answers: a `%%file NAME.yaml` cell of plain `question: answer` lines.
 
-Each question is a part of its own: a wrong line costs that line's share of the points. An answer is read as the student
-means it: how it is spelt does not matter.
+Each question is a part of its own: a wrong line costs that line's share of the points. Differences in spelling,
+such as case or quotes, do not matter.
 """
 
 from __future__ import annotations
@@ -26,13 +26,17 @@ from autograder.reasons import Group, Kind, Refused
 NAME_OR_NONE = ("a full name, such as `/front/points`", "none")
 """The form of an answer that is the full name of a node, topic or service, or `none`."""
 
+FULL_NAME = ("a full name, which begins with `/` and does not end with it",)
+"""The form of an answer that has to be written as the full name of a node, topic or service."""
+
 _AROUND = " \t'\"`."
+_FULL_NAME = re.compile(r"(/[A-Za-z_]\w*)+")
 _NAME = re.compile(r"/?[A-Za-z_]\w*(/\w+)*/?")
 _YES, _NO = ("yes", "true", "on", "y"), ("no", "false", "off", "n")
 
 
 def plain(answer: Any) -> Any:
-    """Return an answer without what is a matter of spelling: case, quotes, spaces, hyphens and underscores."""
+    """Return an answer without differences of spelling: case, quotes, spaces, hyphens and underscores."""
     if isinstance(answer, (list, tuple)):
         return tuple(plain(one) for one in answer)
     if isinstance(answer, (bool, float)) or not isinstance(answer, str):
@@ -68,6 +72,8 @@ def allowed(answer: Any, form: Sequence[Any]) -> bool:
     """Whether an answer has one of the allowed values."""
     if form is NAME_OR_NONE:
         return bool(_NAME.fullmatch(str(answer).strip(_AROUND)))
+    if form is FULL_NAME:
+        return bool(_FULL_NAME.fullmatch(str(answer).strip(_AROUND)))
     if isinstance(form, range):
         number = plain(answer)
         return isinstance(number, int) and not isinstance(number, bool) and number in form
@@ -90,7 +96,7 @@ def one_of(form: Sequence[Any]) -> str:
 
 
 def misses(answer: Any, form: Sequence[Any]) -> str:
-    """What keeps an answer from being of the form, as the end of a sentence that has named the answer."""
+    """Say why an answer does not have the required form; this ends a sentence that has already named the answer."""
     if not form or not isinstance(form[0], (list, tuple)):
         return f", which is none of the allowed answers: {one_of(form)}"
     wanted = len(form[0])
@@ -111,12 +117,12 @@ def _or(words: Sequence[str]) -> str:
 
 
 def seal(question: str, answer: Any) -> str:
-    """Return a word by which a visible check knows the right answer to a question without showing it."""
+    """Return a word that lets a visible check recognise the right answer to a question without showing it."""
     return hashlib.sha256(json.dumps([question, plain(answer)]).encode()).hexdigest()[:12]
 
 
 def is_seal(word: object) -> bool:
-    """Whether it looks like what `seal` returns."""
+    """Whether a text has the form of a seal, as `seal` returns it."""
     return isinstance(word, str) and re.fullmatch(r"[0-9a-f]{12}", word) is not None
 
 
@@ -127,7 +133,7 @@ _LINES = "Write one line for each question: `question: answer`, with a space aft
 
 
 def _no_table(read: Any) -> str:
-    """What YAML made of a file that is no table."""
+    """Say what YAML read instead of a table."""
     if read in (None, {}):
         return "It has no answers yet."
     if isinstance(read, list):
@@ -142,7 +148,7 @@ class Answers:
     """One table of answers; `with answers("predictions.yaml") as table:` like a launch."""
 
     def __init__(self, file: str) -> None:
-        """Name the file; it is read on entering the block."""
+        """Name the file. It is read when the block is entered."""
         self.file = file
         self._table: dict[str, Any] = {}
         self._forms: dict[str, Sequence[Any]] = {}
@@ -156,7 +162,7 @@ class Answers:
         return outcomes.ends_block(error)
 
     def _read(self) -> None:
-        """The file exists and is a table; fails the check if not."""
+        """Read the file. The check fails if the file does not exist or is not a table."""
         if self._table:
             return
         title = f"`{self.file}` is a table of answers"
@@ -186,7 +192,7 @@ class Answers:
                 outcomes.passed(f"`{question}` is answered", observed=str(self._answer(question)))
 
     def _answer(self, question: str) -> Any:
-        """The answer to a question, of an allowed form; fails the question's part if there is none."""
+        """Return the answer to a question. The question's part fails if there is no answer of an allowed form."""
         self._questions[question] = None
         self._read()
         title = f"`{question}` is answered"
@@ -204,14 +210,14 @@ class Answers:
         return answer
 
     def _below(self, question: str) -> str:
-        """A sentence about a question that stands below another line of the table; empty if it does not."""
+        """Return a sentence if the question is indented below another line of the table, otherwise an empty text."""
         for above, below in self._table.items():
             if isinstance(below, dict) and question in below:
                 return f"`{question}` is indented below `{above[:60]}`. Each question has to begin at the left margin."
         return ""
 
     def _misspelt(self, question: str) -> str:
-        """A sentence about a line of the table that is no question but looks like this one; empty if there is none."""
+        """Return a sentence if a line of the table looks like this question with a typing error, or an empty text."""
         if question in self._table:
             return ""
         line = nearest(question, self._table.keys() - self._questions.keys())
@@ -227,7 +233,7 @@ class Answers:
                 self._judge(question, answer, any(same(answer, one) for one in right), hint)
 
     def _lost(self, question: str) -> bool:
-        """Whether it has been said already that there is no usable answer."""
+        """Whether the question has already failed because it has no usable answer."""
         found = current.check.findings.outcomes[current.check.findings.block_began :]
         return any(outcome.part == question and outcome.status is Status.FAILED for outcome in found)
 
@@ -268,7 +274,7 @@ class Answers:
 
 
 def _spelt(answer: Any) -> str:
-    """An answer as a student would type it."""
+    """Return an answer as a student would type it."""
     if isinstance(answer, bool):
         return "yes" if answer else "no"
     if isinstance(answer, list):

@@ -33,7 +33,7 @@ _RECORDS = re.compile(r"(egg-info|dist-info|__pycache__|/colcon-core/|/hook/)|(^
 
 
 class Package:
-    """One package and what building it came to; `with build("car_sensors") as package:` like a launch."""
+    """One package and the result of building it; `with build("car_sensors") as package:` like a launch."""
 
     def __init__(self, name: str) -> None:
         """Name the package; it is built when the first expectation asks for it."""
@@ -222,7 +222,7 @@ class Package:
         return self._built
 
     def _ready(self, title: str, hint: str) -> Built:
-        """The built package; fails the check, or the part, if it was not built."""
+        """Return the built package. The check, or the part, fails if it was not built."""
         reason = missing_package(self.name)
         if reason is None:
             built = self._build()
@@ -236,14 +236,14 @@ class Package:
 
 
 def _not_named(package: str, when: str, named: Sequence[str], tag: str) -> Reason:
-    """A package that package.xml lacks: when it is needed, what is named for that, and the tag that names it."""
+    """Say that package.xml lacks a package: when it is needed, what it is needed for, and which tag names it."""
     because = f"package.xml does not name `{package}` as needed {when} For that it names: "
     because += f"{', '.join(f'`{one}`' for one in named) or 'none'}."
     return PACKAGE_DEPEND(because, f"It needs `<{tag}>{package}</{tag}>`.")
 
 
 def missing_package(name: str) -> Reason | None:
-    """Why a package cannot be built at all; None if it can be tried."""
+    """Why a package cannot be built at all; None if building it can be tried."""
     if current.check.workspace.source(name).is_dir():
         return None
     first = f"%%file src/{name}/package.xml"
@@ -252,7 +252,7 @@ def missing_package(name: str) -> Reason | None:
 
 
 def why_no_package(name: str) -> Reason | None:
-    """Build a package; None if that went well, or why not."""
+    """Build a package, and return why that failed; None if it worked."""
     current.check.use_package(name)
     space = current.check.workspace
     return missing_package(name) or why_not_built(space.build(name), space.source(name))
@@ -264,7 +264,7 @@ def why_not_found(package: str, name: str) -> Reason | None:
 
 
 def _by_colcon_alone(path: str, log: str) -> bool:
-    """Whether a file is there only because colcon makes good for what setup.py left out, which it says in its log."""
+    """Whether a file was installed only because colcon adds what setup.py left out, as its log says."""
     said = (
         "install the 'package.xml' file" if path.endswith("/package.xml") else "install a marker in the package index"
     )
@@ -273,7 +273,7 @@ def _by_colcon_alone(path: str, log: str) -> bool:
 
 
 def build(package: str) -> Package:
-    """Build a package of the student's with colcon, as far as its sources have changed since.
+    """Build one of the student's packages with colcon, if its sources have changed since the last build.
 
     Args:
         package: the name of its folder below `src`.

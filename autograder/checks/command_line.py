@@ -102,7 +102,7 @@ class CommandLine:
 
 
 def _ros_arguments(words: list[str]) -> list[str]:
-    """Leave out what only begins and ends the ROS arguments: rcl takes `--ros-args … -- --ros-args …` as one list."""
+    """Leave out `--ros-args` and `--`, because rcl reads `--ros-args … -- --ros-args …` as one list."""
     kept: list[str] = []
     for word, after in itertools.pairwise([*words, "--ros-args"]):
         marks = word == "--ros-args" or (word, after) == ("--", "--ros-args")

@@ -1,7 +1,7 @@
-"""Evidence made by hand: what the probe saw inside a program contradicts what the graph showed.
+"""Finds evidence that a student may have faked: what the probe saw inside a program contradicts what the graph showed.
 
-The points stay; an instructor gets both sides. A flag is raised only if each ordinary way to such evidence is excluded:
-where the probe did not see all, or a callback awaited, nothing is said.
+No points are taken; an instructor is shown both sides. A flag is raised only if no ordinary program can cause the
+contradiction. Nothing is flagged if the probe could not see everything, or if a callback used `await`.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ def flags(scene: Scene, overlaps: Sequence[tuple[str, str]], varied: Sequence[bo
 
 
 def overlap_by_hand(insides: Sequence[Inside], topic: str, title: str) -> str:
-    """A flag if the begins and ends that overlap all came from one thread, and no callback of the program awaited."""
+    """Flag overlapping begins and ends that all came from one thread, if no callback of the program used `await`."""
     seen = [(inside, thing) for inside in insides for thing in _publishers(inside, topic)]
     if not seen or not all(inside.alive for inside, _ in seen):
         return ""
@@ -56,7 +56,7 @@ def _publishers(inside: Inside, topic: str) -> list[Thing]:
 
 
 def names_by_hand(scene: Scene, insides: Sequence[Inside], varied: Sequence[bool]) -> list[str]:
-    """Flags for programs whose code gives other names to its topics than at an earlier launch with other rules."""
+    """Flag programs whose code names its topics differently than in an earlier launch with other remap rules."""
     found = []
     for inside, rules, free in zip(insides, scene.rules, varied, strict=False):
         names = frozenset(

@@ -1,7 +1,7 @@
-"""The check that runs in this process: where its programs run, the values that vary, and what it has found out.
+"""The check that runs in this process: where its programs run, the values that vary, and its findings.
 
-The grading worker says all that once; in a student's notebook the programs lie beside it and run without isolation
-from oneself.
+The grading worker configures this once. In a student's notebook, the programs are beside the notebook, and they run
+without isolation because they are the student's own.
 """
 
 from __future__ import annotations
@@ -38,20 +38,20 @@ class Asked:
 
 
 class Findings:
-    """What has been found out since the last score: outcomes and logs.
+    """The outcomes and logs since the last score.
 
-    A check cell may launch several times; its score speaks for all of them. The collection is started afresh for each
-    cell.
+    A check cell may launch several times, and its score covers all of these launches. Each cell begins with an empty
+    collection.
     """
 
     def __init__(self) -> None:
-        """Begin with none."""
+        """Begin without findings."""
         self.alone = False
         """Whether these checks are run again, with nothing else of this kit beside them."""
         self.reset()
 
     def reset(self) -> None:
-        """Forget the findings so far: a new cell begins."""
+        """Forget the findings so far, because a new cell begins."""
         self.outcomes: list[Outcome] = []
         self.part = ""
         """Title of the part of the check that is being looked at."""
@@ -75,35 +75,35 @@ class Findings:
         self._began = time.monotonic()
 
     def begin_block(self) -> None:
-        """A launch or a table begins."""
+        """Note that a launch or a table begins."""
         self.block_began = len(self.outcomes)
         self.asked, self.finished = [], set()
 
     @property
     def seconds(self) -> float:
-        """How long ago the cell, or what comes after its last score, began."""
+        """Seconds since the cell began, or since its last score."""
         return time.monotonic() - self._began
 
 
 class Launched(Protocol):
-    """A launch whose programs run."""
+    """A launch whose programs are running."""
 
     @property
     def observer(self) -> Observer:
-        """Who watches its graph."""
+        """The observer of its graph."""
 
     def news(self) -> list[str]:
-        """What has become of its programs since they were started, a sentence each."""
+        """Say in one sentence each what has happened to its programs since they were started."""
 
     def stop(self) -> None:
         """End it."""
 
 
 class CurrentCheck:
-    """What belongs to the check that runs: its programs' folder and sandbox, its launch, and what it has found out."""
+    """The state of the running check: its programs' folder and sandbox, its launch, and its findings."""
 
     def __init__(self) -> None:
-        """Start as a student's notebook does."""
+        """Begin with the configuration of a student's notebook."""
         self.findings = Findings()
         """What has been found out since the last score."""
         self.bag = Bag()
@@ -128,7 +128,7 @@ class CurrentCheck:
         answers: Mapping[str, bool] | None = None,
         built: Mapping[str, BuildRun] | None = None,
     ) -> None:
-        """Say where the programs are and how they are kept apart; the grading worker does so once.
+        """Set where the programs are and how they are isolated; the grading worker does this once.
 
         Args:
             folder: holds the programs and files of the submission.
@@ -143,7 +143,7 @@ class CurrentCheck:
         self._built = built or {}
 
     def vary_for(self, seed: str) -> None:
-        """Let the values that vary be those of one check: they do not depend on which checks ran before it."""
+        """Draw the varying values for one check, so that they do not depend on which checks ran before."""
         self.random = random.Random(seed)
 
     @property
@@ -153,7 +153,7 @@ class CurrentCheck:
 
     @property
     def folder(self) -> Path:
-        """Where the programs and files are."""
+        """The folder of the programs and files."""
         if self._folder is not None:
             return self._folder
         return front_end.active.programs if front_end.active is not None else Path("nodes")
@@ -169,7 +169,7 @@ class CurrentCheck:
         return here.has(file_name) if here is not None else (self.folder / file_name).is_file()
 
     def blank_answers(self) -> dict[str, bool]:
-        """Of the answers that the check uses, whether each is still as students receive it."""
+        """For each answer that the check uses, whether it is still as students receive it."""
         used = self.findings.used
         if self.front_end is not None:
             return self.front_end.blank(used)
@@ -184,7 +184,7 @@ class CurrentCheck:
 
     @property
     def running(self) -> Launched | None:
-        """The launch that runs now: that of the block, or else the one that goes on from cell to cell."""
+        """The running launch: that of the current block, otherwise the one that goes on from cell to cell."""
         return self.block or self.robot
 
     @property

@@ -4,8 +4,8 @@ import sys
 
 
 def main() -> None:
-    """Run `autograder`; what it needs is loaded then."""
-    if sys.argv[1:2] == ["ros2"]:  # its words are none of Typer's, and it is to start at once
+    """Run `autograder`. Its modules are loaded only then, because `ros2` does not need them."""
+    if sys.argv[1:2] == ["ros2"]:  # Typer must not read its words, and it must start quickly
         _ros2(sys.argv[2:])
     from autograder.cli.main import main as run
 

@@ -24,7 +24,7 @@ CourseOption = Annotated[
     Path | None,
     typer.Option(help="The folder of the course; default: the course that you are in, otherwise the kit's own."),
 ]
-"""Of who keeps a course. What a student handed in is checked by the kit's own course, wherever one is (`check`)."""
+"""For instructors. `check` has its own option, because its default is always the kit's own course."""
 ForceOption = Annotated[bool, typer.Option("--force", help="Also run submissions that did not change.")]
 SeedOption = Annotated[int | None, typer.Option(help="Draw the same varying values as the run with this seed.")]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON, for programs.")]

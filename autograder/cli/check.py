@@ -157,7 +157,7 @@ def _status(result: SubmissionResult) -> int:
 
 
 def _wait_for_save(notebook: Path, saved: tuple[int, ...] | None) -> None:
-    """Wait until the notebook is another file than it was, and no longer changes: an editor may still write it."""
+    """Wait until the notebook has changed and is stable, because an editor may still be writing it."""
     seen = saved
     while True:
         time.sleep(_LOOK)

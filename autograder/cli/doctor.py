@@ -1,4 +1,4 @@
-"""`autograder doctor`: what this machine offers for grading, and what to do about each lack."""
+"""`autograder doctor`: what this machine offers for grading, and how to fix what is missing."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ print(json.dumps(found))
 """
 
 TRY_PROBE = "import json; from autograder.sandbox.inside.probe import attach; print(json.dumps(attach.prepare()))"
-"""In a process of its own: to try is to put notes around rclpy's functions."""
+"""Runs in a separate process, because the probe wraps rclpy's functions."""
 
 
 IN_CHECKOUT = (ROOT / "Makefile").is_file()

@@ -95,7 +95,7 @@ def lint(
             for one in run_findings(read, choose(isolation), jobs, known):
                 print(f"{name}: {one}")
                 bad += not one.warning
-        print(f"{name}: {f'{bad} errors' if bad else 'fine'}")
+        print(f"{name}: {'fine' if not bad else '1 error' if bad == 1 else f'{bad} errors'}")
         errors += bad
     raise typer.Exit(1 if errors else 0)
 

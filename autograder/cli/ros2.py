@@ -53,8 +53,8 @@ def ros2(words: Sequence[str]) -> int:
 
 
 def _join_notebook() -> None:
-    """Where a notebook of this user's runs programs in ROS_DOMAIN_ID, take part in the multicast group that it has."""
-    with contextlib.suppress(ValueError):  # what is no number, the tool itself refuses
+    """If a notebook of this user runs programs in ROS_DOMAIN_ID, join the multicast group of that notebook."""
+    with contextlib.suppress(ValueError):  # the tool itself rejects a value that is not a number
         group = group_of(int(os.environ.get("ROS_DOMAIN_ID") or 0))
         if group is not None:
             os.environ.update(group_environment(group))

@@ -38,6 +38,7 @@ from autograder.diagnosis.silence import (
 )
 from autograder.diagnosis.together import (
     layout,
+    sent_nothing,
     waits_for_its_group,
     why_kept_waiting,
     why_not_together,
@@ -59,6 +60,7 @@ __all__ = [
     "paces",
     "program_trouble",
     "reason_inside",
+    "sent_nothing",
     "shut_down_inside",
     "thread_left",
     "waits_for_its_group",

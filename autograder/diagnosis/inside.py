@@ -125,6 +125,11 @@ class Inside:
         """Where the program's main thread is, in the student's own code."""
         return self.source.place(self.name, [next(reversed(stacks.values()), []) for stacks in self.stacks], True)
 
+    def main_in_rclpy(self) -> bool:
+        """Whether the program's main thread is inside a call of rclpy's that the student's own code made."""
+        mains = [next(reversed(stacks.values()), []) for stacks in self.stacks]
+        return bool(mains) and all(sources.inside_rclpy(self.name, frames) for frames in mains)
+
 
 def called(thing: Thing) -> str:
     """A callback as a student knows it: `the timer of `tick` (line 12, every 0.5 s)`."""

@@ -120,12 +120,23 @@ def _why_over(inside: Inside) -> str:
     )
 
 
+_AFTER_SHUTDOWN = re.compile(
+    r"Context must be initialized|context is (invalid|not valid)|NotInitializedException|ExternalShutdownException"
+    r"|InvalidHandle|already called|'NoneType' object does not support the context manager"
+)
+"""What rclpy says to code that goes on to use it after a shutdown."""
+
+
 def shut_down_inside(scene: Scene) -> Reason | None:
-    """Why a program that shut down inside a callback did not end well. Must have seen: that call."""
+    """Why a program that shut down inside a callback did not end well. Must have seen: that call, and an end that can
+    follow from it: by a signal, or by an error of rclpy's that says that something is shut down.
+    """
     for inside in scene.insides:
+        error = last_traceback(inside.program.output(), inside.name)
+        if (inside.program.exit_status() or 0) >= 0 and not (error and _AFTER_SHUTDOWN.search(error.because)):
+            continue  # it ended for a reason of its own
         for call in inside.calls:
             if call.what == "shutdown" and call.in_callback:
-                error = last_traceback(inside.program.output(), inside.name)
                 return SHUTDOWN_IN_CALLBACK(
                     f"`{inside.name}`, {call.line} (`{call.code}`) shuts down rclpy or the executor inside a callback"
                     + (
@@ -222,10 +233,10 @@ def _never_spun(inside: Inside, names: list[str]) -> Reason | None:
 
 
 def pulled_down(inside: Inside) -> Reason | None:
-    """Must have seen: a shutdown in a callback, and a program that runs on while none of its nodes is spun."""
+    """Must have seen: a shutdown in a callback, and a program of which no node is spun, and which waits in rclpy."""
     spun = any(executor.spinning and executor.nodes for executor in inside.executors)
     for call in inside.calls:
-        if call.what == "shutdown" and call.in_callback and not spun:
+        if call.what == "shutdown" and call.in_callback and not spun and inside.main_in_rclpy():
             return SHUTDOWN_IN_CALLBACK(
                 f"`{inside.name}`, {call.line} (`{call.code}`) shuts down rclpy or the executor inside a callback, so "
                 "nothing spins the node any more, but the program continues to run.",

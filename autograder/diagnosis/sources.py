@@ -67,6 +67,12 @@ def parse(dump: str) -> Stacks:
     return stacks
 
 
+def inside_rclpy(name: str, frames: Sequence[Frame]) -> bool:
+    """Whether the innermost line of the program `name` on this stack is a call of rclpy's that has not returned."""
+    own = next((number for number, frame in enumerate(frames) if frame[0].endswith(f"/{name}.py")), 0)
+    return any("/rclpy/" in frame[0] for frame in frames[:own])
+
+
 class Source:
     """A student's program as text."""
 

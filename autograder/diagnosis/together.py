@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import itertools
+import time
 from collections.abc import Sequence
 
 from autograder.diagnosis.blocked import ONE_LOCK, WAITS_FOR_LOCK
 from autograder.diagnosis.inside import Inside, called, listed
 from autograder.diagnosis.scene import Scene
 from autograder.reasons import Group, Kind, Reason
-from autograder.sandbox.inside.probe.events import ExecutorSeen, Thing
+from autograder.sandbox.inside.probe.events import ExecutorSeen, Ran, Thing
 
 ONE_GROUP = Kind(
     "one-group", "all timers and all callbacks that ran are in one exclusive group", Group.TOGETHER, "timeline"
@@ -54,9 +55,24 @@ TIMER_SAME_GROUP = Kind(
     Group.TOGETHER,
     "timeline",
 )
+RAN_AND_SENT_NOTHING = Kind(
+    "ran-and-sent-nothing",
+    "while messages had to come, the timer that publishes them ran, and published none",
+    Group.TOGETHER,
+    "timeline",
+)
+CANCELLED_MEANWHILE = Kind(
+    "cancelled-meanwhile",
+    "while messages had to come, the program cancelled the timer that publishes them, and it did not run",
+    Group.TOGETHER,
+    "timeline",
+)
 
 MOST_OF_THE_TIME = 0.6
 """Share of the time that others must have taken for a callback to count as kept waiting by them."""
+
+CANCELLED_BEFORE = 0.1
+"""Seconds before the time in question in which a timer may have been cancelled on its account."""
 
 FAR_FEWER = 0.6
 """Share of the due runs below which a timer counts as kept waiting."""
@@ -127,9 +143,10 @@ def one_group(inside: Inside) -> Reason | None:
     if len(active) < 2 or len(groups) != 1 or not all(thing.exclusive for thing in active):
         return None
     if active[0].default_group:
+        threads = " has a MultiThreadedExecutor, but" if any(one.threads for one in _used(inside)) else ":"
         return NO_CALLBACK_GROUPS(
-            f"`{inside.name}` has a MultiThreadedExecutor, but all its callbacks are in the node's default group, "
-            "which is mutually exclusive: they run one after another.",
+            f"`{inside.name}`{threads} all its callbacks are in the node's default group, which is mutually exclusive: "
+            "they run one after another.",
             "Give the callbacks that may overlap a callback group of their own.",
         )
     return ONE_GROUP(
@@ -196,6 +213,8 @@ def _publishing(scene: Scene, topic: str) -> list[Inside]:
 def why_not_together(scene: Scene, topic: str, at_once: int = 2, itself: bool = False) -> Reason | None:
     """Why callbacks did not overlap; None where what was seen excludes none of the ways in which that happens.
 
+    Must have seen: callbacks whose runs take time, because no other callback waits for those that do not.
+
     Args:
         scene: the launch.
         topic: where the callbacks publish their begins and ends.
@@ -203,7 +222,7 @@ def why_not_together(scene: Scene, topic: str, at_once: int = 2, itself: bool = 
         itself: they should have been runs of one callback.
     """
     for inside in _publishing(scene, topic):
-        if not inside.attached or not _used(inside):
+        if not inside.attached or not _used(inside) or not any(thing.takes_time for thing in _active(inside)):
             continue
         found = single_threaded(inside) or few_threads(inside, 2)
         found = found or (exclusive_itself(inside) if itself else one_group(inside)) or few_threads(inside, at_once)
@@ -289,6 +308,41 @@ def _taken(inside: Inside, things: Sequence[Thing]) -> float:
 
 def _ran(number: int) -> str:
     return {0: "did not run", 1: "ran only once"}.get(number, f"ran only {number} times")
+
+
+def sent_nothing(scene: Scene, topic: str, spans: Sequence[tuple[float, float]]) -> Reason | None:
+    """Must have seen: a timer that has published on the topic, and that in one of these times either ran and published
+    nothing, or was cancelled and did not run.
+
+    Args:
+        scene: the launch.
+        topic: on which no message came in these times.
+        spans: begins and ends, in seconds on the system clock.
+    """
+    ahead = time.time() - time.monotonic()
+    for inside in _publishing(scene, topic):
+        ran = [run for event in inside.all(Ran) for run in event.runs]
+        senders = {thing.id for thing in inside.things.values() if (thing.kind, thing.name) == ("publisher", topic)}
+        sent = [run for run in ran if run[0] in senders]
+        for timer in (thing for thing in inside.callbacks if thing.kind == "timer"):
+            runs = [run for run in ran if run[0] == timer.id]
+            if not any(run[1] <= at <= run[2] and run[3] == thread for _, at, _, thread in sent for run in runs):
+                continue
+            for begin, end in ((begin - ahead, end - ahead) for begin, end in spans):
+                during = sum(begin < run[1] and run[2] < end for run in runs)
+                if not during and begin - CANCELLED_BEFORE < timer.cancelled_at < end:
+                    return CANCELLED_MEANWHILE(
+                        f"`{inside.name}`: {timer.cancelled_in} cancelled {called(timer)}. It did not run meanwhile.",
+                        "A timer that is cancelled does not run until `reset()` is called. Other callbacks need not "
+                        "stop it in order to wait.",
+                    )
+                if during > 1 and not any(begin < at < end for _, at, _, _ in sent):
+                    return RAN_AND_SENT_NOTHING(
+                        f"`{inside.name}`: meanwhile {called(timer)} ran {during} times, and published nothing on "
+                        f"`{topic}`. So it was not kept waiting.",
+                        "Look for what decides in the callback whether it publishes, such as a condition or a flag.",
+                    )
+    return None
 
 
 def layout(scene: Scene, topic: str) -> str:

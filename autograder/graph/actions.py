@@ -8,7 +8,6 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from action_msgs.msg import GoalStatus, GoalStatusArray
-from action_msgs.srv import CancelGoal
 from rclpy.action import ActionClient
 from rclpy.task import Future
 from unique_identifier_msgs.msg import UUID
@@ -168,7 +167,7 @@ class Goal:
             return False
 
         def answered(reply: Any) -> None:
-            self.agreed = bool(reply.return_code == CancelGoal.Response.ERROR_NONE and reply.goals_canceling)
+            self.agreed = bool(reply.goals_canceling)
 
         self._on_executor(self._handle.cancel_goal_async, answered)
         self._observer.wait(lambda: self.agreed is not None, within, self._give_up)

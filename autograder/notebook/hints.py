@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Any
 
-NAMES = ("NAME_OR_NONE", "Program", "answers", "build", "command_line", "launch", "launch_file", "vary")
+NAMES = ("FULL_NAME", "NAME_OR_NONE", "Program", "answers", "build", "command_line", "launch", "launch_file", "vary")
 """What the set-up cell brings: all names of `autograder.checks`, which this extension does not load."""
 _SAY = (
     "Run the first code cell of the notebook, the one with `%load_ext autograder`. It is needed again after every "

@@ -14,9 +14,6 @@ from std_msgs.msg import String
 
 from autograder.arguments import params_file, remap_rules, rule_effect
 from autograder.arguments.rule_effect import RULE_WITHOUT_MATCH
-from autograder.checks import command_line, current
-from autograder.core.results import Isolation
-from autograder.reasons import Refused
 
 
 @contextmanager
@@ -240,33 +237,6 @@ def test_nested_keys_of_a_parameter_file_are_joined() -> None:
     ]
 
 
-@pytest.fixture
-def table(tmp_path: Path) -> Iterator[Path]:
-    before = current.check.folder
-    current.check.configure(tmp_path, Isolation.NONE, seed=1)
-    yield tmp_path / "rules.yaml"
-    current.check.configure(before, Isolation.NONE, seed=1)
-
-
-@pytest.mark.parametrize(
-    "text",
-    [
-        "-r a:=b -p c:=1", "--ros-args -r a:=b -p c:=1", '"-r  a:=b\\n-p c:=1"', ">-\n  -r a:=b\n  -p c:=1",
-        "-r a:=b -p c:=1 --", "-r a:=b -- --ros-args -p c:=1", "--ros-args -r a:=b --ros-args -p c:=1 --",
-    ],
-)  # fmt: skip
-def test_a_command_line_is_split_as_a_shell_does(table: Path, text: str) -> None:
-    table.write_text(f"front: {text}\n")
-    assert command_line("rules.yaml", "front").words() == ["-r", "a:=b", "-p", "c:=1"]
-    assert command_line("rules.yaml", "front", then=["-r", "x:=y"]).words()[-2:] == ["-r", "x:=y"]
-
-
-def test_arguments_about_logs_and_enclaves_are_ros_arguments(table: Path) -> None:
-    words = "--log-level warn --disable-stdout-logs -r a:=b --enclave /x --log-config-file a.conf --enable-rosout-logs"
-    table.write_text(f"front: {words}\n")
-    assert command_line("rules.yaml", "front").words() == words.split()
-
-
 @pytest.mark.parametrize(
     ("text", "read"),
     [
@@ -290,53 +260,12 @@ def test_only_a_parameter_file_that_rcl_does_not_read_either_is_called_unreadabl
     rclpy.try_shutdown(context=context)
 
 
-@pytest.mark.parametrize(
-    ("text", "code"),
-    [
-        ("other: x\n", "unanswered"),
-        ('front: "?"\n', "unanswered"),
-        ("front:\n", "unanswered"),
-        ("front: [a, b]\n", "command-line"),
-        ("front: a:=b\n", "command-line"),
-        ("front: -r\n", "command-line"),
-        ("front: -r a:=b c:=d\n", "command-line"),
-        ("front: -r a:=b -- c:=d\n", "command-line"),
-        ("front: -r -- --ros-args a:=b\n", "command-line"),
-        ("front: --ros-args --\n", "unanswered"),
-        ("front: --enable-stdout-logs x\n", "command-line"),
-        ("front: --log-level\n", "command-line"),
-        ("front: -r --disable-rosout-logs\n", "command-line"),
-        ('front: "-r \'a"\n', "command-line"),
-        ("front: -r a: b\n", "not-yaml"),
-        ("- front\n", "unanswered"),
-    ],
-)
-def test_words_that_are_no_ros_arguments_are_refused_with_a_reason(table: Path, text: str, code: str) -> None:
-    table.write_text(text)
-    with pytest.raises(Refused) as caught:
-        command_line("rules.yaml", "front").words()
-    assert caught.value.reason.code == code
-
-
-@pytest.mark.parametrize("words", ["-r a := b", "-r a:= b", "-r a :=b"])
-def test_a_space_beside_the_sign_of_a_rule_is_named(table: Path, words: str) -> None:
-    table.write_text(f"front: {words}\n")
-    with pytest.raises(Refused) as caught:
-        command_line("rules.yaml", "front").words()
-    assert "no space" in caught.value.reason.hint
-
-
 @pytest.mark.parametrize("name", ["__node", "__name", "__ns"])
 def test_a_name_that_is_given_as_a_parameter_is_sent_to_the_right_option(name: str) -> None:
     reason = remap_rules.refused_parameter(["--ros-args", "-p", f"{name}:=front"])
     assert reason is not None
     assert reason.code == "rule-kind"
     assert f"-r {name}:=" in reason.hint
-
-
-def test_a_missing_table_is_told(table: Path) -> None:
-    with pytest.raises(Refused, match=r"%%file rules\.yaml"):
-        command_line("rules.yaml", "front").words()
 
 
 @pytest.mark.parametrize(

@@ -392,6 +392,18 @@ def test_a_missing_program_is_the_students_failure(grade: Grade) -> None:
 
 
 @pytest.mark.parametrize(
+    ("program", "observed"),
+    [
+        (TALKER.replace("talker", "talking"), "/talking"),
+        ("import threading; threading.Event().wait()", "no node"),
+    ],
+)
+def test_the_nodes_that_are_there_are_told_where_one_is_missing(grade: Grade, program: str, observed: str) -> None:
+    check = 'with launch("talker") as ros:\n    ros.node("/talker").expect(within=5)\nros.score(2)'
+    assert failure(grade(check, talker__py=program)).observed == observed
+
+
+@pytest.mark.parametrize(
     "check",
     [
         'with launch("talker") as ros:\n    ros.node("/talker").expect()\n    1 / 0\nros.score(2)',

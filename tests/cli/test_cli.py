@@ -340,6 +340,16 @@ def test_json_tells_what_was_left_out_and_fails_like_the_table(tmp_path: Path) -
             assert {result["student"] for result in json.loads(out)} == {"ann", "bob"}
 
 
+def test_lint_lets_a_lab_with_warnings_pass_and_one_with_an_error_fail(tmp_path: Path) -> None:
+    root = toy.make_course(tmp_path / "course")
+    status, out, _ = run(root, "lint", "--static")
+    assert (status, out.splitlines()[-1]) == (0, "toy: fine") and "toy: warning: " in out
+    notebook = root / "solutions" / toy.LAB / f"{toy.LAB}.ipynb"
+    notebook.write_text(notebook.read_text().replace("ros.score(3)", "ros.score(3", 1))
+    status, out, _ = run(root, "lint", "--static")
+    assert (status, out.splitlines()[-1]) == (1, "toy: 1 error") and "toy: error: " in out
+
+
 def test_release_writes_what_students_receive(root: Path) -> None:
     status, out, _ = run(root, "release")
     assert status == 0 and "toy" in out

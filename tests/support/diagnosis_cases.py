@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import textwrap
+import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
@@ -58,6 +59,15 @@ def together(at_once: int = 2, itself: bool = False) -> Ask:
 
 def alike(scene: Scene, name: str) -> Reason | None:
     return diagnosis.why_all_alike(scene)
+
+
+def meanwhile(scene: Scene, name: str) -> Reason | None:
+    """Why nothing was published in the last half second."""
+    return diagnosis.sent_nothing(scene, f"/{name}/out", [(time.time() - 0.5, time.time())])
+
+
+def shut_down(scene: Scene, name: str) -> Reason | None:
+    return None if scene.programs[0].running() else diagnosis.shut_down_inside(scene)
 
 
 def starved(scene: Scene, name: str) -> Reason | None:
@@ -700,6 +710,49 @@ CASES = {
         ask=together(),
         never=("single-threaded-executor", "few-threads", "one-group"),
     ),
+    "quick_callbacks": Case(  # nothing waits for them, whatever groups they are in
+        TWO.format("", ""),
+        "def slow(self):\n    pass\n",
+        ask=together(),
+        never=("no-callback-groups", "single-threaded-executor", "one-group"),
+    ),
+    "holds_back": Case(
+        "self.runs = 0\nself.create_timer(0.05, self.tick)\n",
+        "def tick(self):\n    self.runs += 1\n    if self.runs < 9:\n        self.out.publish(String())\n",
+        says="ran-and-sent-nothing",
+        because="ran 9 times",
+        ask=meanwhile,
+        never=("no-callback-groups", "cancelled-meanwhile"),
+    ),
+    "kept_waiting_beside_another": Case(  # the timer that runs is not the one that publishes
+        "self.first = True\nself.create_timer(0.05, self.tick, callback_group=Exclusive())\n"
+        "self.create_timer(0.05, lambda: None, callback_group=Exclusive())\n",
+        "def tick(self):\n    self.first or time.sleep(1000)\n    self.out.publish(String())\n    self.first = False\n",
+        THREADS.format(3),
+        ask=meanwhile,
+        ready=lambda it: it.age > 3 and any(thing.done >= 20 for thing in it.callbacks),
+        never=("ran-and-sent-nothing", "cancelled-meanwhile"),
+    ),
+    "pauses_itself": Case(
+        "self.ticks = self.create_timer(0.05, self.tick, callback_group=Exclusive())\nself.runs = 0\n"
+        "self.create_timer(0.6, self.go_on, callback_group=Exclusive())\n",
+        "def tick(self):\n    self.out.publish(String())\n    self.runs += 1\n"
+        "    if self.runs % 3 == 0:\n        self.ticks.cancel()\n"
+        "def go_on(self):\n    self.ticks.reset()\n",
+        says="cancelled-meanwhile",
+        because="cancelled the timer of `tick`",
+        ask=lambda scene, name: diagnosis.sent_nothing(
+            scene,
+            f"/{name}/out",
+            [
+                (at + time.time() - time.monotonic() + 0.05, at + time.time() - time.monotonic() + 0.3)
+                for inside in scene.insides
+                for at in [max((thing.cancelled_at for thing in inside.callbacks), default=0)]
+                if at
+            ],
+        ),
+        never=("ran-and-sent-nothing",),
+    ),
     "one_group": Case(
         "group = Exclusive()\n" + TWO.format(", callback_group=group", ", callback_group=group"),
         SLOW,
@@ -978,7 +1031,15 @@ CASES = {
         "rclpy.spin(node)\nrclpy.shutdown()",
         says="shutdown-in-callback",
         because="failed because of this",
-        ask=lambda scene, name: None if scene.programs[0].running() else diagnosis.shut_down_inside(scene),
+        ask=shut_down,
+    ),
+    "shuts_down_and_sleeps": Case(
+        "self.create_timer(0.05, self.tick)\n",
+        "def tick(self):\n    rclpy.shutdown()\n",
+        "rclpy.spin(node)\ntime.sleep(1000)",
+        says="spinning-ended",
+        because="time.sleep(1000)",
+        never=("shutdown-in-callback",),
     ),
     # More errors in callbacks.
     "awaits_asyncio": Case(

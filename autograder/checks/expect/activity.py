@@ -60,7 +60,7 @@ class Activity(Meanwhile):
         return known
 
     def _wait_for_runs(self, names: Sequence[str], runs: int, title: str, within: float, hint: str) -> None:
-        """Wait until each of the callbacks has run completely so often; fail with what keeps one from it."""
+        """Wait until each callback has completed so many runs; otherwise fail with what prevents it."""
         refuse_names(names)
 
         def come() -> bool:
@@ -92,7 +92,7 @@ class Activity(Meanwhile):
         return replace(reason, because=because)
 
     def _starves(self, names: Sequence[str], runs: int) -> bool:
-        """Whether some callback has run so often that one of these, with fewer than `runs` runs, gets no turn."""
+        """Whether one of these callbacks, with fewer than `runs` runs, gets no turn while another runs very often."""
         counts = Counter(span.name for span in self.seen().spans())
         often = max(2 * DECISIVE_RUNS, 8 * runs)
         return min(counts[name] for name in names) < runs and max(counts.values(), default=0) >= often
@@ -107,8 +107,10 @@ class Activity(Meanwhile):
         Example:
             `counts = ros.activity("/activity").messages_during("slow", ros.topic("/heartbeat", Int64))`
         """
-        spans = [(span.begin, span.end) for span in self.seen().spans() if span.name == callback]
-        return published_during(topic, spans)
+        return published_during(topic, self._runs(callback))
+
+    def _runs(self, callback: str) -> list[tuple[float, float]]:
+        return [(span.begin, span.end) for span in self.seen().spans() if span.name == callback]
 
     @waits_for("messages during runs of callbacks, told on `{name}`")
     def expect_messages_during(
@@ -148,7 +150,7 @@ class Activity(Meanwhile):
         self._expect_messages(
             topic,
             f"`{callback}` runs",
-            lambda: self.messages_during(callback, topic),
+            lambda: self._runs(callback),
             at_least=at_least,
             runs=runs,
             within=within,
@@ -346,7 +348,7 @@ class Activity(Meanwhile):
         )
 
     def _off_period(self, names: Sequence[str], period: float, tolerance: float, least: int) -> dict[str, list[float]]:
-        """The gaps between the begins of each callback that has fewer than `least`, or another median."""
+        """For each callback with fewer than `least` gaps between its begins, or another median gap: these gaps."""
         gaps = {name: self.seen().gaps(name) for name in names}
         return {
             name: found
@@ -376,7 +378,7 @@ class _Together:
         )
 
     def seen(self, found: Concurrency) -> bool:
-        """Whether they were under way at once."""
+        """Whether they ran at the same time."""
         if self.itself:
             return all(found.overlap([name]) >= self.at_least for name in self.names)
         if self.others:
@@ -384,19 +386,19 @@ class _Together:
         return found.distinct_overlap(self.names) >= self.at_least
 
     def most(self, found: Concurrency) -> int:
-        """How many of them were under way at once."""
+        """How many of them ran at the same time."""
         if self.itself:
             return max(found.overlap([name]) for name in self.names)
         return found.distinct_overlap([*self.names, *self.others])
 
     def apart(self, most: int) -> str:
-        """What is said of them if they were not."""
+        """Say that they did not run at the same time."""
         if self.others:
             return f"None of {', '.join(self.names)} ran beside one of {', '.join(self.others)}."
         return f"There were never more than {most} at once."
 
 
 def refuse_names(names: Sequence[str], may_be_empty: bool = False) -> None:
-    """Refuse a text where a list of names belongs: its letters would pass for names."""
+    """Refuse a text in place of a list of names, because each of its letters would be taken for a name."""
     if isinstance(names, str) or not (names or may_be_empty):
         raise Misuse(f'{names!r} is no list of callbacks\' names; write ["NAME", …].')

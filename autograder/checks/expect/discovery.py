@@ -1,4 +1,4 @@
-"""When the observer and the nodes know each other's ends: what is sent then arrives, and what it sets off is heard."""
+"""Waits until the observer and the nodes have discovered each other, so that what is sent arrives and is answered."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _ASKED = 16
 
 
 class Discovery(Noun):
-    """Nodes and the observer get to know each other."""
+    """The discovery between the nodes and the observer."""
 
     def _settle(self, name: str) -> None:
         """Wait for proof that a node which was just made also lives on: an answer from it.
@@ -76,7 +76,7 @@ class Discovery(Noun):
             self._running.introduced = (recorded, started)
 
     def _hears_programs(self) -> bool:
-        """Whether the observer has found all that the programs have said they made, and hears it."""
+        """Whether the observer has found, and hears, everything that the programs say they have created."""
         return self._observer.hears_all() and all(shows_all(self._observer, told) for told in self._told())
 
     def _all_begun(self) -> bool:
@@ -89,5 +89,5 @@ class Discovery(Noun):
         return sum(event.name == name and not event.destroyed for event in made)
 
     def _told(self) -> list[list[Event]]:
-        """What the probe of each program that runs has told."""
+        """The events of the probe of each running program."""
         return [read(program.events()) for _, program in self._running.programs if program.running()]

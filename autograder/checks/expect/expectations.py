@@ -35,13 +35,13 @@ _POINTER = re.compile(r"\w, (?:sections? )?'[^']+'")
 
 
 def where_to_read(hint: str) -> str:
-    """The parts of a check's hint that say where to read on; the others presume what went wrong."""
+    """Return the parts of a check's hint that say where to read on, because the others assume a certain mistake."""
     parts = [part.strip() for part in hint.split(";")]
     return " ".join(f"{part[:1].upper()}{part[1:]}" for part in parts if _POINTER.search(part))
 
 
 def objection(verdict: object, otherwise: str) -> str:
-    """What a check's own question says against what it looked at; empty when it has nothing to say against it.
+    """Return what a check's own function objects to; empty if it objects to nothing.
 
     Args:
         verdict: its answer: a sentence that says what is wrong, or whether all is well.
@@ -53,7 +53,7 @@ def objection(verdict: object, otherwise: str) -> str:
 
 
 class Expectations:
-    """A running launch, and what can be asked of it. Each noun adds what it asks."""
+    """A running launch. Each noun adds its own expectations."""
 
     def __init__(self, running: RunningLaunch) -> None:
         """Ask about this launch."""
@@ -72,7 +72,7 @@ class Expectations:
         return [scene.inside(program) for program in scene.programs]
 
     def _without(self, node: str) -> Callable[[], bool]:
-        """Return the question whether a node that is waited for cannot come any more."""
+        """Return a function that tells whether a node that is waited for cannot appear any more."""
         return self._running.hopeless_without(lambda: node in self._observer.nodes())
 
     def _wait(
@@ -98,7 +98,7 @@ class Expectations:
         return ", ".join(own) or "no topic"
 
     def _sure_if(self, quicker: bool) -> None:
-        """Note that what is decided next does not depend on the machine: a busy one never makes a program faster."""
+        """Note that the next decision does not depend on the machine: a busy machine never makes a program faster."""
         if quicker:
             self._observer.patience.is_sure()
 
@@ -144,7 +144,7 @@ class Expectations:
         observed: Any = "",
         hint: str = "",
     ) -> None:
-        """Record an outcome for a fact that has been established; the reason is looked for only if it does not hold."""
+        """Record an outcome for an established fact. A reason is looked for only if the fact does not hold."""
         text = str(observed() if callable(observed) else observed)
         if holds:
             outcomes.passed(title, expected=expected, observed=text)

@@ -274,10 +274,13 @@ class SentGoal(Meanwhile):
         Example:
             `counts = goal.messages_during(ros.topic("/ticks", Int64))`
         """
+        return published_during(topic, self._executed())
+
+    def _executed(self) -> list[tuple[float, float]]:
+        """From `executing` to the last status, once the goal has ended."""
         when = {change.status: change.stamp for change in self.seen.changes}
         over = self.seen.result is not None or any(end in when for end in ("succeeded", "canceled", "aborted"))
-        spans = [(when["executing"], max(when.values()))] if "executing" in when and over else []
-        return published_during(topic, spans)
+        return [(when["executing"], max(when.values()))] if "executing" in when and over else []
 
     @waits_for("messages while a goal of `{name}` is executed")
     def expect_messages_during(
@@ -307,7 +310,7 @@ class SentGoal(Meanwhile):
         self._expect_messages(
             topic,
             f"a goal of `{goal.name}` is executed",
-            lambda: self.messages_during(topic),
+            self._executed,
             at_least=at_least,
             runs=1,
             within=within,
@@ -317,7 +320,7 @@ class SentGoal(Meanwhile):
 
 
 def _unfinished(goal: Goal, within: float) -> tuple[str, str]:
-    """Say of a goal without a result how far it has got, and what to do."""
+    """Say how far a goal without a result has got, and what to do."""
     state = _state_of(goal)
     because = f"The goal is `{state}`, and it has not ended within {within:g} s."
     if state in ("succeeded", "canceled", "aborted"):
@@ -331,6 +334,6 @@ def _unfinished(goal: Goal, within: float) -> tuple[str, str]:
 
 
 def _state_of(goal: Goal) -> str:
-    """The goal's status by the last that is known of it."""
+    """Return the last known status of the goal."""
     changes = goal.changes
     return goal.status if goal.result is not None or not changes else changes[-1].status

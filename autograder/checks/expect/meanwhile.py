@@ -35,7 +35,7 @@ class Meanwhile(Sources):
         self,
         topic: Topic,
         meanwhile: str,
-        counts: Callable[[], list[int]],
+        spans: Callable[[], list[tuple[float, float]]],
         *,
         at_least: int,
         runs: int,
@@ -50,7 +50,7 @@ class Meanwhile(Sources):
         Args:
             topic: on which they come.
             meanwhile: what lasts, in words.
-            counts: tells how many messages came each time so far.
+            spans: tells when it began and ended each time so far, in seconds on the system clock.
             at_least: messages of one time.
             runs: times to look at before giving up.
             within: seconds until these must have come.
@@ -60,6 +60,9 @@ class Meanwhile(Sources):
             look_first: is given the title and may fail, before it is said that the messages paused.
         """
         title = f"`{topic.name}` goes on while {meanwhile}"
+
+        def counts() -> list[int]:
+            return published_during(topic, spans())
 
         def enough() -> bool:
             return max(counts(), default=0) >= at_least
@@ -77,6 +80,7 @@ class Meanwhile(Sources):
                 diagnosis.program_trouble(scene)
                 or diagnosis.inside_reason(scene)
                 or why()
+                or diagnosis.sent_nothing(scene, topic.name, spans())
                 or diagnosis.waits_for_its_group(scene)
                 or diagnosis.why_not_together(scene, told_on)
                 or PAUSED(f"{number} arrived on `{topic.name}` during one run. {diagnosis.layout(scene, told_on)}"),

@@ -49,7 +49,7 @@ _WITHIN = 2.0
 
 
 def own(declared: Collection[str]) -> list[str]:
-    """Those of a node's parameters that rclpy did not declare for it."""
+    """Return the parameters of a node that rclpy did not declare for it."""
     return [name for name in declared if name not in _EVERY_NODE and "qos_overrides" not in name]
 
 
@@ -79,7 +79,7 @@ def why_other(running: RunningLaunch, node: str, name: str, found: Any, wanted: 
 
 
 def _given_as_a_rule(running: RunningLaunch, name: str) -> Reason | None:
-    """Whether the parameter was given with `-r`, as if it were a name to be changed."""
+    """Whether the parameter was given with `-r`, as if it were a remap rule."""
     for launched, _ in running.programs:
         for text in launched.all_rules():
             rule = remap_rules.parse(text)
@@ -133,7 +133,7 @@ def _given_twice(running: RunningLaunch, node: str, name: str, found: Any) -> Re
 
 
 def _given(launched: Program, node: str) -> Iterator[str]:
-    """Names of the parameters that a program's words and files give values to, as far as they are for this node."""
+    """Return the names of the parameters to which a program's arguments and files give values for this node."""
     for text in launched.parameter_rules():
         meant, _, parameter = text.partition(":=")[0].rpartition(":")
         if not meant or f"/{meant}" == node:
@@ -174,7 +174,7 @@ def _file_for_others(running: RunningLaunch, node: str) -> Reason | None:
 
 
 def _other_value(found: Any, wanted: Any) -> Reason:
-    """What a parameter is instead; where its type differs, that is said."""
+    """Say which value the parameter has instead, and whether its type differs."""
     kind, asked = _KINDS.get(type(found), "a list"), _KINDS.get(type(wanted), "a list")
     if kind == asked:
         return PARAMETER_VALUE(f"It is {found!r}.")
@@ -456,7 +456,7 @@ class Node(Discovery):
         return found or NO_LOG(often.get(times, f"It was logged {times} times."))
 
     def _said_instead(self, text: str, level: str, node: str) -> str:
-        """The same words at another level, by another node or only printed, where a message did not come."""
+        """Say where the same words appeared instead: at another level, from another node, or only printed."""
         said = [r.msg for r in self._rosout().messages if re.search(text, r.msg.msg)]
         own = [message for message in said if message.name == node]
         if level and own and own[-1].level != _LEVELS[level]:

@@ -1,4 +1,4 @@
-"""`ros.program`: a program that the launch has started: alive, ended, how it ends when it is told to."""
+"""`ros.program`: a program that the launch has started: whether it runs, how it ended, how it ends at a signal."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ _TRIES = 3
 
 
 def _comes_back(where: str, never_spun: bool) -> str:
-    """When the call comes back in which a program is that should have ended; empty if nothing is known of that."""
+    """Say when the call returns in which a program still is that should have ended; empty if that is not known."""
     if "spin_until_future_complete(" in where:
         over = " or its `timeout_sec` is over" if "timeout_sec" in where else ""
         return (
@@ -128,11 +128,11 @@ class StartedProgram(Noun):
         self._program.signal(number)
 
     def events(self) -> list[dict[str, Any]]:
-        """What its probe has told, as it told it: evidence for reasons only."""
+        """Return the raw events of its probe. They are evidence for reasons only."""
         return self._program.events()
 
     def seen_runs(self, kind: str, name: str) -> int | None:
-        """How often a callback was seen to begin inside it: evidence for reasons only.
+        """Return how often the probe saw a callback begin. This is evidence for reasons only.
 
         Args:
             kind: `subscription` or `service`.
@@ -252,7 +252,7 @@ class StartedProgram(Noun):
         )
 
     def _other_runs(self, program: RunningProgram) -> list[RunningProgram]:
-        """Earlier runs of the same program: what became of them explains nothing."""
+        """Return earlier runs of the same program, which explain nothing about the last one."""
         return [one for _, one in self._running.programs if one.name == program.name and one is not program]
 
     def _why_this_status(self, program: RunningProgram) -> Reason:
@@ -295,7 +295,7 @@ class StartedProgram(Noun):
             outcomes.passed(title, observed="rclpy was interrupted while it began to wait")
 
     def _ends_interrupted(self, title: str, by: str, within: float, hint: str) -> bool:
-        """Tell a program to end; whether rclpy was interrupted as it began to wait. What else it does is an outcome."""
+        """Tell a program to end, and return whether rclpy was interrupted as it began to wait."""
         program = self._program
         self._running.may_end.append(program)
         self._observer.wait(lambda: self._spun(program) or not program.running(), _SPINS_WITHIN)
@@ -331,7 +331,7 @@ class StartedProgram(Noun):
         return False
 
     def _spun(self, program: RunningProgram) -> bool:
-        """Whether a program has come to spin; its node is on the graph before its `__init__` is over."""
+        """Whether a program has begun to spin; its node is on the graph before its `__init__` has ended."""
         inside = self._scene().inside(program)
         return any(executor.spins for executor in inside.executors)
 
@@ -344,16 +344,16 @@ class StartedProgram(Noun):
         return by == "SIGTERM" and "spin" in self._place_of(program)
 
     def _never_spun(self, program: RunningProgram) -> bool:
-        """Whether a program is known to have let no executor spin so far."""
+        """Whether it is known that no executor of the program has spun so far."""
         inside = self._scene().inside(program)
         return inside.attached and not any(executor.spins for executor in inside.executors)
 
     def _thread_left(self, program: RunningProgram) -> Reason | None:
-        """What is known of a thread that keeps a program alive whose `main` is over."""
+        """Say which thread keeps a program alive whose `main` has ended, if that is known."""
         insides = (inside for inside in self._scene().insides if inside.program is program)
         return next((found for inside in insides if (found := diagnosis.thread_left(inside))), None)
 
     def _place_of(self, program: RunningProgram) -> str:
-        """Where the main thread of a program is, as the end of a sentence; empty if that cannot be seen."""
+        """Say, as the end of a sentence, where the main thread of a program is; empty if that cannot be seen."""
         places = [inside.main_place() for inside in self._scene().insides if inside.program is program]
         return f"; it is in {places[0]}" if places and places[0] else ""

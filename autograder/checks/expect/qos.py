@@ -83,7 +83,7 @@ class Qos(Ends):
         )
 
     def _all_there(self, topic: str, kind: End) -> None:
-        """Wait until the nodes at this end are built: their constructors may be about to make further ends."""
+        """Wait until the constructors of these nodes have ended, because they may still create further endpoints."""
         for owner in {node_of(end) for end in self._ends(topic, None, kind, "")}:
             if owner not in self._running.met:
                 self._settle(owner)
@@ -147,7 +147,7 @@ def _in_words(policies: Policies, values: Policies) -> str:
 
 
 def _differences(end: TopicEndpointInfo, kind: str, policies: Policies) -> list[tuple[str, str]]:
-    """The policies of an end that are not as they should be, each with a sentence."""
+    """Return the policies of an endpoint that are not as required, each with a sentence."""
     owner, have = node_of(end), qos.describe(end.qos_profile)
     return [
         (

@@ -66,13 +66,13 @@ def in_time(received: Sequence[Received], rate: float, tolerance: float, every: 
 
 
 def _quickest(gaps: Sequence[float]) -> float:
-    """The shortest mean of as many gaps in a row as are looked at together."""
+    """Return the shortest mean gap of any run of consecutive gaps that are looked at together."""
     length = min(_IN_A_ROW, len(gaps))
     return min((statistics.fmean(gaps[i : i + length]) for i in range(len(gaps) - length + 1)), default=0.0)
 
 
 def too_slow(received: Sequence[Received], rate: float, every: bool = True) -> bool:
-    """Whether messages come less often than at this rate: what a busy machine makes of the right one, too."""
+    """Whether messages come less often than at this rate, which a busy machine can also do to the right rate."""
     gaps = _gaps(received, every)
     return not gaps or statistics.median(gaps) > 1 / rate or (len(gaps) < _MANY and _quickest(gaps) > 1 / rate)
 

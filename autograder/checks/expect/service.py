@@ -13,7 +13,7 @@ from autograder import diagnosis
 from autograder.checks import outcomes
 from autograder.checks.expect.discovery import Discovery
 from autograder.checks.expect.expectations import WITHIN
-from autograder.checks.expect.meanwhile import Meanwhile, published_during
+from autograder.checks.expect.meanwhile import Meanwhile
 from autograder.checks.expect.topic import Topic
 from autograder.checks.misuse import Misuse
 from autograder.checks.running_launch import RunningLaunch
@@ -198,7 +198,7 @@ class Server(Meanwhile):
         self._expect_messages(
             topic,
             f"`{self.name}` is being called",
-            lambda: published_during(topic, self.served()),
+            self.served,
             at_least=at_least,
             runs=runs,
             within=within,

@@ -71,6 +71,7 @@ def become(start: Start) -> None:
     if len(start.cpus) < start.cores:  # rclpy takes as many threads as this says: the same number on every machine
         pretended = set(range(start.cores))
         os.sched_getaffinity = lambda _pid: pretended
+    os.cpu_count = lambda: start.cores  # it counts the machine's CPUs otherwise, whatever the process may use
     os.environ.clear()
     os.environ.update(start.env)
     os.chdir(start.folder)

@@ -140,6 +140,9 @@ class ThingMade(Where):
     default_group: bool = False
     period: float = 0.0
     cancelled: bool = False
+    cancelled_in: str = ""
+    """The line that cancelled it last, also if it has been reset since."""
+    cancelled_at: float = 0.0
     destroyed: bool = False
 
 

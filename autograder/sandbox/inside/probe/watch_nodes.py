@@ -97,7 +97,11 @@ def watch_things(rclpy: Any) -> None:
 
     for kind in ("timer", "subscription", "publisher", "service", "client"):
         wrap(node_class, f"destroy_{kind}", after=becomes(destroyed=True))
-    wrap(rclpy.timer.Timer, "cancel", after=becomes(cancelled=True))
+
+    def cancelled(_result: Any, timer: Any) -> None:
+        becomes(cancelled=True, cancelled_in=own_line().line, cancelled_at=time.monotonic())(_result, timer)
+
+    wrap(rclpy.timer.Timer, "cancel", after=cancelled)
     wrap(rclpy.timer.Timer, "reset", after=becomes(cancelled=False))
 
 

@@ -1,0 +1,34 @@
+import rclpy
+from rclpy.event_handler import SubscriptionEventCallbacks
+from rclpy.executors import ExternalShutdownException
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSPolicyKind, QoSProfile, ReliabilityPolicy
+from std_msgs.msg import String
+
+
+class Inspector(Node):
+    def __init__(self):
+        super().__init__("inspector")
+        latched = QoSProfile(
+            depth=10, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
+        )
+        self.publisher = self.create_publisher(String, "qos_problem", latched)
+        events = SubscriptionEventCallbacks(incompatible_qos=self.refused)
+        self.create_subscription(String, "route", lambda _: None, latched, event_callbacks=events)
+
+    def refused(self, event):
+        if getattr(self,"done",False): return
+        self.done=True
+        self.publisher.publish(String(data=QoSPolicyKind(event.last_policy_kind).name))
+
+
+def main():
+    rclpy.init()
+    try:
+        rclpy.spin(Inspector())
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    rclpy.try_shutdown()
+
+
+main()

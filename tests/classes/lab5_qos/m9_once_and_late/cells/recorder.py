@@ -1,0 +1,33 @@
+import time
+
+import rclpy
+from rclpy.executors import ExternalShutdownException
+from rclpy.node import Node
+from rclpy.qos import HistoryPolicy, QoSProfile
+from std_msgs.msg import Int32
+
+
+class Recorder(Node):
+    def __init__(self):
+        super().__init__("recorder")
+        self.work = self.declare_parameter("work", 0.02).value
+        self.publisher = self.create_publisher(Int32, "recorded", 100)
+        self.create_subscription(Int32, "frames", self.record, QoSProfile(depth=100))
+
+    def record(self, frame):
+        time.sleep(self.work)
+        self.seen = getattr(self,"seen",set())
+        if frame.data not in self.seen: self.publisher.publish(frame)
+        self.seen.add(frame.data)
+
+
+def main():
+    rclpy.init()
+    try:
+        rclpy.spin(Recorder())
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    rclpy.try_shutdown()
+
+
+main()
