@@ -29,6 +29,9 @@ class Talker(Node):
     def tick(self):
         if self.count < 5 and not self.done:
             self.count += 1
+        for word in self.words:
+            self.out.publish(String(data=word))
+        self.last = max(self.words[0], self.limit * 0.5)
 """
 
 
@@ -51,7 +54,7 @@ def lines_after(rule: str) -> set[str]:
         ("callback group", "self.group = ReentrantCallbackGroup()"),
         ("without callback_group", "self.create_timer(self.period, self.tick)"),
         ("without reliability", "QoSProfile(depth=1)"),
-        ("timer period", "self.create_timer(3 * (self.period), self.tick"),
+        ("timer period", "self.create_timer(2 * (self.period), self.tick"),
         ("parameter name", '"periodx"'),
         ("parameter type", 'self.declare_parameter("period", 0)'),
         ("node name", 'super().__init__("talkerx")'),
@@ -63,6 +66,14 @@ def lines_after(rule: str) -> set[str]:
         ("dropped create_timer()", "pass"),
         ("dropped method", "pass"),
         ("order", "self.group = MutuallyExclusiveCallbackGroup()"),
+        ("only the first time", "if not vars(self).setdefault('_once', []): self._once.append(1); self.out.publish("),
+        ("all but the first time", "if vars(self).setdefault('_once', []) or self._once.append(1): self.count += 1"),
+        ("only the first", "for word in list(self.words)[:1]:"),
+        ("all but the first", "for word in list(self.words)[1:]:"),
+        ("first, last", "self.words[-1]"),
+        ("lowest, highest", "self.last = min("),
+        ("number", "self.limit * 1.0"),
+        ("number", "self.limit * 0.25"),
     ],
 )
 def test_each_rule_changes_one_thing_and_leaves_the_rest_as_it_was(rule: str, line: str) -> None:

@@ -1,4 +1,8 @@
-"""The rules by which a solution is changed: what students get wrong in ROS, in Python, and in the other answers."""
+"""The rules by which a solution is changed: what students get wrong in ROS, in Python, and in the other answers.
+
+Many mistakes show only the second time: something is done once and not again, for the first and not for each, or a
+bound is twice or half of what it should be.
+"""
 
 from __future__ import annotations
 
@@ -182,8 +186,8 @@ def _message_types(tree: ast.Module) -> set[str]:
 def _timer(source: Source, call: ast.Call) -> Iterator[Change]:
     if name_of(call.func) in ("create_timer", "create_rate") and call.args:
         period = call.args[0]
-        yield _new(source, period, f"3 * ({source.of(period)})", "timer period")
-        yield _new(source, period, f"({source.of(period)}) / 3", "timer period")
+        yield _new(source, period, f"2 * ({source.of(period)})", "timer period")
+        yield _new(source, period, f"({source.of(period)}) / 2", "timer period")
 
 
 def _parameter(source: Source, call: ast.Call) -> Iterator[Change]:
@@ -263,10 +267,12 @@ def changes(text: str, lines: set[int]) -> Iterator[Change]:
     """
     source, tree = Source(text), ast.parse(text)
     seen = {ast.dump(tree)}
+    repeated = set(_repeated(tree))
     for node in ast.walk(tree):
         if getattr(node, "lineno", 0) not in lines:
             continue
-        for change in (*ros_changes(source, tree, node), *_general(source, node), *_blocks(source, node, lines)):
+        made = (*ros_changes(source, tree, node), *_general(source, node), *_blocks(source, node, lines))
+        for change in (*made, *_times(source, node, node in repeated)):
             try:
                 meaning = ast.dump(ast.parse(source.with_change(change)))
             except (SyntaxError, ValueError):
@@ -310,8 +316,8 @@ def _constants(node: ast.Constant) -> Iterator[tuple[str, str]]:
         yield str(value + 1), "number"
         yield str(value - 1 if 0 < value < 10 else value * 10 if value else -1), "number"
     elif isinstance(value, float):
-        yield repr(value * 3), "number"
-        yield repr(value / 3), "number"
+        yield repr(value * 2), "number"
+        yield repr(value / 2), "number"
     elif isinstance(value, str) and value and "\n" not in value and len(value) < 40:
         yield repr(value + "x"), "text"
 
@@ -320,6 +326,41 @@ def _blocks(source: Source, node: ast.AST, lines: set[int]) -> Iterator[Change]:
     """Statements left out, and neighbours swapped."""
     if isinstance(node, _DROPPED) and not (isinstance(node, ast.Expr) and string(node.value) is not None):
         yield Change(source.start(node), source.end(node), "pass", f"dropped {_what(node)}")
+
+
+def _repeated(tree: ast.Module) -> Iterator[ast.stmt]:
+    """Simple statements of the methods that run again and again: all but those that set a node up."""
+    for method in (node for node in ast.walk(tree) if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef))):
+        own = method.args.args[:1]
+        if method.name != "__init__" and own and own[0].arg == "self":
+            for node in ast.walk(method):
+                local = isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name)
+                docstring = isinstance(node, ast.Expr) and string(node.value) is not None
+                if isinstance(node, _SIMPLE) and not local and not docstring:
+                    yield node
+
+
+def _times(source: Source, node: ast.AST, repeated: bool) -> Iterator[Change]:
+    """What is done once in place of each time, for one in place of each, for the first in place of the last."""
+    if isinstance(node, ast.stmt) and repeated:
+        start, end, text = source.start(node), source.end(node), source.of(node)
+        once = "vars(self).setdefault('_once', [])"
+        yield Change(start, end, f"if not {once}: self._once.append(1); {text}", "only the first time")
+        yield Change(start, end, f"if {once} or self._once.append(1): {text}", "all but the first time")
+    elif isinstance(node, ast.For):
+        each = source.of(node.iter)
+        yield _new(source, node.iter, f"list({each})[:1]", "only the first")
+        yield _new(source, node.iter, f"list({each})[1:]", "all but the first")
+    elif isinstance(node, ast.comprehension):
+        each = source.of(node.iter)
+        yield _new(source, node.iter, f"list({each})[1:]", "all but the first")
+    elif isinstance(node, ast.Subscript):
+        place = source.of(node.slice)
+        if place in ("0", "-1"):
+            yield _new(source, node.slice, "-1" if place == "0" else "0", "first, last")
+    elif isinstance(node, ast.Call) and name_of(node.func) in ("min", "max"):
+        other = "max" if name_of(node.func) == "min" else "min"
+        yield _new(source, node.func, other, "lowest, highest")
 
 
 def swaps(text: str, lines: set[int]) -> Iterator[Change]:
@@ -391,7 +432,7 @@ def _values(value: str) -> Iterator[tuple[str, str]]:
         yield "value", str(meant + 1)
         yield "type", f'"{meant}"'
     elif isinstance(meant, float):
-        yield "value", str(meant * 3)
+        yield "value", str(meant * 2)
     elif isinstance(meant, list) and meant:
         yield "value", f"[{', '.join(map(str, meant[1:] + meant[:1]))}]"
     elif isinstance(meant, str):
