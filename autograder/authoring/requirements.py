@@ -21,6 +21,13 @@ _TASK = re.compile(
     r"\*\*(Write|Repair|Complete|Change|Describe|Fill|Now)\b|^Write\b|\bWrite (one|two|three|the|a)\b", re.MULTILINE
 )
 """What a text that sets a task says."""
+_QUANTIFIER = re.compile(
+    r"\b(each|every|again|only|once|twice|most|least|latest|first|last|all|both|never|always|until|while|within|any|another"
+    r"|nothing|none|above|below|between|before|after|more|less|fewer|higher|lower|than|negative|zero|default|same|other"
+    r"|times|longer|in order|ms)\b|\d ?(s|Hz)\b|\bas (long|soon|often|many) as\b|\bseconds?\b",
+    re.IGNORECASE,
+)
+"""Words that a check does not hold if it tries them once, with one value, in one order."""
 _SENTENCE = re.compile(r"(?<=[.!?:])[)*`_]*\s+(?=[A-Z`*(_\"])")
 
 
@@ -36,6 +43,15 @@ class Requirement:
     """Part of that check; empty: the whole of it."""
     student: str
     """Sample student who breaks it; empty where a course has no sample class."""
+    tried: str = ""
+    """How the check tries what the words say of a number, a time or a repetition, such as `two values and zero`."""
+    once: str = ""
+    """Sample student who keeps it the first time, or for one value, and breaks it then; empty if there is none."""
+
+    @property
+    def quantified(self) -> bool:
+        """Whether the words say how often, how many, how long, or for which values something holds."""
+        return _QUANTIFIER.search(self.text) is not None
 
 
 @dataclass(frozen=True)
@@ -55,6 +71,10 @@ class Requirements:
         """Words that are not in the lab's text."""
         whole = plain(" ".join(source_of(cell) for cell in lab.released))
         return [text for text in [one.text for one in self.required] + self.remarks if text not in whole]
+
+    def untried(self) -> list[str]:
+        """Words with a quantifier or a bound for which nobody has written down how a check tries it."""
+        return [one.text for one in self.required if one.quantified and not one.tried]
 
     def unheld(self, lab: Lab) -> list[str]:
         """Checks that test no requirement."""
@@ -76,8 +96,8 @@ def read(path: Path) -> Requirements:
     try:
         told: dict[str, Any] = yaml.safe_load(path.read_text(encoding="utf-8"))
         found = [
-            Requirement(plain(one["text"]), one["check"], one.get("part", ""), one.get("student", ""))
-            for one in told["requirements"]
+            Requirement(plain(one["text"]), **{key: value for key, value in one.items() if key != "text"})
+            for one in ({"part": "", "student": ""} | each for each in told["requirements"])
         ]
         return Requirements(found, [plain(text) for text in told.get("not_required") or []])
     except (yaml.YAMLError, TypeError, KeyError, AttributeError) as error:

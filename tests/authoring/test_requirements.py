@@ -26,6 +26,11 @@ def test_every_check_holds_a_requirement(name: str) -> None:
     assert requirements.unheld(load_lab(ROOT, name)) == []
 
 
+@pytest.mark.parametrize("name", LABS)
+def test_every_bound_and_every_repetition_says_how_a_check_tries_it(name: str) -> None:
+    assert requirements.untried(load_lab(ROOT, name)) == []
+
+
 def test_the_table_of_requirements_is_up_to_date() -> None:
     assert requirements.PAGE.read_text(encoding="utf-8") == requirements.page(), (
         "run `python tests/tools/requirements.py`"

@@ -41,16 +41,23 @@ def defects(lab: Lab) -> list[str]:
     for one in told.required:
         if one.check not in checks:
             found.append(f"{one.text!r}: the lab has no check `{one.check}`")
-        elif one.student not in sample_class.students(lab.name):
-            found.append(f"{one.text!r}: the class has no student `{one.student}`")
-        else:
-            student = sample_class.expected(lab, one.student)
+            continue
+        for name in filter(None, (one.student, one.once)):
+            if name not in sample_class.students(lab.name):
+                found.append(f"{one.text!r}: the class has no student `{name}`")
+                continue
+            student = sample_class.expected(lab, name)
             lost = student.lost.get(one.check, [])
             if one.check not in kill_matrix.lost(lab, student):
-                found.append(f"{one.text!r}: `{one.student}` does not fail `{one.check}`")
+                found.append(f"{one.text!r}: `{name}` does not fail `{one.check}`")
             elif one.part and student.points[one.check] and one.part not in lost:
-                found.append(f"{one.text!r}: `{one.student}` does not lose the part {one.part!r}, but {lost}")
+                found.append(f"{one.text!r}: `{name}` does not lose the part {one.part!r}, but {lost}")
     return found
+
+
+def untried(lab: Lab) -> list[str]:
+    """Words with a quantifier or a bound for which it is not said how they are tried."""
+    return read(lab.name).untried()
 
 
 def unheld(lab: Lab) -> list[str]:
@@ -69,14 +76,22 @@ def page() -> str:
         "# Requirement, check, mistake",
         "",
         "Made by `python tests/tools/requirements.py`. Each line: words of the lab, the check (and its part) that",
-        "holds them, and the sample student who breaks just that.",
+        "holds them, the sample student who breaks just that, and, where the words say how often, how long, how many",
+        "or for which values something holds, how the check tries that. In brackets: the sample student who keeps the",
+        "words the first time, or for one value, and breaks them after that.",
         "",
     ]
     for name in labs():
-        lines += [f"## {name}", "", "| requirement | check | part | broken by |", "|---|---|---|---|"]
+        lines += [
+            f"## {name}",
+            "",
+            "| requirement | check | part | broken by | how it is tried |",
+            "|---|---|---|---|---|",
+        ]
         for one in read(name).required:
             text = one.text.replace("|", "\\|")
-            lines.append(f"| {text} | `{one.check}` | {one.part} | {one.student} |")
+            tried = " ".join(filter(None, (one.tried, one.once and f"({one.once})")))
+            lines.append(f"| {text} | `{one.check}` | {one.part} | {one.student} | {tried} |")
         lines.append("")
     return "\n".join(lines)
 
@@ -88,6 +103,7 @@ if __name__ == "__main__":
             ("uncovered", uncovered(lab)),
             ("wrong", defects(lab)),
             ("without requirement", unheld(lab)),
+            ("not said how it is tried", untried(lab)),
         ):
             print(f"{title}: {len(lines)}", *[f"  {line}" for line in lines], sep="\n")
     else:
