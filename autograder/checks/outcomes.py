@@ -42,6 +42,9 @@ _NOT_CELLS = (_PACKAGE, sys.prefix, sys.base_prefix, "<frozen", "<string>")
 TEXT_KEPT = 8000
 """Characters of one text in an outcome: some of them quote what a student's program sent."""
 
+_WORTH_QUOTING = 12
+"""Characters from which on an observation is a sentence or a list; a shorter one is a value to compare at a glance."""
+
 _USABLE = "The check can go on with what the programs send"
 
 _FORGED = "A program has announced a node or a topic whose name is no text, below ROS, which allows no such name."
@@ -127,12 +130,24 @@ def worded(
     code: str = "",
     hidden: bool = False,
 ) -> Outcome:
-    """Return an outcome whose texts have a bounded length; its arguments are those of `Outcome`."""
+    """Return an outcome whose texts have a bounded length; its arguments are those of `Outcome`.
+
+    What the reason quotes already is not shown a second time as what was observed, unless it stands beside what was
+    expected, to be compared.
+    """
+    if not expected and len(observed) >= _WORTH_QUOTING and _said_in(observed, because):
+        observed = ""
     title, expected, observed, because, hint = map(_cut, (title, expected, observed, because, hint))
     return Outcome(
         status=status, title=title, expected=expected, observed=observed, because=because, hint=hint, code=code,
         hidden=hidden,
     )  # fmt: skip
+
+
+def _said_in(part: str, whole: str) -> bool:
+    """Whether a text contains another one, apart from case, quotes and the full stop."""
+    one, other = (text.replace("`", "").strip(" .").casefold() for text in (part, whole))
+    return one in other
 
 
 def _cut(text: str) -> str:

@@ -79,6 +79,7 @@ class _Wanted:
         number = f"Exactly {self.need}" if self.most == self.need else f"At least {self.need}"
         number += f", at most {self.most}," if self.most and self.most != self.need else ""
         which = f" that {'says' if self.need == 1 else 'say'} {self.saying}" if self.saying else ""
+        which = which or " with the expected content" * (self.where is not None)
         which += " arrives" if self.need == 1 else " arrive"
         rate = f" at {self.rate:g} Hz" if self.rate else ""
         return f"{number} message{'s' * (self.need != 1)}{which} on `{topic}`{rate}"
@@ -263,7 +264,9 @@ class Topic(Sources):
         if not self._wait(wanted.enough, within, lambda: self._ends(topic, msg_type, "publisher", "")):
             self._too_few(wanted, qos or quiet_profile(), within)
         self._not_more(wanted, for_seconds)
-        self._one_source(wanted.title, topic, msg_type, publisher, publishers, recording.messages[skip:])
+        # They came: a title that asks for them would deny what was seen.
+        whose = f"The messages on `{topic}` come from {f'`{publisher}`' if publisher else 'one publisher'}"
+        self._one_source(whose, topic, msg_type, publisher, publishers, recording.messages[skip:])
         self._at_rate(wanted, tolerance, within)
         return self._say(wanted, values)
 
@@ -348,7 +351,13 @@ class Topic(Sources):
         shown = received if len(received) <= 4 else [*received[:2], *received[-2:]]
         said = [in_words(msg, values) for msg in shown]
         observed = shorten("; ".join(said if len(received) <= 4 else [*said[:2], "…", *said[2:]]))
-        self._fail(wanted.title, CONTENT(wrong), observed=observed, hint=wanted.hint)
+        outcomes.passed(wanted.title, observed=_number(len(received)))
+        self._fail(
+            f"The messages on `{wanted.recording.topic}` say what they should",
+            CONTENT(wrong),
+            observed=observed,
+            hint=wanted.hint,
+        )
 
     @waits_for("messages on `{name}`")
     def expect_last(
