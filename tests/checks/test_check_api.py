@@ -70,4 +70,4 @@ def test_every_name_is_used_by_a_lab_or_a_lecture() -> None:
     ]
     text = "\n".join([*cells, *(page.read_text(encoding="utf-8") for page in (ROOT / "lectures").rglob("*.md"))])
     unused = [f"{noun}.{name}" for noun, names in OFFERED.items() for name in names.split() if f".{name}" not in text]
-    assert unused == []
+    assert unused == [], "use each of them in a lab of solutions/, or in a page of lectures/"

@@ -5,6 +5,8 @@ from __future__ import annotations
 import pytest
 from graded_cell import Grade
 
+from autograder.checks.nouns import NOUNS
+
 BUSY = """
 import threading
 import time
@@ -84,6 +86,7 @@ ticks = node.create_publisher(Int64, "ticks", 10)
 node.create_timer(0.1, lambda: ticks.publish(Int64(data=1)), group)
 said = node.create_publisher(String, "said", QoSProfile(depth=1, durability=1))
 node.create_subscription(String, "say", lambda message: said.publish(message), 10)
+node.create_subscription(String, "said", lambda message: None, 10)
 gate = node.create_client(Trigger, "gate", callback_group=group)
 node.create_subscription(String, "go", lambda message: gate.call(Trigger.Request()), 10, callback_group=group)
 rclpy.spin(node, MultiThreadedExecutor(8))
@@ -101,6 +104,20 @@ rclpy.init()
 rclpy.spin(Camera("camera"))
 """
 
+CLEAN = """
+import rclpy
+from rclpy.executors import ExternalShutdownException
+from rclpy.node import Node
+
+rclpy.init()
+try:
+    rclpy.spin(Node("clean"))
+except (KeyboardInterrupt, ExternalShutdownException):
+    pass
+finally:
+    rclpy.try_shutdown()
+"""
+
 ENDS = "import sys, time\nprint('over', flush=True)\ntime.sleep(0.5)\nsys.exit(3)\n"
 
 LINES = {
@@ -112,6 +129,9 @@ LINES = {
         ("ros.topic('/ticks', Int64).expect_subscription(within=1)", "wrong-end"),
         ("ros.topic('/ticks').expect_subscription(count=0)", ""),
         ("ros.topic('/ticks').expect_unused(within=0.3)", "topic-present"),
+        ("ros.topic('/nothing').expect_unused()", ""),
+        ("ros.topic('/ticks', Int64).expect_messages(at_least=5, rate=10, publisher='/busy')", ""),
+        ("ros.topic('/ticks', Int64).expect_messages(at_least=5, rate=2, within=1)", "rate"),
         ("ros.topic('/ticks', Int64).expect_last(7, times=3)", ""),
         ("ros.topic('/ticks', Int64).expect_last(8, within=0.5)", "content"),
         ("ros.topic('/ticks', Int64).expect_last(8, within=0.5, code='own-code', because='It is {said}.')", "own-code"),
@@ -133,6 +153,7 @@ LINES = {
         ("ros.require('it runs' in ros.program('busy').output(), 'It says so')", ""),
         ("ros.program('busy').expect_exit(within=0.5)", "still-running"),
         ("ros.program('other').expect_running()", "failed"),
+        ("ros.program('other').expect_started()", "failed"),
     ],
     "serves": [
         ("ros.node('/serves').expect()", ""),
@@ -153,7 +174,8 @@ LINES = {
         ("ros.node('/serves').expect_log('asked', count=9, within=1)", "no-log"),
         ("ros.qos('/said').expect(reliability='reliable', durability='transient_local')", ""),
         ("ros.qos('/said').expect(durability='volatile')", "qos-durability"),
-        ("ros.qos('/said').expect_match(within=1)", "topic-name"),
+        ("ros.qos('/said').expect_match()", ""),
+        ("ros.qos('/say').expect_match(within=1)", "topic-name"),
         ("ros.publisher('/say', String).publish(String(data='hello'))", ""),
         ("ros.topic('/said', String).expect_last('hello')", ""),
         ("ros.publisher('/says', String).publish(String(), within=1)", "topic-name"),
@@ -175,6 +197,7 @@ LINES = {
         ("ros.action('/count', Fibonacci).send_goal(Fibonacci.Goal(order=1), accepted=False)", "goal-accepted"),
         ("ros.action('/counts', Fibonacci).send_goal(Fibonacci.Goal(order=1), within=1)", "action-name"),
         ("ros.action('/count', Fibonacci).send_goal(Fibonacci.Goal(order=99), accepted=True).expect_canceled()", ""),
+        ("goal.expect_canceled()", "cancel-refused"),
         ("ros.action('/count', Fibonacci).expect_one_at_a_time()", ""),
         ("[ros.action('/count', Fibonacci).send_goal(Fibonacci.Goal(order=9)) for _ in 'ab'][-1].expect_result()", ""),
         ("ros.action('/count', Fibonacci).expect_one_at_a_time()", "goals-together"),
@@ -190,11 +213,15 @@ LINES = {
         ("ros.require_equal('It is back', ros.lifecycle('/camera').state(), 'unconfigured')", ""),
         ("ros.require('configure' in ros.lifecycle('/camera').available_transitions(), 'It may begin again')", ""),
         ("ros.lifecycle('/camera').expect_transitions([('unconfigured', 'active')], within=0.5)", "transitions"),
+        ("ros.lifecycle('/camera').expect_transitions(CONFIGURED + 2 * REFUSED + CLEANED_UP)", ""),
         ("ros.require_equal('All', ros.changes('/camera')[0].step, ('unconfigured', 'configuring'))", ""),
         ("ros.require('/camera' in ros.graph.nodes(), 'It is there')", ""),
         ("ros.require(ros.graph.wait(lambda: ros.graph.publishers('/camera/transition_event')), 'It tells')", ""),
         ("ros.require('/rosout' in ros.graph.topics() and not ros.graph.subscriptions('/rosout'), 'It logs')", ""),
         ("ros.program('camera').expect_clean_end(by='SIGTERM')", "unclean-end"),
+    ],
+    "clean": [
+        ("ros.program('clean').expect_clean_end(by='SIGINT')", ""),
     ],
     "ends": [
         ("ros.program('ends').expect_exit(status=3)", ""),
@@ -202,15 +229,35 @@ LINES = {
         ("ros.require_equal('Status', ros.program('ends').exit_status(), 3)", ""),
     ],
 }
-PROGRAMS = {"busy": BUSY, "serves": SERVES, "camera": CAMERA, "ends": ENDS}
-SET_UP = "from std_msgs.msg import Int64\nfrom test_msgs.action import Fibonacci\n"
+PROGRAMS = {"busy": BUSY, "serves": SERVES, "camera": CAMERA, "clean": CLEAN, "ends": ENDS}
+SET_UP = """\
+from std_msgs.msg import Int64
+from test_msgs.action import Fibonacci
+CONFIGURED = [("unconfigured", "configuring"), ("configuring", "inactive")]
+REFUSED = [("inactive", "activating"), ("activating", "inactive")]
+CLEANED_UP = [("inactive", "cleaningup"), ("cleaningup", "unconfigured")]
+"""
 WORDS = {
     "busy": "'busy', listen=[('/activity', String)]",
     "serves": "'serves', listen=[('/said', String), ('/ticks', Int64)],"
     " serve=[('/gate', Trigger, lambda request, response: response, 0.5)]",
     "camera": "'camera', lifecycle=['/camera']",
+    "clean": "'clean'",
     "ends": "'ends'",
 }
+
+
+def test_each_expectation_has_a_line_where_it_holds_and_one_where_it_fails() -> None:
+    lines = [line for program in LINES.values() for line in program]
+    missing = [
+        f"{noun}.{name}: a line where it {'fails' if fails else 'holds'}"
+        for noun in NOUNS
+        for name in dir(NOUNS[noun])
+        for fails in (False, True)
+        if name.startswith("expect") and f"{noun} {name}" != "ros expect_argument_needed"  # which takes a launch file
+        if not any(f".{name}(" in line and noun in line and bool(code) is fails for line, code in lines)
+    ]
+    assert missing == [], "add a line of `LINES` for each of these"
 
 
 @pytest.mark.parametrize("program", LINES)

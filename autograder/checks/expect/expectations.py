@@ -97,9 +97,12 @@ class Expectations:
         own = [t for t in sorted(self._observer.topics()) if t not in ("/rosout", "/parameter_events")]
         return ", ".join(own) or "no topic"
 
-    def _sure_if(self, quicker: bool) -> None:
-        """Note that the next decision does not depend on the machine: a busy machine never makes a program faster."""
-        if quicker:
+    def _sure_if(self, sure: bool) -> None:
+        """Note that the next decision would be the same on any machine, so that the check is not run again for it.
+
+        A busy machine makes a program slower, but never faster, and it does not change what a message says.
+        """
+        if sure:
             self._observer.patience.is_sure()
 
     def _fail(
