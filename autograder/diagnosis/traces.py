@@ -107,7 +107,8 @@ KNOWN_ERRORS = (
     (
         "InvalidParameterTypeException",
         PARAMETER_TYPE,
-        "The value's type must be the declared one: 40 is an integer, 40.0 a double, '40' a string.",
+        "The given value and the declared default must have one type: 40 is an integer, 40.0 a double, '40' a string. "
+        "If the value that is given is right, declare a default of its type.",
     ),
     (
         "PermissionError: [Errno 1]",
