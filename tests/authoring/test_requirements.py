@@ -35,6 +35,17 @@ def test_every_bound_and_every_repetition_says_how_a_check_tries_it(name: str) -
     assert requirements.untried(load_lab(ROOT, name)) == []
 
 
+@pytest.mark.parametrize("name", LABS)
+def test_every_point_that_a_sample_student_loses_has_a_sentence_that_is_broken(name: str) -> None:
+    assert requirements.unexplained(load_lab(ROOT, name)) == []
+
+
+def test_the_table_of_what_is_broken_and_what_is_lost_is_up_to_date() -> None:
+    assert requirements.LOST_PAGE.read_text(encoding="utf-8") == requirements.lost_page(), (
+        "run `python tests/tools/requirements.py`"
+    )
+
+
 def test_a_task_may_stand_above_a_check_of_a_program_that_grows() -> None:
     lab = load_lab(ROOT, "lab4_lifecycle")
     check = next(cell for cell in lab.released if grade_id_of(cell) == lab.checks[-1].grade_id)
