@@ -54,7 +54,7 @@ def why_not_matched(scene: Scene, topic: str, profile: QoSProfile, kind: str) ->
 
 NO_ANSWER = Kind("no-answer", "no reason was established: what was seen is said", Group.SILENCE)
 TIMER_PERIOD = Kind(
-    "timer-period", "nothing published, a timer of the node is not due yet, and the others have run", Group.SILENCE
+    "timer-period", "nothing published, and the node has only timers, none of which is due yet", Group.SILENCE
 )
 LIFECYCLE_INACTIVE = Kind(
     "lifecycle-inactive", "a lifecycle publisher dropped a message in another state", Group.SILENCE
@@ -68,6 +68,9 @@ LIFESPAN = Kind(
     "lifespan", "a transient local publisher's last message is older than its lifespan; nothing came", Group.SILENCE
 )
 SILENT = Kind("silent", "no reason was established: what was seen is said", Group.SILENCE)
+
+_MILLISECONDS = 100
+"""Seconds from which on a timer's period may have been meant in milliseconds."""
 
 _EVERY_NODE = ("use_sim_time", "start_type_description_service")
 """Parameters that a node has without declaring them."""
@@ -139,7 +142,7 @@ def too_old(scene: Scene, topic: str, profile: QoSProfile) -> Reason | None:
 
 
 def not_due(scene: Scene, topic: str) -> Reason | None:
-    """Must have seen: a node that has published nothing on a topic, and timers of it of which none is due yet."""
+    """Must have seen: a node that has published nothing on a topic, and has only timers, of which none is due yet."""
     for inside, publisher in _publishers(scene, topic):
         found = None if publisher.runs else _no_timer_due(inside, publisher.node)
         if found:
@@ -148,25 +151,22 @@ def not_due(scene: Scene, topic: str) -> Reason | None:
 
 
 def _no_timer_due(inside: Inside, node: str) -> Reason | None:
-    """Must have seen: a program that lives, and timers of its node of which none is due yet."""
-    timers = [t for t in inside.callbacks if t.kind == "timer" and t.node == node and not t.cancelled]
-    late = [t for t in timers if not t.runs and t.period > inside.age]
-    if inside.alive and late and len(late) == len(timers):
-        return TIMER_PERIOD(
-            f"`{inside.name}`: {called(late[0])} has not fired yet; the program has run for {inside.age:.0f} s.",
-            "`create_timer` takes its period in seconds.",
-        )
-    return None
+    """Must have seen: a program that lives, and a node of it that has only timers, of which none is due yet."""
+    callbacks = [thing for thing in inside.callbacks if thing.node == node and not thing.cancelled]
+    late = [thing for thing in callbacks if thing.kind == "timer" and not thing.runs and thing.period > inside.age]
+    if not inside.alive or not late or len(late) < len(callbacks):
+        return None
+    period = late[0].period
+    meant = f" For {period:g} milliseconds, write `{period / 1000:g}`." * (period >= _MILLISECONDS)
+    return TIMER_PERIOD(
+        f"`{inside.name}`: {called(late[0])} has not fired yet; the program has run for {inside.age:.0f} s.",
+        f"`create_timer` takes its period in seconds.{meant}",
+    )
 
 
 def nothing_due(scene: Scene, node: str) -> Reason | None:
-    """Must have seen: a node without a subscription that lives, and timers of it of which none is due yet."""
-    for inside in scene.insides:
-        if not any(thing.kind == "subscription" and thing.node == node for thing in inside.callbacks):
-            found = _no_timer_due(inside, node)
-            if found:
-                return found
-    return None
+    """Must have seen: a node that lives and has only timers, of which none is due yet."""
+    return first((lambda inside: _no_timer_due(inside, node),), scene.insides)
 
 
 def paces(scene: Scene, topic: str) -> str:
