@@ -95,6 +95,18 @@ class Source:
         calls = [node for node in ast.walk(self._tree) if isinstance(node, ast.Call)]
         return min((call.lineno for call in calls if getattr(call.func, "attr", "") == name), default=0)
 
+    def declares(self, parameter: str) -> int:
+        """Return the line of the only call that declares a parameter of this name, or 0."""
+        calls = [node for node in ast.walk(self._tree) if isinstance(node, ast.Call) and node.args]
+        found = [
+            call.lineno
+            for call in calls
+            if getattr(call.func, "attr", "") == "declare_parameter"
+            and isinstance(call.args[0], ast.Constant)
+            and call.args[0].value == parameter
+        ]
+        return found[0] if len(found) == 1 else 0
+
     def place(self, name: str, looks: Sequence[list[Frame]], innermost: bool = False) -> Place | None:
         """Where the looks at one thread agree that the student's code is.
 
