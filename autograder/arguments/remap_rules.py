@@ -1,13 +1,13 @@
-"""Remap rules and parameter rules on a command line, as rcl (Jazzy) has them, and why one is refused.
+"""Reads remap rules and parameter rules on a command line as rcl (Jazzy) does, and says why it refuses one.
 
-A text is cut into lexemes from left to right, and these must follow one another in a fixed order:
+A text is cut into lexemes from left to right, and the lexemes must follow one another in a fixed order:
 
     remap rule:     [token ":"]  ("__node" | "__name") ":=" token
                     [token ":"]  "__ns" ":=" "/" [token {"/" token} ["/"]]
                     [token ":"]  ["rostopic://" | "rosservice://"] name ":=" name
     name:           ["~/" | "/"] token {"/" token}
     parameter rule: [token ":"]  part {"." part} ":=" value, where a part has tokens and slashes in any order
-    token:          letters, digits and single underscores; it does not begin with a digit, nor with two underscores
+    token:          letters, digits and single underscores; it begins with neither a digit nor two underscores
 
 rcl reads the value of a parameter rule as YAML: one plain value, or a list of values of one type.
 """
@@ -57,16 +57,16 @@ _DOUBLE = re.compile(
 )
 
 _LONGEST_INTEGER = 1000
-"""Characters."""
+"""The number of characters from which a number is not read as an integer."""
 
-# A comma behind a tag belongs to the tag for rcl.
+# rcl reads a comma behind a tag as a part of the tag.
 _TAG = re.compile(r"(![\w-]*),")
 LIBYAML = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
-"""The library that rcl reads YAML with; it differs from PyYAML's own reader in tabs and colons."""
+"""The library with which rcl reads YAML. It treats tabs and colons differently from PyYAML's own reader."""
 
 
 def why_value_refused(value: str) -> str | None:
-    """Why rcl does not take a text for a value, as a sentence; None if it does."""
+    """Return why rcl does not accept a text as a value, as a sentence; None if it does."""
     shown = f"`{value[:60]}`"
     if not value:
         return "it has no value."
@@ -103,7 +103,7 @@ def _kind(value: str, *, plain: bool) -> str:
         return "text"
     if value in _BOOLS:
         return "bool"
-    # Python reads no number of thousands of digits, and rcl takes none that long for an integer.
+    # Python does not read a number with thousands of digits, and rcl does not read one that long as an integer.
     if len(value) < _LONGEST_INTEGER and _INTEGER.fullmatch(value) and -(2**63) <= _integer(value) < 2**63:
         return "integer"
     return "double" if _DOUBLE.fullmatch(value) else "text"
@@ -123,24 +123,24 @@ _LEXEMES = re.compile(
 
 @dataclass(frozen=True)
 class Rule:
-    """`PREFIX:LEFT:=RIGHT`, as it stands after `-r`."""
+    """A remap rule, `PREFIX:LEFT:=RIGHT`, as it is written after `-r`."""
 
     text: str
     prefix: str
     left: str
-    """Without `rostopic://` and `rosservice://`."""
+    """The left side without `rostopic://` and `rosservice://`."""
     right: str
     kind: str = ""
     """`topic` or `service` if the rule is for one of them only."""
 
     @property
     def renames_topics(self) -> bool:
-        """Whether it is about topics and services, and not about the node itself."""
+        """Whether the rule renames topics and services, and not the node itself."""
         return self.left not in ("__ns", "__node", "__name")
 
 
 def parse(text: str) -> Rule | None:
-    """Read a remap rule, also one that rcl refuses; None without a `:=`."""
+    """Read a remap rule, even one that rcl refuses; return None if the text has no `:=`."""
     left, separator, right = text.partition(":=")
     if not separator:
         return None
@@ -153,7 +153,7 @@ def parse(text: str) -> Rule | None:
 
 
 def _shape(text: str) -> str:
-    """The lexemes of a text as a word with one letter each."""
+    """Return the lexemes of a text as a word with one letter for each lexeme."""
     letters = {
         "scheme": "u", "node": "N", "ns": "S", "private": "~", "token": "t", "separator": "=", "colon": ":",
         "slash": "/", "dot": ".", "wild": "*", "back": "\\", "other": "?",
@@ -166,7 +166,10 @@ _PARAMETER = re.compile(r"(t:)?[t/]+(\.[t/]+)*")
 
 
 def why_remap_refused(text: str) -> Reason | None:
-    """Why rcl does not take a remap rule: at `rclpy.init`, or for its namespace when the node is made."""
+    """Return why rcl refuses a remap rule; None if it does not.
+
+    rcl refuses it in `rclpy.init`, or, because of the namespace in it, when the node is created.
+    """
     rule = parse(text)
     if rule is None:
         return RULE_FORM(f"`{text}` is not a remap rule: it has no `:=`.", "A rule is `old:=new`.")
@@ -178,7 +181,7 @@ def why_remap_refused(text: str) -> Reason | None:
 
 
 def _of_node(rule: Rule) -> Reason | None:
-    """What is wrong with the new name or namespace of a node."""
+    """Return what is wrong with the new name or namespace of a node."""
     right = rule.right
     if rule.left in ("__node", "__name"):
         if "/" in right:
@@ -200,7 +203,7 @@ def _of_node(rule: Rule) -> Reason | None:
 
 
 def _of_names(rule: Rule) -> Reason | None:
-    """What is wrong with the names of a rule for topics and services."""
+    """Return what is wrong with the names in a rule for topics and services."""
     if not rule.renames_topics:
         return None
     if rule.left.lower() in ("__ns", "__node", "__name", "__namespace", "ns", "_ns", "_node") and "__" in rule.left:
@@ -228,7 +231,7 @@ def _of_names(rule: Rule) -> Reason | None:
 
 
 def _of_name(name: str, what: str, left: bool = False) -> Reason | None:
-    """What is wrong with one name; None if it can be a name."""
+    """Return what is wrong with one name; None if it is a valid name."""
     bare = name[2:] if name.startswith("~/") else name.removeprefix("/")
     parts = bare.split("/")
     if not name:
@@ -289,7 +292,7 @@ def _of_form(rule: Rule) -> Reason:
 
 
 def why_parameter_refused(text: str) -> Reason | None:
-    """Why rcl does not take the name in a parameter rule, `NAME:=VALUE` after `-p`, or the value."""
+    """Return why rcl refuses the name or the value in a parameter rule, `NAME:=VALUE` after `-p`."""
     name, separator, value = text.partition(":=")
     said = f"The parameter rule `{text}` is refused, and the program ends at its start:"
     if not separator:
@@ -336,21 +339,24 @@ def _of_parameter(name: str) -> Reason:
 
 
 def rules_in(words: Sequence[str]) -> list[str]:
-    """The remap rules of a command line, in its order."""
+    """Return the remap rules of a command line, in its order."""
     return [after for word, after in itertools.pairwise(words) if word in ("-r", "--remap")]
 
 
 def parameter_rules_in(words: Sequence[str]) -> list[str]:
-    """The parameter rules of a command line, in its order."""
+    """Return the parameter rules of a command line, in its order."""
     return [after for word, after in itertools.pairwise(words) if word in ("-p", "--param")]
 
 
 def refused(rules: Sequence[str]) -> Reason | None:
-    """Why the first rule that rcl does not take is refused; it ends the program at its start."""
+    """Return why rcl refuses the first rule that it does not accept. Such a rule ends the program at its start."""
     return next((reason for reason in map(why_remap_refused, rules) if reason), None)
 
 
 def refused_parameter(words: Sequence[str]) -> Reason | None:
-    """Why the first parameter rule of a command line that rcl does not take is refused; it ends the program, too."""
+    """Return why rcl refuses the first parameter rule of a command line that it does not accept.
+
+    Such a rule ends the program at start, too.
+    """
     ros = words[words.index("--ros-args") :] if "--ros-args" in words else []
     return next((reason for reason in map(why_parameter_refused, parameter_rules_in(ros)) if reason), None)
