@@ -41,9 +41,9 @@ class Shape:
 
 
 class _Dumper(yaml.SafeDumper):
-    """A dumper without aliases and tags, so that equal objects are repeated.
+    """A dumper without aliases and tags, so that an object that occurs twice is written twice.
 
-    Only lists are written in the flow style.
+    The flow style applies to lists only.
     """
 
     def ignore_aliases(self, data: object) -> bool:
