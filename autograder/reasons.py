@@ -86,7 +86,7 @@ class Reason:
     because: str
     """One or two sentences for the student."""
     hint: str = ""
-    """What to do."""
+    """What the student can do."""
 
     @property
     def code(self) -> str:

@@ -27,7 +27,7 @@ class Scene:
     folder: Path
     """The folder with the programs' sources."""
     rules: Sequence[Sequence[str]] = ()
-    """The remap rules given to each of the programs, as on the command line."""
+    """The remap rules that were given to each of the programs, as on the command line."""
     parameter_rules: Sequence[Sequence[str]] = ()
     """The parameter rules that were typed for each of the programs."""
     parameters: Sequence[Collection[str]] = ()

@@ -1,4 +1,4 @@
-"""`ros2 action`."""
+"""The verbs of `ros2 action`."""
 
 from __future__ import annotations
 

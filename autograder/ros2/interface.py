@@ -1,4 +1,4 @@
-"""`ros2 interface`: these verbs read files and do not join a graph."""
+"""The verbs of `ros2 interface`, which read files and do not join a graph."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`ros2 lifecycle`."""
+"""The verbs of `ros2 lifecycle`."""
 
 from __future__ import annotations
 

@@ -27,7 +27,7 @@ _SEQUENCES = (list, tuple, array.array, numpy.ndarray)
 
 
 class Shape:
-    """How much of a message is written.
+    """Settings for how much of a message is written.
 
     Args:
         longest: the number of elements or characters after which a value is cut, or None for no limit.

@@ -1,4 +1,4 @@
-"""`ros2 node`."""
+"""The verbs of `ros2 node`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`ros2 param`."""
+"""The verbs of `ros2 param`."""
 
 from __future__ import annotations
 

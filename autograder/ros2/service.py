@@ -1,4 +1,4 @@
-"""`ros2 service`."""
+"""The verbs of `ros2 service`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`ros2 topic`: lists topics, prints and measures their messages, and publishes messages."""
+"""The verbs of `ros2 topic`: they list topics, print and measure their messages, and publish messages."""
 
 from __future__ import annotations
 

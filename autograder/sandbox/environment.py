@@ -130,7 +130,7 @@ class PythonPlaces:
     """Exactly the files and folders that make up this virtual environment and the Python on which it is based."""
 
     paths: list[Path]
-    """Real paths of folders and files, without links; none is inside another."""
+    """The real paths of the folders and files. None of them is inside another one."""
     links: dict[Path, str]
     """The links that lead to `paths`, with the target of each. Links inside `paths` are left out."""
 
@@ -145,7 +145,7 @@ def python_places() -> PythonPlaces:
     prefix, base = Path(sys.prefix), Path(sys.base_prefix)
     wanted = [prefix / name for name in ("pyvenv.cfg", "bin", "include", "lib", "lib64", "share") if prefix != base]
     wanted += [Path(sys.executable), Path(sysconfig.get_path("stdlib")), Path(sysconfig.get_path("platstdlib"))]
-    wanted += [Path(sysconfig.get_path("include"))]  # of Python itself: generated interfaces are extension modules
+    wanted += [Path(sysconfig.get_path("include"))]  # Python's headers, because generated interfaces are extensions
     wanted += sorted(library for folder in ("lib", "lib64") for library in (base / folder).glob("*.so*"))
     links: dict[Path, str] = {}
     found = {_real(path, links) for path in wanted if path.exists()}

@@ -73,7 +73,7 @@ def main() -> int:
 def _run(module: str, arguments: list[str]) -> int:
     """Run a module as `python -m` does, and return the exit status."""
     sys.argv = [module, *arguments]
-    prctl(PR_SET_NAME, module.rpartition(".")[2].encode())  # its command line is still that of the server
+    prctl(PR_SET_NAME, module.rpartition(".")[2].encode())  # the command line is still that of the server
     try:
         if module in sys.modules:
             return int(sys.modules[module].main())

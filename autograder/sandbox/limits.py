@@ -33,6 +33,6 @@ class Limits:
     """The number of files and folders in each of these. Even an empty file costs the kernel a kilobyte of memory, which
     no other limit counts."""
     output_kept: int = 256 * 1024
-    """How much of a program's output is kept: the first half and the last half of it."""
+    """The bytes of a program's output that are kept: one half from its beginning, and one half from its end."""
     events: int = 2000
-    """How many lines of the probe are kept."""
+    """The number of the probe's lines that are kept."""

@@ -152,7 +152,7 @@ class NodeSandbox:
         os.lseek(self._said, 0, os.SEEK_SET)
         return " ".join(os.read(self._said, 10_000).decode("utf-8", "replace").strip().splitlines()[-3:])
 
-    # In the sandbox's thread.
+    # Methods that run in the sandbox's thread.
 
     def _spawn(self) -> None:
         ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)

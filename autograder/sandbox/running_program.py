@@ -117,7 +117,7 @@ class RunningProgram:
         self.readers: list[int] = []
         """The pipes from the program that are still open."""
 
-    # The sandbox's thread calls these methods, always while it holds the condition's lock.
+    # Methods for the sandbox's thread, which calls them while it holds the condition's lock.
 
     def _started(self, handle: int) -> None:
         self._handle = handle
@@ -174,7 +174,7 @@ class RunningProgram:
             self._stopped_by = why
         self.signal(signal.SIGKILL)
 
-    # Other code calls these methods.
+    # Methods for callers.
 
     def running(self) -> bool:
         """Whether the program has not ended."""
@@ -192,7 +192,7 @@ class RunningProgram:
         return self._stopped_by
 
     def output(self) -> str:
-        """Return what it has printed so far: of a long output the beginning and the end."""
+        """Return the program's output so far. Of a long output, only the beginning and the end are kept."""
         self._catch_up(self)
         with self._changed:
             half = self._limits.output_kept // 2

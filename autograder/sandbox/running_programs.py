@@ -254,7 +254,7 @@ class RunningPrograms:
         """End all programs of the group."""
         self.end()
 
-    # What callers use.
+    # Methods for callers.
 
     def wait_ready(self, timeout: float) -> None:
         """Wait until the first process is ready.
@@ -327,7 +327,7 @@ class RunningPrograms:
                 signal.pidfd_send_signal(self._first, signal.SIGKILL)
             self.changed.notify_all()
 
-    # Starting.
+    # Methods that start a program.
 
     def _packages(self, prefixes: Sequence[str]) -> dict[str, str]:
         """Return the variable by which ROS and the launcher find installed packages."""
@@ -359,7 +359,7 @@ class RunningPrograms:
             self.changed.wait_for(lambda: program.pid >= 0 or not program.running() or self._over, _ANSWER_WITHIN)
             return program.pid >= 0 or not program.running()
 
-    # In the sandbox's thread.
+    # Methods that run in the sandbox's thread.
 
     def _on_channel(self) -> None:
         """Receive one answer of the first process. An invalid answer ends the group."""

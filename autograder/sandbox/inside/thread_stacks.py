@@ -19,7 +19,7 @@ END = b"\n=\n"
 
 def answer(descriptor: int) -> None:
     """Begin to answer on this descriptor, in a thread that Python's `threading` does not know."""
-    signal.pthread_sigmask(signal.SIG_BLOCK, [STACK_SIGNAL])  # in the threads of the program, too
+    signal.pthread_sigmask(signal.SIG_BLOCK, [STACK_SIGNAL])  # all threads of the program inherit this
     _thread.start_new_thread(_answer, (descriptor,))
 
 

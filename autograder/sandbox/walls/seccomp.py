@@ -35,7 +35,7 @@ _CALLS = {  # x86-64, the only architecture for which the ROS wheels exist
 _WITH_ARGUMENT = [  # (call, argument, value)
     # Calls on the first process: if a program slowed it down or limited it, a failure would look like our defect.
     (302, 0, 1), (203, 0, 1), (142, 0, 1), (144, 0, 1), (314, 0, 1),  # prlimit64, sched_setaffinity, …param, …attr
-    (141, 1, 1), (141, 0, 2), (251, 1, 1), (251, 0, 3),  # setpriority, ioprio_set: on it or on its user
+    (141, 1, 1), (141, 0, 2), (251, 1, 1), (251, 0, 3),  # setpriority, ioprio_set: on it, or on a user
     # fcntl's locks on parts of a file: each costs the kernel memory that no limit counts.
     (72, 1, 6), (72, 1, 7), (72, 1, 37), (72, 1, 38),
 ]  # fmt: skip

@@ -50,7 +50,7 @@ class CallbackError(Where):
     e: Literal["callback_error"] = "callback_error"
     kind: str = ""
     name: str = ""
-    """Full name of the topic or service, if it has one."""
+    """The full name of the topic or service; empty if there is none."""
     when: float = 0.0
     type: str
     text: str = ""
@@ -214,7 +214,7 @@ class Call(Where):
 
 @dataclass(frozen=True, kw_only=True)
 class ExecutorSeen:
-    """An executor."""
+    """The state of an executor."""
 
     e: Literal["executor"] = "executor"
     id: int
@@ -240,7 +240,7 @@ class ExecutorSeen:
 
 @dataclass(frozen=True, kw_only=True)
 class NodeSeen:
-    """A node, from the end of `Node.__init__` on."""
+    """The state of a node, which is known from the end of `Node.__init__` on."""
 
     e: Literal["node"] = "node"
     name: str
@@ -254,7 +254,7 @@ class NodeSeen:
 
 @dataclass(frozen=True, kw_only=True)
 class ParameterSeen:
-    """A parameter of a node."""
+    """The state of a parameter of a node."""
 
     e: Literal["parameter"] = "parameter"
     node: str

@@ -12,7 +12,7 @@ from .writing import ledger, quiet
 
 
 class Thing:
-    """A timer, subscription, service, client, publisher or action server, or another kind of callback."""
+    """The record of a timer, subscription, service, client, publisher or action server, or of another callback."""
 
     dirty = False
 
@@ -114,7 +114,7 @@ _MOST = 8
 
 
 class Executor:
-    """An executor: which nodes it contains, whether it is spinning, how many callbacks it ran at once."""
+    """The record of an executor: which nodes it contains, whether it is spinning, how many callbacks it ran at once."""
 
     dirty = False
 

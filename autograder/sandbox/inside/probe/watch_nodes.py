@@ -15,7 +15,7 @@ from .writing import emit_once, ledger, quiet
 
 
 class Node:
-    """A node, from the end of `Node.__init__` on."""
+    """The record of a node, which is created at the end of `Node.__init__`."""
 
     dirty = False
 

@@ -132,7 +132,7 @@ class Ledger:
         if start:
             _thread.start_new_thread(self._write_on, ())
         if self._wake.locked():
-            with contextlib.suppress(RuntimeError):  # another thread was faster
+            with contextlib.suppress(RuntimeError):  # another thread has already released it
                 self._wake.release()
 
     def ran(self, number: int, began: float, ended: float, thread: int) -> None:
