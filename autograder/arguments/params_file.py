@@ -22,17 +22,17 @@ _REFUSED = re.compile(
 )
 """The error message of rcl about a parameter file that it cannot read."""
 _ABOVE = (
-    "Below a node's name stands `ros__parameters:`, with two underscores, and below that, indented further, the names "
-    "of the parameters with their values, without dashes."
+    "Write `ros__parameters:`, with two underscores, below a node's name. Below that, indented further, write the "
+    "names of the parameters with their values, without dashes."
 )
 _WHOLE = (
-    "The key is the node's full name, such as `/car/front_demo:`; of keys that stand below one another each is a part "
-    "of it."
+    "The key is the node's full name, such as `/car/front_demo:`. If keys are nested, each of them is a part of that "
+    "name."
 )
 _IN_WORDS = {
-    "value before ros__parameters": ("has a value there that is no `name: value` below `ros__parameters:`", _ABOVE),
+    "value before ros__parameters": ("has a value there that is not a `name: value` below `ros__parameters:`", _ABOVE),
     "aliasing": ("has an anchor (`&`) or an alias (`*`), which ROS 2 does not read", "Write the values out."),
-    "repeated forward slash": ("has keys that together make `{what}`, which is no node's name", _WHOLE),
+    "repeated forward slash": ("has keys that together make `{what}`, which is not a node name", _WHOLE),
     "node name must not be empty": ("has a key that ends with a slash", _WHOLE),
 }
 """For the words in rcl's message: what is wrong, and what the student can do."""

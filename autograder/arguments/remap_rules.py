@@ -33,11 +33,11 @@ NAME_FORM = Kind("name-form", "`~` is in a place where it has no meaning, or the
 NAMESPACE_WITHOUT_SLASH = Kind("namespace-without-slash", "the new namespace does not begin with a slash", Group.RULES)
 NAMESPACE_END = Kind("namespace-end", "the new namespace ends with a slash", Group.RULES)
 RULE_SPECIAL = Kind("rule-special", "`__node` or `__ns` is misspelt, or something else is in their place", Group.RULES)
-RULE_SCHEME = Kind("rule-scheme", "`rostopic://` or `rosservice://` stands on the right side", Group.RULES)
-RULE_COLON = Kind("rule-colon", "what stands before a single `:` is no name of a node", Group.RULES)
+RULE_SCHEME = Kind("rule-scheme", "`rostopic://` or `rosservice://` is on the right side", Group.RULES)
+RULE_COLON = Kind("rule-colon", "the text before a single `:` is not the name of a node", Group.RULES)
 BEGINS_WITH_DIGIT = Kind("begins-with-digit", "a part of a name begins with a digit", Group.RULES)
 NAME_EMPTY = Kind("name-empty", "a side of the rule is empty", Group.RULES)
-NAME_SPACE = Kind("name-space", "a name holds a space", Group.RULES)
+NAME_SPACE = Kind("name-space", "a name contains a space", Group.RULES)
 WILDCARD = Kind("wildcard", "a rule has a `*`, which ROS 2 does not implement", Group.RULES)
 NAME_SLASH = Kind("name-slash", "a slash or a dot is not followed by a part of a name", Group.RULES)
 NAME_CHARACTERS = Kind("name-characters", "a name contains a character that is not allowed", Group.RULES)
@@ -77,7 +77,7 @@ def why_value_refused(value: str) -> str | None:
             match event:
                 case yaml.AliasEvent() | yaml.MappingStartEvent():
                     what = "an alias" if isinstance(event, yaml.AliasEvent) else "`key: value`"
-                    return f"{shown} is {what} in YAML, and no value of a parameter."
+                    return f"{shown} is {what} in YAML, which cannot be the value of a parameter."
                 case yaml.SequenceStartEvent():
                     depth += 1
                 case yaml.SequenceEndEvent():
@@ -85,7 +85,7 @@ def why_value_refused(value: str) -> str | None:
                 case yaml.ScalarEvent():
                     bare = event.style not in ("'", '"')
                     if depth and bare and ":" in event.value:
-                        return f"{shown} has a colon in a list, which stands in quotes."
+                        return f"in the list {shown}, a text with a colon has to be in quotes."
                     if not event.value and bare:
                         return f"{shown} is empty in YAML."
                     if depth:
@@ -213,18 +213,18 @@ def _of_names(rule: Rule) -> Reason | None:
         )
     if rule.right.startswith(("rostopic://", "rosservice://")):
         return RULE_SCHEME(
-            "`rostopic://` and `rosservice://` stand on the left side only.",
+            "`rostopic://` and `rosservice://` are allowed on the left side only.",
             "Leave the word out on the right side.",
         )
     if ":" in rule.left:
         before = rule.left.rsplit(":", 1)[0]
         return RULE_COLON(
-            f"a single `:` ends the name of the node that the rule is for, and `{before}` is no node's name there.",
+            f"a single `:` ends the name of the node that the rule is for, and `{before}` is not a node name.",
             "Write one name of a node, without slash, then `:`, then the old name: `NODE:old:=new`.",
         )
     if re.fullmatch(r"[+-]?\d[\d.]*", rule.right):
         return BEGINS_WITH_DIGIT(
-            "a number is no name, and `-r` gives a new name.",
+            "a number is not a name, but `-r` gives a new name.",
             f"A parameter gets its value with `-p`: `-p {rule.text}`.",
         )
     return _of_name(rule.left, "the left side", left=True) or _of_name(rule.right, "the right side")
@@ -238,11 +238,11 @@ def _of_name(name: str, what: str, left: bool = False) -> Reason | None:
         return NAME_EMPTY(f"{what} is empty.", "A rule is `old:=new`, without spaces around `:=`.")
     if ":=" in name:
         return RULE_FORM(
-            f"a second `:=` stands in {what}.",
+            f"there is a second `:=` in {what}.",
             "Every rule has its own `-r`: `-r old:=new -r old2:=new2`.",
         )
     if name.strip() != name or any(character.isspace() for character in name):
-        return NAME_SPACE(f"{what} holds a space.", "Write the rule as one word, without spaces around `:=`.")
+        return NAME_SPACE(f"{what} contains a space.", "Write the rule as one word, without spaces around `:=`.")
     if left and "*" in name:
         return WILDCARD("`*` is not implemented in remap rules.", "Write one rule for each name.")
     if re.search(r"\\[1-9]", name):
@@ -251,15 +251,15 @@ def _of_name(name: str, what: str, left: bool = False) -> Reason | None:
             "Write one rule for each name.",
         )
     if name in ("~", "~/", "/"):
-        return NAME_FORM(f"{what} is `{name}`, which is no name of its own.", "Write a name after it: `~/name`.")
+        return NAME_FORM(f"{what} is `{name}`, which is not a name by itself.", "Write a name after it: `~/name`.")
     if "~" in bare or (name.startswith("~") and not name.startswith("~/")):
         return NAME_FORM(
-            f"in {what}, `~` does not stand at the beginning with a slash behind it.",
+            f"in {what}, `~` is not at the beginning, or no slash follows it.",
             "`~/name` is a name below the node's own; elsewhere `~` means nothing.",
         )
     if any(part == "" for part in parts):
         where = "ends with a slash" if name.endswith("/") and "//" not in name else "has two slashes in a row"
-        return NAME_SLASH(f"{what} {where}.", "A slash stands between two parts of a name, and only there.")
+        return NAME_SLASH(f"{what} {where}.", "Write a slash only between two parts of a name.")
     return _of_parts(name, parts, what)
 
 
@@ -272,7 +272,7 @@ def _of_parts(name: str, parts: list[str], what: str) -> Reason | None:
     strange = re.search(r"[^A-Za-z0-9_/~]", name)
     if strange:
         return NAME_CHARACTERS(
-            f"`{name}` is not a name: `{strange[0]}` cannot stand in it.",
+            f"`{name}` is not a name, because a name cannot contain `{strange[0]}`.",
             "Names have letters from a to z, digits and underscores, with slashes between their parts.",
         )
     if "__" in name:
@@ -285,7 +285,7 @@ def _of_parts(name: str, parts: list[str], what: str) -> Reason | None:
 
 def _of_form(rule: Rule) -> Reason:
     if not rule.renames_topics or rule.left.startswith("__"):
-        why = f"`{rule.left}` cannot stand before `:={rule.right}`."
+        why = f"`{rule.left}` cannot be followed by `:={rule.right}`."
     else:
         why = f"`{rule.left}` and `{rule.right}` do not make a rule."
     return RULE_FORM(why, "A rule is `old:=new`, or `NODE:old:=new` for one node.")
@@ -314,7 +314,7 @@ def _of_parameter(name: str) -> Reason:
         return NAME_EMPTY("it has no name.", "A parameter rule is `name:=value`.")
     if ":" in name and (name.startswith("/") or name.count(":") > 1):
         return RULE_COLON(
-            "before the `:` stands the name of a node, without slashes.",
+            "the text before the `:` has to be the name of a node, without slashes.",
             "Remove the node name; the value then applies to every node of the process. A parameter file can name one"
             " node.",
         )
@@ -322,7 +322,7 @@ def _of_parameter(name: str) -> Reason:
         return WILDCARD("`*` is not implemented there.", "Write one rule for each parameter.")
     bare = name.rsplit(":", 1)[-1]
     if any(part == "" for part in bare.split(".")):
-        return NAME_SLASH("a part of the name is empty.", "A dot stands between two parts of a name.")
+        return NAME_SLASH("a part of the name is empty.", "Write a dot only between two parts of a name.")
     found = _of_parts(name, [part for part in re.split(r"[./]", bare) if part], "the name")
     if found and found.kind is BEGINS_WITH_DIGIT:
         return found
@@ -330,11 +330,11 @@ def _of_parameter(name: str) -> Reason:
     if strange:
         what = "a space" if strange[0].isspace() else f"`{strange[0]}`"
         return NAME_CHARACTERS(
-            f"{what} cannot stand in the name of a parameter on a command line.",
+            f"{what} is not allowed in the name of a parameter on a command line.",
             "Such names have letters from a to z, digits, underscores and dots.",
         )
     if name in ("__node", "__name", "__ns"):
-        return RULE_KIND(f"`{name}` is no parameter.", f"Names are changed with `-r`: `-r {name}:=NEW`.")
+        return RULE_KIND(f"`{name}` is not a parameter.", f"Names are changed with `-r`: `-r {name}:=NEW`.")
     return NAME_FORM(f"`{name}` is not a name.", "A parameter rule is `name:=value`.")
 
 

@@ -233,7 +233,7 @@ def _order(case: _Case) -> Reason | None:
             if made not in case.used or not matched:
                 return None
             return RULE_ORDER(
-                f"{case.said} `{earlier.text}` stands before it and matches the same name, and the first rule wins.",
+                f"{case.said} `{earlier.text}` comes before it and matches the same name, and the first rule wins.",
                 "Only the first rule that matches a name counts.",
             )
     return None

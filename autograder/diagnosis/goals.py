@@ -121,7 +121,7 @@ def why_no_feedback(scene: Scene, name: str) -> Reason | None:
             return NO_FEEDBACK(
                 f"`{inside.name}`: {called(thing)} {'runs' if thing.running else 'has run'}, and no feedback was "
                 "published.",
-                "`goal_handle.publish_feedback(...)` sends one feedback message; it belongs into the loop.",
+                "`goal_handle.publish_feedback(...)` sends one feedback message; call it in the loop.",
             )
     return None
 

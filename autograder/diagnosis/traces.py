@@ -15,7 +15,7 @@ PARAMETER_NOT_DECLARED = Kind("parameter-not-declared", "the error is a Paramete
 PARAMETER_TYPE = Kind("parameter-type", "the error is an InvalidParameterTypeException", Group.PROGRAM)
 REFUSED_CALL = Kind("refused-call", "the error is the system's refusal of a call", Group.PROGRAM)
 BUILTIN_CALLBACK = Kind(
-    "builtin-callback", "rclpy found no signature of a callback that is no Python function", Group.PROGRAM
+    "builtin-callback", "rclpy found no signature of a callback that is not a Python function", Group.PROGRAM
 )
 NOT_COPIED = Kind(
     "not-copied",
@@ -102,7 +102,7 @@ KNOWN_ERRORS = (
         "expecting type 'BYTE_ARRAY'",
         PARAMETER_TYPE,
         "An empty list as the default is a list of bytes for rclpy. Give the type in its place, as in "
-        '`declare_parameter("names", rclpy.Parameter.Type.STRING_ARRAY)`, or a list that holds something.',
+        '`declare_parameter("names", rclpy.Parameter.Type.STRING_ARRAY)`, or a list that is not empty.',
     ),
     (
         "InvalidParameterTypeException",

@@ -42,6 +42,6 @@ def type_name(interface: type) -> str:
         TypeError: the argument is not a class.
     """
     if not isinstance(interface, type):
-        raise TypeError(f"{interface!r:.80} is no message class; import one, such as std_msgs.msg.String")
+        raise TypeError(f"{interface!r:.80} is not a message class; import one, such as std_msgs.msg.String")
     package, kind = interface.__module__.split(".")[:2]
     return f"{package}/{kind}/{interface.__name__}"

@@ -168,7 +168,7 @@ class ActionInContext:
                 student_yaml.load(done, f"`{path.name}` with its substitutions done")
             except Refused as error:
                 if error.reason.kind is student_yaml.NOT_YAML:  # everything else is left to the program, as in `launch`
-                    raise refused(error.reason.because, "A value that holds a colon stands in quotes.") from None
+                    raise refused(error.reason.because, "Write a value with a colon in quotes.") from None
             return ParamsText(text=done)
 
         found: ParamsText = refusing(place.at("from"), read)

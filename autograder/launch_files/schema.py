@@ -70,7 +70,7 @@ def _action(entry: Any, number: int, place: Place) -> Action:
     if not isinstance(entry, dict) or len(entry) != 1:
         raise place.at(f"entry {number}").error(
             "each entry of the list is one action, such as `- node:`.",
-            "The keys of the action stand below it, indented further than its name.",
+            "Write the keys of the action below it, indented further than its name.",
         )
     kind, body = next(iter(entry.items()))
     here = place.at(f"{kind} (entry {number})")
@@ -114,7 +114,7 @@ def _keys(body: Any, schema: dict[str, Key], place: Place, ignored: bool = False
         if expected.needed and key not in body:
             hint = f"Write `{key}: …` below it."
             if key == "children":
-                hint = "Below `group:` stands a list: each entry begins with a `-`, such as `- push_ros_namespace:`."
+                hint = "Write a list below `group:`: each entry begins with a `-`, such as `- push_ros_namespace:`."
             raise place.error(f"the key `{key}` is missing.", hint)
     unknown = [] if ignored else [str(key) for key in body if key not in schema]
     if unknown:
@@ -230,7 +230,7 @@ def _parameter(entry: dict[str, Any], place: Place) -> dict[str, Any]:
     given = _keys(entry, schema, place)
     if "param" in given:
         if "value" in given or "type" in given:
-            raise place.error("`param` stands in the place of `value` and `type`.", "Leave those two out.")
+            raise place.error("`param` takes the place of `value` and `type`.", "Leave those two out.")
         return given
     if "value" not in given:
         raise place.error("the key `value` is missing.", "Write `value: …` below it.")

@@ -131,7 +131,7 @@ def _name(node: ast.Name) -> Any:
         return _NAMES[node.id]
     if hasattr(builtins, node.id) or hasattr(math, node.id):
         raise refused(f"`{node.id}` is not covered here.")
-    quoted = f"Python has `True` and `False`; a text stands in quotes: `'{node.id}'`."
+    quoted = f"Python has `True` and `False`; write a text in quotes: `'{node.id}'`."
     raise refused(f"Python knows no name `{node.id}` there.", quoted)
 
 
@@ -293,7 +293,7 @@ def check(text: Text) -> None:
             raise refused(
                 f"`{call.written}`: `{call.name}` takes {wanted} value{'s' if most != 1 else ''}, "
                 f"and {len(call.values)} {'is' if len(call.values) == 1 else 'are'} given.",
-                "A value with spaces stands in quotes.",
+                "Write a value with spaces in quotes.",
             )
 
 

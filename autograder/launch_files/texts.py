@@ -137,7 +137,7 @@ class _Reader:
                 )
         found += [unescaped(text[start:at])] if at > start else []
         if not found:
-            raise self.error("a value is missing after a space.", "Exactly one space stands before each value.")
+            raise self.error("a value is missing after a space.", "Write exactly one space before each value.")
         return tuple(found), at
 
 
@@ -194,5 +194,5 @@ def _pieces(part: str) -> list[str]:
         raise refused(
             f"a quotation mark is not closed in `{part.strip()[:60]}`: a command line is split into words before its "
             "substitutions are done.",
-            "What `$(var …)` stands for is one word in any case: leave the quotation marks around it out.",
+            "The value of `$(var …)` is one word in any case, so leave out the quotation marks around it.",
         ) from None

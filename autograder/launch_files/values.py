@@ -42,7 +42,7 @@ def read(value: Any, kind: Any) -> Value:
         Refused: `launch` refuses it.
     """
     if kind is not None and (not isinstance(kind, str) or kind not in _TYPES):
-        raise refused(f"`{kind}` is no type.", f"Types are {', '.join(_TYPES)}.")
+        raise refused(f"`{kind}` is not a type.", f"Types are {', '.join(_TYPES)}.")
     wanted, is_list = _TYPES[kind] if kind is not None else (None, False)
     if isinstance(value, list):
         if kind not in (None, "yaml") and not is_list:
@@ -50,8 +50,8 @@ def read(value: Any, kind: Any) -> Value:
         return Value(_list(value, wanted), wanted)
     if not isinstance(value, _SIMPLE):
         raise refused(
-            f"a parameter is a bool, a number, a text or a list of such, not {_shown(value)}.",
-            "A text stands in quotes.",
+            f"a parameter is a bool, a number, a text or a list of these, not {_shown(value)}.",
+            "Write a text in quotes.",
         )
     if is_list:  # `launch` accepts no text here, not even one that YAML would convert to a list
         raise refused(f"{_shown(value)} is not of the type `{kind}`.", "Write a list, such as `[1, 2]`.")
@@ -114,7 +114,7 @@ def read_as_yaml(text: str) -> Any:
     if not isinstance(value, _SIMPLE):
         raise refused(
             f"`{text[:60]}` is read as YAML, which makes {_shown(value)} of it; a parameter is a bool, a number, a "
-            "text or a list of such.",
+            "text or a list of these.",
             _OWN_QUOTES,
         )
     return value

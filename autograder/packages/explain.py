@@ -14,7 +14,7 @@ from autograder.packages.built import Built
 from autograder.reasons import Group, Kind, Reason
 
 INTERFACE_LINE = Kind(
-    "interface-line", "a line of an interface file is no field, or its name or type is not allowed", Group.BUILDING
+    "interface-line", "a line of an interface file is not a field, or its name or type is not allowed", Group.BUILDING
 )
 INTERFACE_TYPE = Kind(
     "interface-type", "an interface file uses a message type that the package does not have", Group.BUILDING
@@ -25,7 +25,7 @@ BUILD_LIMIT = Kind(
     "build-limit", "the build went over one of the limits of builds, which is named, and was ended", Group.BUILDING
 )
 PACKAGE_XML = Kind(
-    "package-xml", "package.xml is missing, or is no package description that ROS's tools accept", Group.BUILDING
+    "package-xml", "package.xml is missing, or is not a package description that ROS's tools accept", Group.BUILDING
 )
 PACKAGE_NAME = Kind("package-name", "package.xml gives the package another name than its folder has", Group.BUILDING)
 BUILD_TYPE = Kind(
@@ -215,7 +215,7 @@ _REASONS: list[tuple[str, _Reason]] = [
     (
         r"include_map\[pkg\].{0,2000}?KeyError: '([^']{1,200})'",
         lambda m: INTERFACE_DEPENDENCY(
-            f"An interface uses a message of `{m[1]}`, which rosidl_generate_interfaces is not told of.",
+            f"An interface uses a message of `{m[1]}`, but rosidl_generate_interfaces does not name this package.",
             f"Its last line names the packages whose messages are used: `DEPENDENCIES {m[1]}`.",
         ),
     ),
@@ -227,21 +227,21 @@ _REASONS: list[tuple[str, _Reason]] = [
         r"the passed dependency '([^']+)' has not been found before",
         lambda m: CMAKE_PACKAGE(
             f"CMakeLists.txt uses `{m[1]}` before it has looked it up.",
-            f"`find_package({m[1]} REQUIRED)` has to stand above.",
+            f"Put `find_package({m[1]} REQUIRED)` above the line that uses it.",
         ),
     ),
     (
         r'Unknown CMake command "rosidl_generate_interfaces"',
         lambda m: CMAKE_PACKAGE(
             "CMake does not know `rosidl_generate_interfaces`: the package that brings it was not looked up.",
-            "`find_package(rosidl_default_generators REQUIRED)` has to stand above.",
+            "Put `find_package(rosidl_default_generators REQUIRED)` above the line that uses it.",
         ),
     ),
     (
         r'Unknown CMake command "ament_(\w+)"',
         lambda m: CMAKE_PACKAGE(
             f"CMake does not know `ament_{m[1]}`: the package that brings it was not looked up.",
-            "`find_package(ament_cmake REQUIRED)` has to stand above.",
+            "Put `find_package(ament_cmake REQUIRED)` above the line that uses it.",
         ),
     ),
     (

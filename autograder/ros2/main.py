@@ -64,7 +64,7 @@ def run(
         TimeIsUp: the verb was ended because of the time limit.
     """
     if words and words[0] in ELSEWHERE:
-        print(f"`ros2 {words[0]}` is no part of this kit. {ELSEWHERE[words[0]]}", file=sys.stderr)
+        print(f"`ros2 {words[0]}` is not part of this kit. {ELSEWHERE[words[0]]}", file=sys.stderr)
         return 1
     try:
         options = _parser(words).parse_args(list(words))

@@ -24,7 +24,7 @@ def add_graph_options(parser: Parser) -> Parser:
     """Add the options of every verb that looks at the graph."""
     parser.add_argument("--spin-time", type=float, help="seconds to listen before the graph is believed")
     parser.add_argument("-s", "--use-sim-time", action="store_true", help="take the time from /clock")
-    parser.add_argument("--no-daemon", action="store_true", help="there is none: nothing changes")
+    parser.add_argument("--no-daemon", action="store_true", help="has no effect, because there is no daemon")
     return parser
 
 
