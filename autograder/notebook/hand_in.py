@@ -1,5 +1,4 @@
-"""Finds what a student should know before handing in a notebook: what is unsaved, not run, outdated, ignored or
-empty."""
+"""Finds what is unsaved, not run, outdated, ignored or empty in a notebook that a student hands in."""
 
 from __future__ import annotations
 

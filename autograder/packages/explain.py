@@ -1,4 +1,4 @@
-"""Says why a package was not built, according to its files if they show it, otherwise to what the build printed.
+"""Finds why a package was not built: from its files if they show the reason, otherwise from what the build printed.
 
 Each reason needs words in the tool's output that only this mistake causes. If none of these words are found, the reason
 quotes the first error that the build printed.

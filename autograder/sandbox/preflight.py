@@ -1,5 +1,4 @@
-"""The module that the preflight runs in the grading sandbox. It runs a program in the node sandbox that prints a
-word."""
+"""The module that the preflight runs in the grading sandbox: it starts a program in the node sandbox."""
 
 from __future__ import annotations
 

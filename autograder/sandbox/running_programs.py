@@ -204,7 +204,7 @@ class GroupLost(Exception):
 
 
 class RunningPrograms:
-    """The programs of one launch. `NodeSandbox.group` creates it; `end` or the end of a `with` block ends it.
+    """The group of the programs of one launch. `NodeSandbox.group` creates it; `end` or leaving a `with` block ends it.
 
     With full isolation, the launch has its own PID namespace: when the first process has ended, the kernel has ended
     everything in the namespace, no matter which process started it.

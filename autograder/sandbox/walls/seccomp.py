@@ -1,8 +1,8 @@
 """The system calls that are refused to a student's program, as a filter for the kernel.
 
-The filter lists what is denied, not what is allowed, because Python and DDS use most of the other calls, and the
-isolation is mainly that of namespaces, capabilities and limits. It denies what these do not prevent: memory that no
-limit counts, access to other processes, new namespaces, mounts, and rarely used parts of the kernel.
+The filter lists what is denied, not what is allowed, because Python and DDS use most of the other calls, and programs
+are isolated mainly by namespaces, capabilities and limits. It denies what these do not prevent: memory that no limit
+counts, access to other processes, new namespaces, mounts, and rarely used parts of the kernel.
 """
 
 from __future__ import annotations
