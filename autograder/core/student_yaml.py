@@ -18,7 +18,7 @@ import yaml
 from autograder.reasons import Group, Kind, Refused
 
 NOT_YAML = Kind(
-    "not-yaml", "the file is not YAML, or is a list or one text where lines `name: value` belong", Group.FILES
+    "not-yaml", "the file is not YAML, or is a list or a single text instead of lines `name: value`", Group.FILES
 )
 YAML_REFUSED = Kind(
     "yaml-refused",
@@ -59,10 +59,10 @@ _PROBLEMS = {
     "expected the node content": "a value is expected there; perhaps a bracket above is not closed",
     "expected ',' or": "a bracket is not closed, or a comma is missing",
     "found another document": "a second document begins there. Leave out the line `---`",
-    "expected '<document start>'": "the lines above are a whole value already, to which this does not belong",
-    "found unexpected document separator": "`---` stands inside a value",
+    "expected '<document start>'": "the lines above are already a complete value, so this line cannot follow them",
+    "found unexpected document separator": "`---` is inside a value",
     "second occurrence": "two anchors have this name. Give this one another",
-    "undefined alias": "no anchor of this name stands above it",
+    "undefined alias": "no anchor with this name is defined above it",
     "for merging": "`<<` takes a mapping, such as `*name`",
     "special characters are not allowed": "a character that cannot be printed is not allowed",
 }
@@ -81,7 +81,7 @@ class Twice:
 
     def __str__(self) -> str:
         """Say what the fault is, as the end of a sentence about the key."""
-        return "stands there twice, in lines {} and {} of the cell".format(*self.lines)
+        return "appears twice, in lines {} and {} of the cell".format(*self.lines)
 
 
 class Written(dict[Any, Any]):
@@ -144,7 +144,7 @@ def read(path: Path, table: bool = False, written: bool = False) -> Any:
             content = file.read(FILE_BYTES + 1)
     except OSError:
         because = f"No cell that begins with `%%file {path.name}` was found."
-        hint = "Check the first line of the cell; it must stand there unchanged."
+        hint = "Check the first line of the cell, which must not be changed."
         raise Refused(FILE_MISSING(because, hint)) from None
     try:
         text = content.decode("utf-8", "strict" if len(content) <= FILE_BYTES else "replace")
@@ -197,7 +197,7 @@ class _Loader(yaml.SafeLoader):
         event: Any = self.peek_event()  # type: ignore[no-untyped-call]
         if isinstance(event, yaml.AliasEvent):
             if event.anchor in self._open:
-                raise _RefusedError(event.start_mark, f"`*{event.anchor[:40]}` stands inside what it is to repeat")
+                raise _RefusedError(event.start_mark, f"`*{event.anchor[:40]}` is inside the value that it repeats")
             return self._written_out(super().compose_node(parent, index), event.start_mark, self._depth)
         if getattr(event, "tag", None) not in (None, "!", *_PLAIN_TAGS):
             tag = event.tag.replace(_PREFIX, "!!")[:40]
@@ -215,7 +215,7 @@ class _Loader(yaml.SafeLoader):
         if self._values > VALUES:
             raise _RefusedError(mark, f"the file has more than {VALUES} values")
         if depth >= DEPTH:
-            raise _RefusedError(mark, f"more than {DEPTH} lists and mappings stand inside one another")
+            raise _RefusedError(mark, f"lists and mappings are nested more than {DEPTH} levels deep")
 
     def _written_out(self, node: yaml.Node | None, mark: Any, depth: int) -> yaml.Node | None:
         """Return a copy of an alias's value and count all of its values, so that a short text cannot become large."""
@@ -261,7 +261,7 @@ class _Loader(yaml.SafeLoader):
                     continue
                 raise _RefusedError(
                     key_node.start_mark,
-                    f"the key `{key_node.value[:40]}` stands a second time; it is also in line {line}",
+                    f"the key `{key_node.value[:40]}` appears a second time; it is also in line {line}",
                 )
             first[key] = key_node
         return {**super().construct_mapping(node, deep), **twice}
