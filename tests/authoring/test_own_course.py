@@ -157,8 +157,8 @@ def test_nbgraders_own_settings_of_a_course_hold_everywhere(environment: Environ
 @pytest.mark.parametrize(
     ("address", "told"),
     [
-        ("gradebook.db", "no address of a gradebook"),
-        ("mysql+nodriver://h/db", "no address"),
+        ("gradebook.db", "not the address of a gradebook"),
+        ("mysql+nodriver://h/db", "not the address"),
         ("mysql://h/db", "driver"),
     ],
 )
