@@ -1,4 +1,4 @@
-"""Commands for who keeps a course: `new`, `lint`, `release`, `kit` and `gradescope`."""
+"""Commands for the authors of a course: `new`, `trust`, `lint`, `release`, `kit` and `gradescope`."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from autograder.cli.app import CourseOption, IsolationOption, app
 from autograder.core.results import Isolation
 
 new = typer.Typer(no_args_is_help=True)
-app.add_typer(new, name="new", help="Begin a course, or a lab in a course.")
+app.add_typer(new, name="new", help="Create a course, or a lab in a course.")
 
 
 @new.command("course")
@@ -65,10 +65,10 @@ def lint(
     lab: Annotated[str | None, typer.Argument(help="The lab; default: all of them.")] = None,
     static: Annotated[bool, typer.Option("--static", help="Only read the lab, and run nothing.")] = False,
     isolation: IsolationOption = Isolation.FULL,
-    jobs: Annotated[int, typer.Option(min=1, help="How many runs go on at once.")] = 4,
+    jobs: Annotated[int, typer.Option(min=1, help="The number of runs at the same time.")] = 4,
     course: CourseOption = None,
 ) -> None:
-    """Say what is wrong with a lab: in its cells and checks, in what students would receive, and when it runs."""
+    """Find mistakes in a lab: in its cells and checks, in what students would receive, and when it runs."""
     from autograder.authoring.lint.runs import run_findings
     from autograder.authoring.lint.static import course_findings, read_findings, release_findings
     from autograder.course.lab import lab_names, load_lab
