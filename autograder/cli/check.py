@@ -49,7 +49,7 @@ def check(
         Path | None, typer.Option(help="The folder of the course whose checks are run; default: the kit's own.")
     ] = None,
 ) -> None:
-    """Check one notebook in the same way as grading does, and report what is wrong and why.
+    """Check one notebook in the same way as grading does, and report what failed and why.
 
     Exit status: 0 all checks passed; 1 some failed; 2 wrong usage or set-up; 3 none failed, but some are undecided.
     """

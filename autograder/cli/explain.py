@@ -1,4 +1,4 @@
-"""`autograder explain`: all that is known of one submission, or of one check of it."""
+"""The command `autograder explain`, which shows everything that is known about a submission or one of its checks."""
 
 from __future__ import annotations
 

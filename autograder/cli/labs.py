@@ -52,7 +52,7 @@ def new_lab(
     name: Annotated[str, typer.Argument(help="Lower-case letters, digits and underscores, such as lab2_talkers.")],
     course: CourseOption = None,
 ) -> None:
-    """Write a small, complete lab with checks into the course, which you change into your own."""
+    """Write a small, complete lab with checks into the course. You then change it into your own lab."""
     from autograder.authoring.courses import new_lab as write
     from autograder.course.paths import course_root
 
@@ -105,7 +105,7 @@ def release(
     lab: Annotated[str | None, typer.Argument(help="The lab; default: all of them.")] = None,
     course: CourseOption = None,
 ) -> None:
-    """Generate what students receive, `labs/`, from `solutions/`; refuse a lab in which `lint` finds an error."""
+    """Generate `labs/`, which students receive, from `solutions/`. A lab in which `lint` finds an error is refused."""
     from autograder.authoring.release import START_PAGE, start_page
     from autograder.authoring.release import release as generate
     from autograder.core.files import write_beside
@@ -126,7 +126,7 @@ def kit(
     ] = None,
     course: CourseOption = None,
 ) -> None:
-    """Write what students get into build/release, as a folder and a zip: labs, a lock, the kit without solutions."""
+    """Write the student's kit to build/release, as a folder and a zip: labs, a lock, and the kit without solutions."""
     from autograder.authoring.student_kit import write_kit
     from autograder.course.paths import CoursePaths, course_root
 

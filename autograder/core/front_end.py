@@ -18,7 +18,7 @@ class Watcher(Protocol):
         """Say what the check waits for from now on. Return False if another wait is already shown."""
 
     def end(self) -> None:
-        """Say that the wait is over, whether or not what was waited for has come."""
+        """Say that the wait is over, whether or not it was successful."""
 
     def close(self) -> None:
         """Say that the programs have ended."""

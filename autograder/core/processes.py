@@ -15,7 +15,7 @@ _OF_A_LAUNCH = 192
 
 @dataclass(frozen=True)
 class Process:
-    """One line of the process list."""
+    """A process in the process list."""
 
     pid: int
     parent: int

@@ -169,7 +169,7 @@ class CellResult(_Model):
 
     @property
     def status(self) -> Status:
-        """The worst outcome: could not find out, then failed, then passed."""
+        """The status of the worst outcome. "Could not find out" is worse than "failed", and "failed" than "passed"."""
         statuses = {outcome.status for outcome in self.outcomes}
         if self.points is None or Status.UNKNOWN in statuses:
             return Status.UNKNOWN

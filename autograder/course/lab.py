@@ -69,7 +69,7 @@ class Answer:
     blank: str
     """The source that students receive."""
     solution: str
-    """The source that solves it, without the markers."""
+    """The source of the model answer, without the markers."""
     file: CellFile | None
     """The file that the blank cell names; None for an answer in plain text."""
     points: float | None

@@ -55,7 +55,7 @@ def _named(folder: Path) -> Path:
 
 
 def is_students_kit() -> bool:
-    """Return whether this is the environment of a student's kit, which has no solutions and grades nobody.
+    """Return whether this is the environment of a student's kit, which has no solutions and cannot grade a class.
 
     Such a kit has two courses. The student works in `labs/`. The labs below `kit/` are as they were handed out, and
     their checks are run.

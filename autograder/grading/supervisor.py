@@ -271,7 +271,7 @@ def _stuck(cell: Cell, run: SandboxRun, seconds: float) -> CheckResult:
     if not stacks:
         return undecided(cell, f"The grader took longer than {seconds:.0f} s.", run.stderr, STUCK)
     because = f"The grader got stuck in this check and was ended after {CELL_SECONDS + STUCK_SECONDS:.0f} s."
-    main_thread = stacks.strip().split("\n\n")[-1].splitlines()  # its newest call comes first
+    main_thread = stacks.strip().split("\n\n")[-1].splitlines()  # the newest call comes first
     check = undecided(cell, because, "\n".join(main_thread[: 1 + _LINES]), STUCK)
     check.flags.append(
         "The grader stopped answering while the programs of a check ran. Honest programs do not cause this, but a "

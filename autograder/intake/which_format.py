@@ -44,7 +44,7 @@ class Known:
     """What is known about a class before it is read."""
 
     is_student: Callable[[str], bool] = lambda _: False
-    """Returns whether a student with this name is in the roster or was taken in before."""
+    """A function that returns whether a student with this name is in the roster or was taken in before."""
     roster: bool = False
     """Whether there is a roster, so that somebody who is not in it is no student."""
     own: bool = False

@@ -29,10 +29,10 @@ def commands(result: SubmissionResult, notebook: Path) -> str:
 
 
 def summary(result: SubmissionResult) -> str:
-    """Return the step's summary: a table of the checks, and what is wrong below it.
+    """Return the summary of the step in Markdown: a table of the checks, and below it the findings.
 
     Args:
-        result: as its reader may see it.
+        result: the result as its reader may see it.
     """
     rows = [
         f"| {words.SYMBOL[words.verdict(check)]} | {_cell(check.title or check.grade_id)} | {words.points(check)} |"

@@ -30,7 +30,7 @@ class UnreadableError(Exception):
 
 
 def problem(title: str, reason: Reason) -> Outcome:
-    """Return an outcome that says what is wrong with a submission."""
+    """Return an outcome that describes a problem of a submission."""
     return Outcome(status=Status.FAILED, title=title, because=reason.because, hint=reason.hint, code=reason.kind.code)
 
 
