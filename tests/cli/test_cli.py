@@ -104,7 +104,7 @@ def test_what_lies_around_a_notebook_is_never_the_course(root: Path, tmp_path: P
     (evil / "toy.ipynb").write_bytes((root / "class" / "ann" / "toy.ipynb").read_bytes())
     for folder in (evil, evil / "labs"):
         status, _, err = run(folder, "check", str(evil / "toy.ipynb"))
-        assert status == 2 and "no notebook of a lab of this course" in err and f"Labs in {ROOT}: lab" in err
+        assert status == 2 and "does not belong to a lab of this course" in err and f"Labs in {ROOT}: lab" in err
     status, _, err = run(evil, "grade", "toy", ".")
     assert status == 2 and "is inside the submissions" in err
 
