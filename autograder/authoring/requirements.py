@@ -106,18 +106,19 @@ def read(path: Path) -> Requirements:
 
 def tasks(lab: Lab) -> list[str]:
     """Every sentence and every list item of the texts that set a task."""
+    checks = {check.grade_id for check in lab.checks}
     units: list[str] = []
     texts: list[str] = []
     for cell in lab.released:
-        if cell["cell_type"] == "markdown" and grade_id_of(cell) not in lab.answers:
+        grade_id = grade_id_of(cell)
+        answer = lab.answers.get(grade_id)
+        if cell["cell_type"] == "markdown" and answer is None:
             texts.append(source_of(cell))
             continue
-        answer = lab.answers.get(grade_id_of(cell))
-        if answer is not None and answer.file is not None:
+        if grade_id in checks or (answer is not None and answer.file is not None):
             for text in texts:
                 units += [unit for unit in _units(text) if unit not in units]
-        if answer is None or answer.file is not None:
-            texts = [] if answer is None else texts
+        texts = []
     return units
 
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import shlex
+import shutil
+import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -33,7 +35,10 @@ def new_course(
             f"\nThe folder could not be registered as a course of yours ({error.filename}: {error.strerror}), so"
             f" nbgrader's own commands will ignore its settings. Once it can be written, run: autograder trust {folder}"
         )
-    print(f"\nNext:\n  cd {shlex.quote(str(folder))}\n  autograder lint {FIRST_LAB}\n  autograder release")
+    command = (
+        "autograder" if shutil.which("autograder") else shlex.quote(str(Path(sys.executable).with_name("autograder")))
+    )
+    print(f"\nNext:\n  cd {shlex.quote(str(folder))}\n  {command} lint {FIRST_LAB}\n  {command} release")
 
 
 @app.command()

@@ -198,7 +198,8 @@ def _compare(grade_id: str, copies: list[dict[str, Any]], lab: Lab, submission: 
             problem(
                 f"the cell `{grade_id}` is as in the lab",
                 CHANGED_CELL(
-                    f"The cell `{grade_id}` was edited; the lab's own cell is run instead.",
+                    f"The cell `{grade_id}` differs from the lab's current one: it was edited, or it comes from an "
+                    "earlier version of the lab. The lab's current cell is run instead.",
                 ),
             )
         )

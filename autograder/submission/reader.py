@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import shlex
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,7 @@ from typing import Any
 from autograder.core.errors import KitError
 from autograder.core.files import signature
 from autograder.course.lab import Lab, lab_names, load_lab
+from autograder.course.paths import is_course
 from autograder.reasons import Group, Kind
 from autograder.submission.answers import Submission, take_answers, take_files, take_own_files
 from autograder.submission.notebook_file import UnreadableError, cells_of, grade_ids_in, problem
@@ -76,8 +78,11 @@ def lab_of(notebook: Path, name: str | None, root: Path) -> Lab:
     best = max(labs, key=lambda lab: len(ids & lab.answers.keys()), default=None)
     # Half of them: two courses may well call one cell alike.
     if best is None or 2 * len(ids & best.answers.keys()) < max(1, len(best.answers)):
+        here = next((one for one in (Path.cwd(), *Path.cwd().parents) if is_course(one) and one != root), None)
         raise KitError(
-            f"{notebook.name} is no notebook of a lab of this course.",
-            f"Name the lab: --lab NAME, or another course: --course FOLDER. Labs in {root}: {', '.join(names)}.",
+            f"{notebook.name} is no notebook of a lab of the course in {root}, which has {', '.join(names)}.",
+            f"If it belongs to the course that you are in, add: --course {shlex.quote(str(here))}"
+            if here is not None
+            else "Name the lab: --lab NAME, or another course: --course FOLDER",
         )
     return best

@@ -282,7 +282,7 @@ def test_what_cannot_be_read_is_said_with_its_place(tmp_path: Path, text: str, t
     [
         (f'launch:\n{CAMERA}, name: "$(arg side)"}}\n', "In ROS 2 it is `$(var NAME)`"),
         (f'launch:\n{CAMERA}, name: "${{side}}"}}\n', "`$(var NAME)`"),
-        ("launch:\n- group:\n    include: {file: x}\n", "Below `group:` stands a list"),
+        ("launch:\n- group:\n    include: {file: x}\n", "Write a list below `group:`"),
         ("launch:\n- include: {file: $(dirname)/a_launch.yaml}\n", "Is `a.launch.yaml` meant?"),
     ],
 )

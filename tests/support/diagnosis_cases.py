@@ -668,6 +668,16 @@ CASES = {
     "long_period": Case(
         "self.create_timer(500.0, lambda: None)\n", says="timer-period", because="every 500 s)", never=("silent",)
     ),
+    "in_milliseconds": Case(
+        "self.create_timer(250, lambda: None)\n", says="timer-period", because="For 250 milliseconds, write `0.25`."
+    ),
+    "another_sends": Case(
+        "self.create_timer(500.0, lambda: None)\n"
+        "self.create_subscription(String, '~/in', lambda message: self.out.publish(message), 10)\n",
+        says="silent",
+        never=("timer-period",),
+        ready=lambda it: it.age > 1,
+    ),
     "logs_later": Case(
         "self.create_timer(500.0, lambda: None)\n", says="timer-period", because="every 500 s)", ask=unlogged
     ),

@@ -39,6 +39,10 @@ class Expected:
     """A part of its reason."""
     lost: dict[str, list[str]] = field(default_factory=dict)
     """Titles of the parts that were lost, sorted, by grade_id of a check that has parts."""
+    breaks: dict[str, list[str]] = field(default_factory=dict)
+    """Words of the task that the student breaks, by grade_id of the check that holds them."""
+    follows: dict[str, str] = field(default_factory=dict)
+    """Why a check loses points though the student breaks nothing that it holds, by its grade_id."""
     flagged: list[str] = field(default_factory=list)
     """Checks with flags for the instructor, sorted."""
     problems: list[str] = field(default_factory=list)
@@ -77,7 +81,7 @@ def expected(lab: Lab, student: str, folder: Path | None = None) -> Expected:
     result.from_solution = told.get("base") == "solution"
     result.flagged = sorted(told.get("flagged") or [])
     for name, check in (told.get("checks") or {}).items():
-        _only(check, {"points", "code", "because", "lost"}, path)
+        _only(check, {"points", "code", "because", "lost", "breaks", "follows"}, path)
         result.points[name] = check["points"]
         if "code" in check:
             result.codes[name] = check["code"]
@@ -85,6 +89,10 @@ def expected(lab: Lab, student: str, folder: Path | None = None) -> Expected:
             result.lost[name] = sorted(check["lost"])
         if "because" in check:
             result.because[name] = check["because"]
+        if "breaks" in check:
+            result.breaks[name] = check["breaks"]
+        if "follows" in check:
+            result.follows[name] = check["follows"]
     return result
 
 

@@ -2,7 +2,8 @@
 
 `tests/classes/<lab>/requirements.yaml` says which words of the task's text are a requirement, which check (and which
 part of it) holds them, and which sample student breaks them; and which sentences only explain. The test of this module
-fails for a sentence that is in neither list. As a script it writes `tests/classes/REQUIREMENTS.md`.
+fails for a sentence that is in neither list. As a script it writes `tests/classes/REQUIREMENTS.md`, and
+`tests/classes/BROKEN_AND_LOST.md`, which says for each sample student which words are broken and which points are lost.
 """
 
 from __future__ import annotations
@@ -16,11 +17,12 @@ import kill_matrix
 import sample_class
 from places import ROOT
 
-from autograder.authoring.requirements import Requirements
+from autograder.authoring.requirements import Requirements, plain
 from autograder.authoring.requirements import read as read_file
 from autograder.course.lab import Lab, load_lab
 
 PAGE = ROOT / "tests" / "classes" / "REQUIREMENTS.md"
+LOST_PAGE = PAGE.with_name("BROKEN_AND_LOST.md")
 
 
 def read(lab: str) -> Requirements:
@@ -58,6 +60,75 @@ def defects(lab: Lab) -> list[str]:
 def untried(lab: Lab) -> list[str]:
     """Words with a quantifier or a bound for which it is not said how they are tried."""
     return read(lab.name).untried()
+
+
+def broken(lab: Lab, student: sample_class.Expected, check: str) -> list[str]:
+    """Words held by a check that a student breaks: those for whose sake he is in the class, and what else he breaks."""
+    named = [
+        one.text for one in read(lab.name).required if one.check == check and student.student in (one.student, one.once)
+    ]
+    return named + [text for text in map(plain, student.breaks.get(check, [])) if text not in named]
+
+
+def unexplained(lab: Lab) -> list[str]:
+    """Points that a sample student loses although nobody has said which words are broken, and the reverse."""
+    found = []
+    texts: dict[str, list[str]] = {}
+    for one in read(lab.name).required:
+        texts.setdefault(one.check, []).append(one.text)
+    for student in losers(lab):
+        gone = kill_matrix.lost(lab, student)
+        for check in gone:
+            if bool(broken(lab, student, check)) == bool(student.follows.get(check)):
+                found.append(f"{student.student}: {check} needs either `breaks` or `follows`")
+        for check, words in student.breaks.items():
+            found += [
+                f"{student.student}: {check}: not there: {w!r}"
+                for w in map(plain, words)
+                if w not in texts.get(check, [])
+            ]
+        found += [
+            f"{student.student}: {check} loses nothing" for check in {*student.breaks, *student.follows} - set(gone)
+        ]
+    return found
+
+
+def losers(lab: Lab) -> list[sample_class.Expected]:
+    """Students whose notebooks are the solution but for their mistakes."""
+    return [student for student in kill_matrix.one_mistake(lab) if student.from_solution]
+
+
+def lost_page() -> str:
+    """The page of what is broken and what is lost."""
+    lines = [
+        "# What is broken, and what is lost",
+        "",
+        "Made by `python tests/tools/requirements.py`. Each line: a sample student whose notebook is the solution but",
+        "for some mistakes, a check, the points that it takes, the parts of it that are lost, and the words of the",
+        "task that the student breaks. Where a check takes points although nothing is broken that it holds, the last",
+        "column says why: one mistake then costs more than its own part.",
+        "",
+    ]
+    for name in labs():
+        lab = load_lab(ROOT, name)
+        full = {check.grade_id: check.points or 0 for check in lab.checks}
+        rows, more = [], 0
+        for student in losers(lab):
+            for check in kill_matrix.lost(lab, student):
+                words = "<br>".join(text.replace("|", "\\|") for text in broken(lab, student, check))
+                more += not words
+                points = f"{full[check] - (student.points[check] or 0):g} of {full[check]:g}"
+                parts = "; ".join(student.lost.get(check, []))
+                why = words or student.follows.get(check, "")
+                rows.append(f"| {student.student} | `{check}` | {points} | {parts} | {why} |")
+        lines += [
+            f"## {name}",
+            "",
+            f"In {more} of {len(rows)} lines a check takes points for a mistake that another one holds.",
+            "",
+        ]
+        lines += ["| student | check | lost | parts | broken |", "|---|---|---|---|---|", *rows, ""]
+    return "\n".join(lines)
 
 
 def unheld(lab: Lab) -> list[str]:
@@ -104,8 +175,10 @@ if __name__ == "__main__":
             ("wrong", defects(lab)),
             ("without requirement", unheld(lab)),
             ("not said how it is tried", untried(lab)),
+            ("points lost without a reason", unexplained(lab)),
         ):
             print(f"{title}: {len(lines)}", *[f"  {line}" for line in lines], sep="\n")
     else:
         PAGE.write_text(page(), encoding="utf-8")
-        print(PAGE.relative_to(ROOT))
+        LOST_PAGE.write_text(lost_page(), encoding="utf-8")
+        print(PAGE.relative_to(ROOT), LOST_PAGE.relative_to(ROOT))

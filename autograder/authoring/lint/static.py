@@ -415,7 +415,11 @@ def _requirement_findings(lab: Lab, path: Path) -> Iterator[Finding]:
     for text in told.strangers(lab):
         yield Finding("", f"{path.name}: these words are not in the lab: {text}", warning=True)
     for text in told.uncovered(lab):
-        yield Finding("", f"nothing says which check holds this sentence: {text}", warning=True)
+        yield Finding(
+            "",
+            f"{path.name} lists this sentence neither as required nor as not required: {text}",
+            warning=True,
+        )
     for check in told.unheld(lab):
         yield Finding(check, "it holds no requirement.", warning=True)
 
