@@ -21,6 +21,11 @@ NOT_MADE_YET = Kind(
     "a method in the source code creates the publisher or subscription in a line that the probe has not seen executed",
     Group.NAMES,
 )
+TAKEN_AWAY = Kind(
+    "taken-away",
+    "the program made the publisher or subscription and destroyed it again",
+    Group.NAMES,
+)
 NODE_NAME = Kind("node-name", "the node is not there, others are", Group.NAMES)
 DUPLICATE_NODE = Kind("duplicate-node", "several nodes have one name", Group.NAMES)
 TOPIC_PRESENT = Kind("topic-present", "somebody uses the topic", Group.NAMES)
@@ -240,8 +245,8 @@ def why_no_endpoint(scene: Scene, topic: str, msg_type: type | None, kind: str, 
     }
     twins = _twins(scene, topic)
     near = [name for name in (meant or used) if not {node_of(end) for end in reach(name)} <= twins]
-    found = _idle_rule(scene, topic, node) or not_made_yet(scene, topic, kind, node)
-    found = found or _elsewhere(scene, topic, kind, near)
+    found = _idle_rule(scene, topic, node) or taken_away(scene, topic, kind, node)
+    found = found or not_made_yet(scene, topic, kind, node) or _elsewhere(scene, topic, kind, near)
     if found:
         return found
     opposite = observer.subscriptions(topic) if kind == "publisher" else observer.publishers(topic)
@@ -324,6 +329,20 @@ def why_no_service(scene: Scene, name: str, srv_type: type) -> Reason:
         said = f"There is no service `{name}`; the nearest name on the graph is"
         return _misspelt(scene, "service", close, said, SERVICE_NAME)
     return inside_reason(scene) or NO_SERVICE(f"No node offers the service `{name}`.")
+
+
+def taken_away(scene: Scene, topic: str, kind: str, node: str) -> Reason | None:
+    """Must have seen: such ends that the program made, and that it has destroyed all of them."""
+    for inside in scene.inside_of(node) if node else scene.insides:
+        things = inside.things.values() if inside.alive else ()
+        made = [thing for thing in things if (thing.kind, thing.name) == (kind, topic)]
+        if made and all(thing.destroyed for thing in made):
+            line = f" in {made[-1].made}" if made[-1].made else ""
+            return TAKEN_AWAY(
+                f"`{inside.name}` made the {kind} on `{topic}`{line} and has destroyed it since.",
+                f"Destroy the {kind} where it must no longer exist, and not before.",
+            )
+    return None
 
 
 def not_made_yet(scene: Scene, topic: str, kind: str, node: str) -> Reason | None:

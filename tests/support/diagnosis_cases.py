@@ -402,6 +402,7 @@ CASES = {
         base="LifecycleNode",
         says="not-made-yet",
         because="in `on_activate`, line",
+        never=("taken-away",),
         ask=no_end,
     ),
     "made_it_and_took_it_away": Case(
@@ -409,8 +410,9 @@ CASES = {
         LATER.format("on_configure", "    self.destroy_publisher(self.more)\n" + SUCCESS),
         TRIGGER,
         base="LifecycleNode",
-        says="topic-name",
-        never=("not-made-yet",),
+        says="taken-away",
+        because="and has destroyed it since",
+        never=("not-made-yet", "topic-name"),
         ask=no_end,
     ),
     # Why a service waits for another callback.
