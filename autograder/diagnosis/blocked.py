@@ -50,7 +50,7 @@ BUSY_WAIT = Kind(
 WRONG_TYPE = Kind("wrong-type", "the end, or the service that is asked, is there with another type", Group.NAMES)
 WAITS_FOR_LOCK = Kind(
     "waits-for-lock",
-    "a callback has not returned, and its thread is waiting for a lock; or two callbacks take the same lock",
+    "a callback has not returned; its thread waits for a lock or a semaphore; or two callbacks take the same lock",
     Group.BLOCKED,
 )
 
