@@ -454,6 +454,29 @@ CASES = {
         because="with self.lock:",
         never=("stuck-callback",),
     ),
+    "takes_the_lock_twice": Case(
+        "self.lock = threading.Lock()\n" + TALK + "self.create_timer(0.05, self.work)\n",
+        "def work(self):\n    with self.lock:\n        self.more()\n\n"
+        "def more(self):\n    with self.lock:\n        pass\n",
+        says="waits-for-lock",
+        because="it already holds this lock",
+        never=("stuck-callback",),
+    ),
+    "takes_another_lock": Case(
+        "self.lock, self.other = threading.Lock(), threading.Lock()\nself.other.acquire()\n"
+        + TALK
+        + "self.create_timer(0.05, self.work)\n",
+        "def work(self):\n    with self.lock:\n        self.more()\n\n"
+        "def more(self):\n    with self.other:\n        pass\n",
+        says="waits-for-lock",
+        because="what it takes there is not free",
+    ),
+    "never_gets_the_semaphore": Case(
+        "self.some = threading.Semaphore(2)\n" + TALK + "self.create_timer(0.05, self.work)\n",
+        "def work(self):\n    self.some.acquire()\n",
+        says="waits-for-lock",
+        because="because the semaphore that it needs is not free",
+    ),
     "holds_the_lock": Case(
         "self.lock = threading.Lock()\nself.create_timer(0.05, self.work)\n",
         "def work(self):\n    with self.lock:\n        time.sleep(60)\n",
@@ -504,6 +527,11 @@ CASES = {
         says="waits-for-service",
         because="`/gate`",
         never=("stuck-in-init",),
+    ),
+    "waits_long_for_nobody": Case(
+        "self.create_client(Trigger, '/parking').wait_for_service(timeout_sec=60.0)\n",
+        says="waits-for-service",
+        because="how long it is",
     ),
     "waits_for_the_second": Case(
         SERVER + "self.clients_ = [self.create_client(Trigger, name) for name in ('~/gate', '~/door')]\n",
@@ -822,6 +850,13 @@ CASES = {
         says="waits-for-lock",
         because="take the same `self.lock`",
         ask=together(),
+    ),
+    "a_semaphore_for_two": Case(
+        "self.some = threading.Semaphore(2)\n" + TWO.format(OWN, OWN),
+        "def slow(self):\n    with self.some:\n        time.sleep(0.1)\n",
+        THREADS.format(4),
+        ask=together(),
+        never=("waits-for-lock",),
     ),
     "a_lock_for_each": Case(
         "self.one, self.other = threading.Lock(), threading.Lock()\n"
