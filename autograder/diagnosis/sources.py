@@ -182,7 +182,7 @@ class Source:
         return min(held, default=0) if lines else 0
 
     def locks(self, line: int) -> dict[str, int]:
-        """Return what the function beginning in a line takes for itself alone (`with self.lock`), and in which line each.
+        """Return what the function beginning in a line takes for itself alone (`with self.lock`), and in which lines.
 
         What the functions that it calls in the same file take is included.
         """
