@@ -9,7 +9,7 @@ class ObstacleCounter(LifecycleNode):
 
     def __init__(self):
         super().__init__("obstacle_counter")
-        self.limit = self.declare_parameter("limit", 1.0).value
+        self.declare_parameter("limit", 1.0)
         self.react = self.ignore
 
     def ignore(self, distance):
@@ -21,6 +21,7 @@ class ObstacleCounter(LifecycleNode):
             self.out.publish(Int32(data=self.obstacles))
 
     def on_configure(self, previous):
+        self.limit = self.get_parameter("limit").value
         self.obstacles = 0
         self.out = self.create_publisher(Int32, "obstacles", 10)
         self.inp = self.create_subscription(Float64, "distance", lambda m: self.react(m), 10)
