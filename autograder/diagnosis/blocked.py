@@ -57,6 +57,7 @@ STUCK_AFTER = 1.5
 
 ONE_LOCK = "Callbacks that take the same lock run one after another, no matter which groups and threads they have."
 
+_WITH_A_LIMIT = "Wait with a time limit, and check whether the server is available."
 _OWN_GROUP = "Give the client, or the callback that waits, a callback group of its own."
 
 
@@ -111,11 +112,21 @@ def waits_for_a_service(inside: Inside) -> Reason | None:
         lasting = call.blocks or (call.what == "wait_for_service" and call.begun > 1)
         services = inside.observer.services()
         if lasting and client.name and client.name not in services:
-            limit = (
-                " If the service may be missing, wait with `timeout_sec`." if call.what == "wait_for_service" else ""
-            )
-            return _nobody_offers(client, services, f"{_at(inside, call)}this call waits for ", limit)
+            said = f"{_at(inside, call)}this call waits for "
+            return _nobody_offers(client, services, said, *_without_waiting(call))
     return None
+
+
+def _without_waiting(call: Call) -> tuple[str, str]:
+    """What to do where a service is missing: beside another name, and where there is none that is similar."""
+    if call.in_callback:
+        held = "A callback that waits holds up the others: ask `service_is_ready()`, and go on if it says no."
+        return f" {held}", held
+    if "timeout" in call.code:
+        return "", "It waits again and again: go on without the server, and ask later whether it is there."
+    if call.what == "wait_for_service":
+        return " If the service may be missing, wait with `timeout_sec`.", _WITH_A_LIMIT
+    return "", _WITH_A_LIMIT
 
 
 def asks_nobody(inside: Inside) -> Reason | None:
@@ -145,14 +156,16 @@ def asks_another_type(inside: Inside) -> Reason | None:
     return None
 
 
-def _nobody_offers(client: Thing, services: dict[str, list[str]], said: str, else_do: str = "") -> Reason:
+def _nobody_offers(
+    client: Thing, services: dict[str, list[str]], said: str, else_do: str = "", alone: str = _WITH_A_LIMIT
+) -> Reason:
     own = ("rcl_interfaces/", "type_description")  # what each node offers by itself
     close = nearest(client.name, [n for n, types in services.items() if not types[0].startswith(own)])
     given = f" (`{client.given}` in the code)" if client.given and client.given != client.name else ""
     return WAITS_FOR_SERVICE(
         f"{said}the service `{client.name}`{given}, but no node offers this service"
         + (f"; the nearest name is `{close}`." if close else "."),
-        "Wait with a time limit, and check whether the server is available."
+        alone
         if not close
         else "The name in the code begins with a slash, so the namespace does not apply to it. Remove the slash."
         if client.given.startswith("/") and close.endswith(client.given)

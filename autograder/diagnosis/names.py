@@ -6,7 +6,7 @@ import ast
 from collections.abc import Sequence
 
 from autograder.arguments import remap_rules, rule_effect
-from autograder.arguments.rule_effect import ABSOLUTE_NAME, TOPIC_NAME
+from autograder.arguments.rule_effect import ABSOLUTE_NAME, RULE_WITHOUT_MATCH, TOPIC_NAME
 from autograder.diagnosis.blocked import WRONG_TYPE
 from autograder.diagnosis.chain import inside_reason, reason_inside
 from autograder.diagnosis.inside import Inside
@@ -234,7 +234,9 @@ def why_no_endpoint(scene: Scene, topic: str, msg_type: type | None, kind: str, 
     }
     twins = _twins(scene, topic)
     near = [name for name in (meant or used) if not {node_of(end) for end in reach(name)} <= twins]
-    found = _idle_rule(scene, topic, node) or not_made_yet(scene, topic, kind, node)
+    found, unmade = _idle_rule(scene, topic, node), not_made_yet(scene, topic, kind, node)
+    if unmade and (found is None or found.kind is RULE_WITHOUT_MATCH):  # what is not made yet, no rule can have matched
+        found = unmade
     found = found or _elsewhere(scene, topic, kind, near)
     if found:
         return found
@@ -319,7 +321,7 @@ def why_no_service(scene: Scene, name: str, srv_type: type) -> Reason:
 def not_made_yet(scene: Scene, topic: str, kind: str, node: str) -> Reason | None:
     """Must have seen: a line in a method of the source that makes such an end, and no end made there."""
     for inside in scene.inside_of(node) if node else scene.insides:
-        for method, call in _makers(inside, topic, kind) if inside.alive else []:
+        for method, call in _makers(inside, _before_rules(scene, inside, topic), kind) if inside.alive else []:
             code = inside.source.line(call.lineno)
             return NOT_MADE_YET(
                 f"The code creates the {kind} on `{topic}` in `{method}`, line {call.lineno} (`{code}`), but the "
@@ -329,14 +331,26 @@ def not_made_yet(scene: Scene, topic: str, kind: str, node: str) -> Reason | Non
     return None
 
 
-def _makers(inside: Inside, topic: str, kind: str) -> list[tuple[str, ast.Call]]:
-    """The calls that would make this end and have made none, each with its method, other than `__init__`."""
+def _before_rules(scene: Scene, inside: Inside, topic: str) -> list[str]:
+    """The full names in the code of which the program's rules make this topic, and the topic's own."""
+    rules = map(remap_rules.parse, dict(zip(scene.insides, scene.rules, strict=False)).get(inside, ()))
+    return [topic] + [
+        rule_effect.full_name(rule.left, node)
+        for rule in rules
+        if rule and rule.renames_topics
+        for node in inside.nodes
+        if rule_effect.full_name(rule.right, node) == topic
+    ]
+
+
+def _makers(inside: Inside, topics: list[str], kind: str) -> list[tuple[str, ast.Call]]:
+    """The calls that would make an end on one of these and have made none, each with its method but for `__init__`."""
     used = {int(thing.made.rpartition(":")[2] or 0) for thing in inside.things.values() if thing.kind == kind}
     found = []
     for method, call in inside.source.method_calls():
         made = isinstance(call.func, ast.Attribute) and call.func.attr in _MAKERS[kind]
         names = [word.value for word in call.args if isinstance(word, ast.Constant) and isinstance(word.value, str)]
-        named = any(topic.endswith("/" + name.lstrip("~/")) for name in names)
+        named = any(topic.endswith("/" + name.lstrip("~/")) for name in names for topic in topics)
         if made and named and used.isdisjoint(range(call.lineno, (call.end_lineno or 0) + 1)) and method != "__init__":
             found.append((method, call))
     return found
