@@ -525,7 +525,7 @@ CASES = {
         never=("stuck-in-init",),
     ),
     "waits_in_a_callback": Case(
-        "client = self.create_client(Trigger, '/gate')\n"
+        "client = self.create_client(Trigger, '/zzz')\n"
         "self.create_timer(0.05, lambda: client.wait_for_service(timeout_sec=0.3))\n",
         says="waits-for-service",
         because="ask `service_is_ready()`",
