@@ -59,10 +59,8 @@ STUCK_AFTER = 1.5
 
 ONE_LOCK = "Callbacks that take the same lock run one after another, no matter which groups and threads they have."
 
-_NO_LIMIT = "Wait with a time limit, and check whether the server is available."
+_WITH_A_LIMIT = "Wait with a time limit, and check whether the server is available."
 _LIMITED = re.compile(r"wait_for_service\(\s*[^)\s]")
-_LIMIT_TOO_LONG = "The call has a time limit: look how long it is, and how often the program makes such a call."
-
 _OWN_GROUP = "Give the client, or the callback that waits, a callback group of its own."
 
 
@@ -117,14 +115,21 @@ def waits_for_a_service(inside: Inside) -> Reason | None:
         lasting = call.blocks or (call.what == "wait_for_service" and call.begun > 1)
         services = inside.observer.services()
         if lasting and client.name and client.name not in services:
-            where = f"{_at(inside, call)}this call waits for "
-            if _LIMITED.search(call.code):
-                return _nobody_offers(client, services, where, missing=_LIMIT_TOO_LONG)
-            limit = (
-                " If the service may be missing, wait with `timeout_sec`." if call.what == "wait_for_service" else ""
-            )
-            return _nobody_offers(client, services, where, limit)
+            said = f"{_at(inside, call)}this call waits for "
+            return _nobody_offers(client, services, said, *_without_waiting(call))
     return None
+
+
+def _without_waiting(call: Call) -> tuple[str, str]:
+    """Return what to do if a service is missing: in addition to another name, and if no name is similar."""
+    if call.in_callback:
+        held = "A callback that waits holds up the others: ask `service_is_ready()`, and go on if it says no."
+        return f" {held}", held
+    if _LIMITED.search(call.code):
+        return "", "The call has a time limit: look how long it is, and how often the program makes such a call."
+    if call.what == "wait_for_service":
+        return " If the service may be missing, wait with `timeout_sec`.", _WITH_A_LIMIT
+    return "", _WITH_A_LIMIT
 
 
 def asks_nobody(inside: Inside) -> Reason | None:
@@ -155,7 +160,7 @@ def asks_another_type(inside: Inside) -> Reason | None:
 
 
 def _nobody_offers(
-    client: Thing, services: dict[str, list[str]], said: str, else_do: str = "", missing: str = _NO_LIMIT
+    client: Thing, services: dict[str, list[str]], said: str, else_do: str = "", alone: str = _WITH_A_LIMIT
 ) -> Reason:
     own = ("rcl_interfaces/", "type_description")  # the services that every node offers by default
     close = nearest(client.name, [n for n, types in services.items() if not types[0].startswith(own)])
@@ -163,7 +168,7 @@ def _nobody_offers(
     return WAITS_FOR_SERVICE(
         f"{said}the service `{client.name}`{given}, but no node offers this service"
         + (f"; the nearest name is `{close}`." if close else "."),
-        missing
+        alone
         if not close
         else "The name in the code begins with a slash, so the namespace does not apply to it. Remove the slash."
         if client.given.startswith("/") and close.endswith(client.given)

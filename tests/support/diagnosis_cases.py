@@ -5,7 +5,7 @@ from __future__ import annotations
 import textwrap
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from rclpy.duration import Duration
 from rclpy.qos import DurabilityPolicy, LivelinessPolicy, QoSProfile
@@ -189,6 +189,12 @@ def gate(self, request, response):
 
 def no_end(scene: Scene, name: str) -> Reason | None:
     return diagnosis.why_no_endpoint(scene, f"/{name}/more", String, "publisher", f"/{name}")
+
+
+def no_end_under_a_rule(scene: Scene, name: str) -> Reason | None:
+    """As if the program had been given a rule for what it makes in `on_activate`."""
+    ruled = replace(scene, rules=[["~/more:=path"]] * len(scene.programs))
+    return diagnosis.why_no_endpoint(ruled, "/path", String, "publisher", f"/{name}")
 
 
 LATER = "def {}(self, state):\n    self.more = self.create_publisher(String, '~/more', 10)\n{}"
@@ -405,6 +411,21 @@ CASES = {
         never=("taken-away",),
         ask=no_end,
     ),
+    "makes_it_in_activate_under_a_rule": Case(
+        methods=LATER.format("on_activate", SUCCESS),
+        main=TRIGGER,
+        base="LifecycleNode",
+        says="not-made-yet",
+        because="in `on_activate`, line",
+        never=("rule-without-match",),
+        ask=no_end_under_a_rule,
+    ),
+    "no_end_for_a_rule": Case(
+        says="rule-without-match",
+        because="nothing is called",
+        never=("not-made-yet",),
+        ask=no_end_under_a_rule,
+    ),
     "made_it_and_took_it_away": Case(
         TALK,
         LATER.format("on_configure", "    self.destroy_publisher(self.more)\n" + SUCCESS),
@@ -532,6 +553,12 @@ CASES = {
         "self.create_client(Trigger, '/parking').wait_for_service(timeout_sec=60.0)\n",
         says="waits-for-service",
         because="how long it is",
+    ),
+    "waits_in_a_callback": Case(
+        "client = self.create_client(Trigger, '/zzz')\n"
+        "self.create_timer(0.05, lambda: client.wait_for_service(timeout_sec=0.3))\n",
+        says="waits-for-service",
+        because="ask `service_is_ready()`",
     ),
     "waits_for_the_second": Case(
         SERVER + "self.clients_ = [self.create_client(Trigger, name) for name in ('~/gate', '~/door')]\n",
