@@ -119,8 +119,8 @@ KNOWN_ERRORS = (
     (
         "no signature found for builtin",
         BUILTIN_CALLBACK,
-        "rclpy looks at the parameters of a callback. Some of Python's own functions, such as the `append` of a deque, do "
-        "not tell theirs: put the call into a `def` or a `lambda` of your own.",
+        "rclpy looks at the parameters of a callback. Some of Python's own functions, such as the `append` of a deque, "
+        "do not tell theirs: put the call into a `def` or a `lambda` of your own.",
     ),
     (
         "'NoneType' object is not callable",
