@@ -1,7 +1,8 @@
-"""Why points were lost: the kinds of reasons that the kit knows, and a reason that was established.
+"""Why points were lost: the kinds of reasons that the kit knows, and the reasons given for one submission.
 
-A kind is declared once, in the module that gives it, and everything else is made from the declaration: the page of
-reason codes, the picture in a report, and what a course says about where to read on (`[sections]` in `course.toml`).
+A kind is declared once, in the module that gives reasons of this kind. Everything else is derived from the
+declaration: the page of reason codes, the picture in a report, and where a course tells students to read on
+(`[sections]` in `course.toml`).
 
     TOPIC_PRESENT = Kind("topic-present", "somebody uses the topic", Group.NAMES)
 
@@ -19,7 +20,7 @@ from typing import Literal
 
 
 class Group(StrEnum):
-    """The headings of the page of reason codes, in its order."""
+    """The headings of the page of reason codes, in the order of the page."""
 
     PROGRAM = "The program"
     CALLBACKS = "Errors in callbacks"
@@ -52,13 +53,13 @@ class Kind:
     """A kind of reason."""
 
     code: str
-    """A short word that stays the same when the sentences change: results, exports and statistics use it."""
+    """A short identifier that stays the same when the sentences change. Results, exports and statistics use it."""
     seen: str
-    """What must have been seen before such a reason is given."""
+    """What must have been observed before a reason of this kind is given."""
     group: Group | None
-    """The heading of the page of reason codes; None: the kind belongs to a lab, and is not on that page."""
+    """The heading on the page of reason codes. It is None for a kind that belongs to a lab and is not on that page."""
     picture: Literal["", "timeline", "qos"] = ""
-    """The picture that shows it: the callbacks over time, or the offered and requested QoS."""
+    """The picture that illustrates it: the callbacks over time, or the offered and requested QoS."""
 
     def __post_init__(self) -> None:
         """Register the kind.
@@ -79,13 +80,13 @@ class Kind:
 
 @dataclass(frozen=True)
 class Reason:
-    """Why something did not happen: established, or what was observed in place of a reason."""
+    """The established reason why something did not happen, or, if none was established, what was observed instead."""
 
     kind: Kind
     because: str
     """One or two sentences for the student."""
     hint: str = ""
-    """What to do."""
+    """What the student can do."""
 
     @property
     def code(self) -> str:
@@ -94,23 +95,23 @@ class Reason:
 
 
 class Refused(Exception):
-    """What a student wrote cannot be used; the message is the reason's sentence."""
+    """Raised if something that a student wrote cannot be used; the message is the sentence of the reason."""
 
     def __init__(self, reason: Reason, place: str = "") -> None:
-        """Keep the reason, and the place that its sentence begins with, if it names one."""
+        """Keep the reason, and the place in the file with which its sentence begins, if there is one."""
         super().__init__(reason.because)
         self.reason, self.place = reason, place
 
 
 def kind_of_lab(code: str) -> Kind:
-    """Return the kind of a reason whose code a check cell gives: one of the kit's, or one of the lab's own."""
+    """Return the kind with a code that a check cell gives: either a kind of the kit or one of the lab's own."""
     return KINDS.get(code) or Kind(code, "what the lab says", None)
 
 
 def all_kinds() -> dict[str, Kind]:
-    """Return every kind of the kit by its code; all modules of the kit are imported for it."""
+    """Return every kind of the kit by its code. This imports all modules of the kit."""
     for module in pkgutil.walk_packages([str(Path(__file__).parent)], "autograder."):
-        # What runs inside a student's process knows nothing of the kit.
+        # The modules that run inside a student's process declare no kinds and do not use the kit.
         if not module.name.startswith("autograder.sandbox.inside"):
             importlib.import_module(module.name)
     return KINDS

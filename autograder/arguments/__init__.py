@@ -1,1 +1,1 @@
-"""What a ROS program is started with: remap rules and parameters."""
+"""The arguments with which a ROS program is started: remap rules and parameters."""

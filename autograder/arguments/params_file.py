@@ -1,4 +1,4 @@
-"""Which nodes a parameter file is for: its keys, matched as rcl matches them."""
+"""Finds the nodes to which a parameter file applies. Its keys are matched as rcl matches them."""
 
 from __future__ import annotations
 
@@ -20,28 +20,29 @@ _REFUSED = re.compile(
     r"(?: at line (?P<line>\d+))?(?:, at /|\s*$)",
     re.MULTILINE,
 )
-"""What rcl says of a parameter file that it cannot read."""
+"""The error message of rcl about a parameter file that it cannot read."""
 _ABOVE = (
-    "Below a node's name stands `ros__parameters:`, with two underscores, and below that, indented further, the names "
-    "of the parameters with their values, without dashes."
+    "Write `ros__parameters:`, with two underscores, below a node's name. Below that, indented further, write the "
+    "names of the parameters with their values, without dashes."
 )
 _WHOLE = (
-    "The key is the node's full name, such as `/car/front_demo:`; of keys that stand below one another each is a part "
-    "of it."
+    "The key is the node's full name, such as `/car/front_demo:`. If keys are nested, each of them is a part of that "
+    "name."
 )
 _IN_WORDS = {
-    "value before ros__parameters": ("has a value there that is no `name: value` below `ros__parameters:`", _ABOVE),
+    "value before ros__parameters": ("has a value there that is not a `name: value` below `ros__parameters:`", _ABOVE),
     "aliasing": ("has an anchor (`&`) or an alias (`*`), which ROS 2 does not read", "Write the values out."),
-    "repeated forward slash": ("has keys that together make `{what}`, which is no node's name", _WHOLE),
+    "repeated forward slash": ("has keys that together make `{what}`, which is not a node name", _WHOLE),
     "node name must not be empty": ("has a key that ends with a slash", _WHOLE),
 }
-"""By rcl's words: what is wrong, and what to do."""
+"""For the words in rcl's message: what is wrong, and what the student can do."""
 
 
 def unreadable(words: Sequence[str], folder: Path) -> Refused | None:
-    """Why a program cannot start with these words: the first of its parameter files that is no YAML at all.
+    """Return why a program cannot start with this command line: its first parameter file that is not YAML.
 
-    The program itself would only end with the parser's own words. What it might read after all is not decided here.
+    The program itself would only end with the parser's message. Files that a program may be able to read are not
+    refused here.
     """
     for option, file in itertools.pairwise(words):
         if option == "--params-file" and (folder / file).is_file():
@@ -54,7 +55,7 @@ def unreadable(words: Sequence[str], folder: Path) -> Refused | None:
 
 
 def text_of(folder: Path, file: str) -> str:
-    """A parameter file's text; empty where there is none that a program could read as one."""
+    """Return the text of a parameter file, or an empty text if a program cannot read such a file."""
     try:
         with (folder / file).open("rb") as opened:
             return opened.read(FILE_BYTES).decode("utf-8", "replace")
@@ -63,23 +64,26 @@ def text_of(folder: Path, file: str) -> str:
 
 
 def node_keys(text: str) -> list[str]:
-    """The node names that the file's values are for, as full names; wildcards are kept. Empty if it is no such file."""
+    """Return the full names of the nodes that the file has values for, with wildcards as they are.
+
+    The list is empty if the text is not a parameter file.
+    """
     return [node for node, _ in _sections(text)]
 
 
 def names_for(text: str, node: str) -> list[str]:
-    """The names of the parameters that the file has values for, as far as they are for this node."""
+    """Return the names of the parameters for which the file has values for this node."""
     return [str(name) for key, values in _sections(text) if is_for(key, node) for name in values]
 
 
 def _sections(text: str) -> list[tuple[str, list[str]]]:
-    """Each `ros__parameters` of a file: the full name of the node that it is for, and the names below it.
+    """Return, for each `ros__parameters` of a file, the full name of its node and the names of the parameters below it.
 
-    Read as rcl reads it: several documents, keys that stand twice, anchors and tags are all the same to it. It refuses
-    a file with an alias, and then there are none.
+    The file is read as rcl reads it: several documents, duplicate keys, anchors and tags are accepted. rcl refuses a
+    file with an alias, so the list is empty for such a file.
     """
     found: list[tuple[str, list[str]]] = []
-    path: list[str | None] = []  # for each collection that is open: the key in it that is being read
+    path: list[str | None] = []  # for each open mapping: the key whose value is being read
     lists = 0
 
     def end_value() -> None:
@@ -120,7 +124,7 @@ def _sections(text: str) -> list[tuple[str, list[str]]]:
 
 
 def why_refused(error: str, folder: Path) -> Reason | None:
-    """Why rcl could not read a parameter file, by what a program printed."""
+    """Return why rcl could not read a parameter file, according to what the program printed."""
     match = _REFUSED.search(error)
     if match is None or not (folder / match["file"]).is_file():
         return None
@@ -133,9 +137,12 @@ def why_refused(error: str, folder: Path) -> Reason | None:
 
 
 def is_for(key: str, node: str) -> bool:
-    """Whether values below this key reach the node with this full name: `*` is one part of a name, `**` any number."""
+    """Whether values below this key apply to the node with this full name.
+
+    `*` stands for one part of a name, and `**` for any number of parts.
+    """
     names = node.strip("/").split("/")
-    reached = {0}  # how many of the node's names the key's parts so far can stand for
+    reached = {0}  # how many parts of the node's name the parts of the key read so far can match
     for part in key.strip("/").split("/"):
         if part == "**":
             reached = set(range(min(reached), len(names) + 1))
@@ -147,7 +154,7 @@ def is_for(key: str, node: str) -> bool:
 
 
 def why_not_reached(text: str, node: str) -> str | None:
-    """Why a parameter file's values do not reach a node, as a sentence; None if they do, or the file has none."""
+    """Return why the values of a parameter file do not apply to a node; None if they do, or if the file has none."""
     keys = node_keys(text)
     if not keys or any(is_for(key, node) for key in keys):
         return None

@@ -1,13 +1,13 @@
-"""Remap rules and parameter rules on a command line, as rcl (Jazzy) has them, and why one is refused.
+"""Reads remap rules and parameter rules on a command line as rcl (Jazzy) does, and says why it refuses one.
 
-A text is cut into lexemes from left to right, and these must follow one another in a fixed order:
+A text is cut into lexemes from left to right, and the lexemes must follow one another in a fixed order:
 
     remap rule:     [token ":"]  ("__node" | "__name") ":=" token
                     [token ":"]  "__ns" ":=" "/" [token {"/" token} ["/"]]
                     [token ":"]  ["rostopic://" | "rosservice://"] name ":=" name
     name:           ["~/" | "/"] token {"/" token}
     parameter rule: [token ":"]  part {"." part} ":=" value, where a part has tokens and slashes in any order
-    token:          letters, digits and single underscores; it does not begin with a digit, nor with two underscores
+    token:          letters, digits and single underscores; it begins with neither a digit nor two underscores
 
 rcl reads the value of a parameter rule as YAML: one plain value, or a list of values of one type.
 """
@@ -33,11 +33,11 @@ NAME_FORM = Kind("name-form", "`~` is in a place where it has no meaning, or the
 NAMESPACE_WITHOUT_SLASH = Kind("namespace-without-slash", "the new namespace does not begin with a slash", Group.RULES)
 NAMESPACE_END = Kind("namespace-end", "the new namespace ends with a slash", Group.RULES)
 RULE_SPECIAL = Kind("rule-special", "`__node` or `__ns` is misspelt, or something else is in their place", Group.RULES)
-RULE_SCHEME = Kind("rule-scheme", "`rostopic://` or `rosservice://` stands on the right side", Group.RULES)
-RULE_COLON = Kind("rule-colon", "what stands before a single `:` is no name of a node", Group.RULES)
+RULE_SCHEME = Kind("rule-scheme", "`rostopic://` or `rosservice://` is on the right side", Group.RULES)
+RULE_COLON = Kind("rule-colon", "the text before a single `:` is not the name of a node", Group.RULES)
 BEGINS_WITH_DIGIT = Kind("begins-with-digit", "a part of a name begins with a digit", Group.RULES)
 NAME_EMPTY = Kind("name-empty", "a side of the rule is empty", Group.RULES)
-NAME_SPACE = Kind("name-space", "a name holds a space", Group.RULES)
+NAME_SPACE = Kind("name-space", "a name contains a space", Group.RULES)
 WILDCARD = Kind("wildcard", "a rule has a `*`, which ROS 2 does not implement", Group.RULES)
 NAME_SLASH = Kind("name-slash", "a slash or a dot is not followed by a part of a name", Group.RULES)
 NAME_CHARACTERS = Kind("name-characters", "a name contains a character that is not allowed", Group.RULES)
@@ -57,16 +57,16 @@ _DOUBLE = re.compile(
 )
 
 _LONGEST_INTEGER = 1000
-"""Characters."""
+"""The number of characters from which a number is not read as an integer."""
 
-# A comma behind a tag belongs to the tag for rcl.
+# rcl reads a comma behind a tag as a part of the tag.
 _TAG = re.compile(r"(![\w-]*),")
 LIBYAML = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
-"""The library that rcl reads YAML with; it differs from PyYAML's own reader in tabs and colons."""
+"""The library with which rcl reads YAML. It treats tabs and colons differently from PyYAML's own reader."""
 
 
 def why_value_refused(value: str) -> str | None:
-    """Why rcl does not take a text for a value, as a sentence; None if it does."""
+    """Return why rcl does not accept a text as a value, as a sentence; None if it does."""
     shown = f"`{value[:60]}`"
     if not value:
         return "it has no value."
@@ -77,7 +77,7 @@ def why_value_refused(value: str) -> str | None:
             match event:
                 case yaml.AliasEvent() | yaml.MappingStartEvent():
                     what = "an alias" if isinstance(event, yaml.AliasEvent) else "`key: value`"
-                    return f"{shown} is {what} in YAML, and no value of a parameter."
+                    return f"{shown} is {what} in YAML, which cannot be the value of a parameter."
                 case yaml.SequenceStartEvent():
                     depth += 1
                 case yaml.SequenceEndEvent():
@@ -85,7 +85,7 @@ def why_value_refused(value: str) -> str | None:
                 case yaml.ScalarEvent():
                     bare = event.style not in ("'", '"')
                     if depth and bare and ":" in event.value:
-                        return f"{shown} has a colon in a list, which stands in quotes."
+                        return f"in the list {shown}, a text with a colon has to be in quotes."
                     if not event.value and bare:
                         return f"{shown} is empty in YAML."
                     if depth:
@@ -103,7 +103,7 @@ def _kind(value: str, *, plain: bool) -> str:
         return "text"
     if value in _BOOLS:
         return "bool"
-    # Python reads no number of thousands of digits, and rcl takes none that long for an integer.
+    # Python does not read a number with thousands of digits, and rcl does not read one that long as an integer.
     if len(value) < _LONGEST_INTEGER and _INTEGER.fullmatch(value) and -(2**63) <= _integer(value) < 2**63:
         return "integer"
     return "double" if _DOUBLE.fullmatch(value) else "text"
@@ -123,24 +123,24 @@ _LEXEMES = re.compile(
 
 @dataclass(frozen=True)
 class Rule:
-    """`PREFIX:LEFT:=RIGHT`, as it stands after `-r`."""
+    """A remap rule, `PREFIX:LEFT:=RIGHT`, as it is written after `-r`."""
 
     text: str
     prefix: str
     left: str
-    """Without `rostopic://` and `rosservice://`."""
+    """The left side without `rostopic://` and `rosservice://`."""
     right: str
     kind: str = ""
     """`topic` or `service` if the rule is for one of them only."""
 
     @property
     def renames_topics(self) -> bool:
-        """Whether it is about topics and services, and not about the node itself."""
+        """Whether the rule renames topics and services, and not the node itself."""
         return self.left not in ("__ns", "__node", "__name")
 
 
 def parse(text: str) -> Rule | None:
-    """Read a remap rule, also one that rcl refuses; None without a `:=`."""
+    """Read a remap rule, even one that rcl refuses; return None if the text has no `:=`."""
     left, separator, right = text.partition(":=")
     if not separator:
         return None
@@ -153,7 +153,7 @@ def parse(text: str) -> Rule | None:
 
 
 def _shape(text: str) -> str:
-    """The lexemes of a text as a word with one letter each."""
+    """Return the lexemes of a text as a word with one letter for each lexeme."""
     letters = {
         "scheme": "u", "node": "N", "ns": "S", "private": "~", "token": "t", "separator": "=", "colon": ":",
         "slash": "/", "dot": ".", "wild": "*", "back": "\\", "other": "?",
@@ -166,7 +166,10 @@ _PARAMETER = re.compile(r"(t:)?[t/]+(\.[t/]+)*")
 
 
 def why_remap_refused(text: str) -> Reason | None:
-    """Why rcl does not take a remap rule: at `rclpy.init`, or for its namespace when the node is made."""
+    """Return why rcl refuses a remap rule; None if it does not.
+
+    rcl refuses it in `rclpy.init`, or, because of the namespace in it, when the node is created.
+    """
     rule = parse(text)
     if rule is None:
         return RULE_FORM(f"`{text}` is not a remap rule: it has no `:=`.", "A rule is `old:=new`.")
@@ -178,7 +181,7 @@ def why_remap_refused(text: str) -> Reason | None:
 
 
 def _of_node(rule: Rule) -> Reason | None:
-    """What is wrong with the new name or namespace of a node."""
+    """Return what is wrong with the new name or namespace of a node."""
     right = rule.right
     if rule.left in ("__node", "__name"):
         if "/" in right:
@@ -200,7 +203,7 @@ def _of_node(rule: Rule) -> Reason | None:
 
 
 def _of_names(rule: Rule) -> Reason | None:
-    """What is wrong with the names of a rule for topics and services."""
+    """Return what is wrong with the names in a rule for topics and services."""
     if not rule.renames_topics:
         return None
     if rule.left.lower() in ("__ns", "__node", "__name", "__namespace", "ns", "_ns", "_node") and "__" in rule.left:
@@ -210,36 +213,36 @@ def _of_names(rule: Rule) -> Reason | None:
         )
     if rule.right.startswith(("rostopic://", "rosservice://")):
         return RULE_SCHEME(
-            "`rostopic://` and `rosservice://` stand on the left side only.",
+            "`rostopic://` and `rosservice://` are allowed on the left side only.",
             "Leave the word out on the right side.",
         )
     if ":" in rule.left:
         before = rule.left.rsplit(":", 1)[0]
         return RULE_COLON(
-            f"a single `:` ends the name of the node that the rule is for, and `{before}` is no node's name there.",
+            f"a single `:` ends the name of the node that the rule is for, and `{before}` is not a node name.",
             "Write one name of a node, without slash, then `:`, then the old name: `NODE:old:=new`.",
         )
     if re.fullmatch(r"[+-]?\d[\d.]*", rule.right):
         return BEGINS_WITH_DIGIT(
-            "a number is no name, and `-r` gives a new name.",
+            "a number is not a name, but `-r` gives a new name.",
             f"A parameter gets its value with `-p`: `-p {rule.text}`.",
         )
     return _of_name(rule.left, "the left side", left=True) or _of_name(rule.right, "the right side")
 
 
 def _of_name(name: str, what: str, left: bool = False) -> Reason | None:
-    """What is wrong with one name; None if it can be a name."""
+    """Return what is wrong with one name; None if it is a valid name."""
     bare = name[2:] if name.startswith("~/") else name.removeprefix("/")
     parts = bare.split("/")
     if not name:
         return NAME_EMPTY(f"{what} is empty.", "A rule is `old:=new`, without spaces around `:=`.")
     if ":=" in name:
         return RULE_FORM(
-            f"a second `:=` stands in {what}.",
+            f"there is a second `:=` in {what}.",
             "Every rule has its own `-r`: `-r old:=new -r old2:=new2`.",
         )
     if name.strip() != name or any(character.isspace() for character in name):
-        return NAME_SPACE(f"{what} holds a space.", "Write the rule as one word, without spaces around `:=`.")
+        return NAME_SPACE(f"{what} contains a space.", "Write the rule as one word, without spaces around `:=`.")
     if left and "*" in name:
         return WILDCARD("`*` is not implemented in remap rules.", "Write one rule for each name.")
     if re.search(r"\\[1-9]", name):
@@ -248,15 +251,15 @@ def _of_name(name: str, what: str, left: bool = False) -> Reason | None:
             "Write one rule for each name.",
         )
     if name in ("~", "~/", "/"):
-        return NAME_FORM(f"{what} is `{name}`, which is no name of its own.", "Write a name after it: `~/name`.")
+        return NAME_FORM(f"{what} is `{name}`, which is not a name by itself.", "Write a name after it: `~/name`.")
     if "~" in bare or (name.startswith("~") and not name.startswith("~/")):
         return NAME_FORM(
-            f"in {what}, `~` does not stand at the beginning with a slash behind it.",
+            f"in {what}, `~` is not at the beginning, or no slash follows it.",
             "`~/name` is a name below the node's own; elsewhere `~` means nothing.",
         )
     if any(part == "" for part in parts):
         where = "ends with a slash" if name.endswith("/") and "//" not in name else "has two slashes in a row"
-        return NAME_SLASH(f"{what} {where}.", "A slash stands between two parts of a name, and only there.")
+        return NAME_SLASH(f"{what} {where}.", "Write a slash only between two parts of a name.")
     return _of_parts(name, parts, what)
 
 
@@ -269,7 +272,7 @@ def _of_parts(name: str, parts: list[str], what: str) -> Reason | None:
     strange = re.search(r"[^A-Za-z0-9_/~]", name)
     if strange:
         return NAME_CHARACTERS(
-            f"`{name}` is not a name: `{strange[0]}` cannot stand in it.",
+            f"`{name}` is not a name, because a name cannot contain `{strange[0]}`.",
             "Names have letters from a to z, digits and underscores, with slashes between their parts.",
         )
     if "__" in name:
@@ -282,14 +285,14 @@ def _of_parts(name: str, parts: list[str], what: str) -> Reason | None:
 
 def _of_form(rule: Rule) -> Reason:
     if not rule.renames_topics or rule.left.startswith("__"):
-        why = f"`{rule.left}` cannot stand before `:={rule.right}`."
+        why = f"`{rule.left}` cannot be followed by `:={rule.right}`."
     else:
         why = f"`{rule.left}` and `{rule.right}` do not make a rule."
     return RULE_FORM(why, "A rule is `old:=new`, or `NODE:old:=new` for one node.")
 
 
 def why_parameter_refused(text: str) -> Reason | None:
-    """Why rcl does not take the name in a parameter rule, `NAME:=VALUE` after `-p`, or the value."""
+    """Return why rcl refuses the name or the value in a parameter rule, `NAME:=VALUE` after `-p`."""
     name, separator, value = text.partition(":=")
     said = f"The parameter rule `{text}` is refused, and the program ends at its start:"
     if not separator:
@@ -311,7 +314,7 @@ def _of_parameter(name: str) -> Reason:
         return NAME_EMPTY("it has no name.", "A parameter rule is `name:=value`.")
     if ":" in name and (name.startswith("/") or name.count(":") > 1):
         return RULE_COLON(
-            "before the `:` stands the name of a node, without slashes.",
+            "the text before the `:` has to be the name of a node, without slashes.",
             "Remove the node name; the value then applies to every node of the process. A parameter file can name one"
             " node.",
         )
@@ -319,7 +322,7 @@ def _of_parameter(name: str) -> Reason:
         return WILDCARD("`*` is not implemented there.", "Write one rule for each parameter.")
     bare = name.rsplit(":", 1)[-1]
     if any(part == "" for part in bare.split(".")):
-        return NAME_SLASH("a part of the name is empty.", "A dot stands between two parts of a name.")
+        return NAME_SLASH("a part of the name is empty.", "Write a dot only between two parts of a name.")
     found = _of_parts(name, [part for part in re.split(r"[./]", bare) if part], "the name")
     if found and found.kind is BEGINS_WITH_DIGIT:
         return found
@@ -327,30 +330,33 @@ def _of_parameter(name: str) -> Reason:
     if strange:
         what = "a space" if strange[0].isspace() else f"`{strange[0]}`"
         return NAME_CHARACTERS(
-            f"{what} cannot stand in the name of a parameter on a command line.",
+            f"{what} is not allowed in the name of a parameter on a command line.",
             "Such names have letters from a to z, digits, underscores and dots.",
         )
     if name in ("__node", "__name", "__ns"):
-        return RULE_KIND(f"`{name}` is no parameter.", f"Names are changed with `-r`: `-r {name}:=NEW`.")
+        return RULE_KIND(f"`{name}` is not a parameter.", f"Names are changed with `-r`: `-r {name}:=NEW`.")
     return NAME_FORM(f"`{name}` is not a name.", "A parameter rule is `name:=value`.")
 
 
 def rules_in(words: Sequence[str]) -> list[str]:
-    """The remap rules of a command line, in its order."""
+    """Return the remap rules of a command line, in its order."""
     return [after for word, after in itertools.pairwise(words) if word in ("-r", "--remap")]
 
 
 def parameter_rules_in(words: Sequence[str]) -> list[str]:
-    """The parameter rules of a command line, in its order."""
+    """Return the parameter rules of a command line, in its order."""
     return [after for word, after in itertools.pairwise(words) if word in ("-p", "--param")]
 
 
 def refused(rules: Sequence[str]) -> Reason | None:
-    """Why the first rule that rcl does not take is refused; it ends the program at its start."""
+    """Return why rcl refuses the first rule that it does not accept. Such a rule ends the program at its start."""
     return next((reason for reason in map(why_remap_refused, rules) if reason), None)
 
 
 def refused_parameter(words: Sequence[str]) -> Reason | None:
-    """Why the first parameter rule of a command line that rcl does not take is refused; it ends the program, too."""
+    """Return why rcl refuses the first parameter rule of a command line that it does not accept.
+
+    Such a rule ends the program at start, too.
+    """
     ros = words[words.index("--ros-args") :] if "--ros-args" in words else []
     return next((reason for reason in map(why_parameter_refused, parameter_rules_in(ros)) if reason), None)

@@ -1,13 +1,14 @@
-"""Why no remap rule made a name that one was meant to make: one function per reason.
+"""Says why no remap rule produced a name that a rule was meant to produce. There is one function for each reason.
 
-Measured on rclpy 7.1.6. A rule is matched against a *full* name, the one the code gives after namespace and node name
-are settled. The first rule that matches a name wins, and its result is not looked at again. The prefix of a
-node-specific rule is the name that the node has after `__node`; only for `__node` itself it is the name in the code.
+This was measured with rclpy 7.1.6. A rule is matched against a *full* name: the name in the code, expanded with the
+node's final namespace and name. The first rule that matches a name wins, and no other rule is applied to the result.
+The prefix of a node-specific rule is the name that the node has after `__node` was applied; only for `__node` itself
+it is the name in the code.
 
-A reason is given only if what the graph shows establishes it: the rule is for the node in question, or would be but
-for what the reason says, and after the advice the wanted name is there. One thing cannot be seen on the graph: which
-names the code gives. Whoever knows them says so; otherwise it is taken for granted that the code has no name of its
-own that a rule makes as well.
+A reason is given only if the graph proves it: the rule is for the node in question, or would be without the mistake
+that the reason names, and the wanted name appears if the student follows the advice. The graph does not show which
+names the code gives. A caller that knows these names passes them; otherwise it is assumed that the code itself does
+not use a name that a rule produces as well.
 """
 
 from __future__ import annotations
@@ -41,18 +42,18 @@ RULE_ORDER = Kind("rule-order", "an earlier rule matches the same name", Group.E
 
 @dataclass(frozen=True)
 class _Case:
-    """One rule, one node that it would give the wanted name, and what is known about the two."""
+    """One rule, one node to which the rule may apply, and what is known about both."""
 
     rule: Rule
     number: int
     node: str
     rules: Sequence[Rule]
     used: Collection[str]
-    """Names of topics that the node uses."""
+    """The names of the topics that the node uses."""
     nodes: Sequence[str]
     wanted: str
     given: Collection[str] | None
-    """Full names, before any rule, of the topics that the node's code makes; None if that is not known."""
+    """The full names that the node's code gives to its topics, before any rule is applied; None if not known."""
 
     @property
     def said(self) -> str:
@@ -71,18 +72,21 @@ class _Case:
         return rule.prefix in ("", self.node.rsplit("/", 1)[-1])
 
     def makes(self, name: str) -> list[Rule]:
-        """The rules for the node that could have made a name."""
+        """Return the rules for the node that can have produced a name."""
         return [rule for rule in self.rules if self.is_for(rule) and full_name(rule.right, self.node) == name]
 
     def in_code(self, name: str) -> bool:
-        """Whether the node's code gives a name; where nothing says so, it gives those that no rule can have made."""
+        """Whether the node's code gives a name.
+
+        If the names in the code are not known, the code is assumed to give those that no rule can have produced.
+        """
         if self.given is not None:
             return name in self.given
         return name in self.used and not self.makes(name)
 
 
 def full_name(name: str, node: str) -> str:
-    """The full name that `name` stands for in `node`."""
+    """Return the full name to which `name` expands in `node`."""
     if name.startswith("/"):
         return name
     if name.startswith("~"):
@@ -97,15 +101,16 @@ def without_effect(
     topics: Sequence[str] | Mapping[str, Collection[str]],
     in_code: Mapping[str, Collection[str]] | None = None,
 ) -> Reason | None:
-    """Why no rule made the topic or service `wanted`, although one was meant to.
+    """Return why no rule produced the topic or service name `wanted`, although a rule was meant to.
 
     Args:
-        rules: of one program, in the order in which they were given.
-        wanted: the full name that should be there.
-        nodes: full names of the nodes on the graph.
-        topics: full names of topics, with the nodes that use each; a sequence stands for topics of all nodes.
-        in_code: full names that topics have in the code, before any rule, with the nodes that make them; None if that
-            is not known. The graph does not tell a name that a rule has made from one that the code gives.
+        rules: the rules of one program, in the order in which they were given.
+        wanted: the full name that should be on the graph.
+        nodes: the full names of the nodes on the graph.
+        topics: the full names of topics, with the nodes that use each; a sequence means that all nodes use them.
+        in_code: the full names that topics have in the code, before any rule is applied, with the nodes that use
+            them; None if they are not known. The graph does not show whether a name comes from a rule or from the
+            code.
     """
     users = topics if isinstance(topics, Mapping) else dict.fromkeys(topics, nodes)
     read = [rule for rule in map(parse, rules) if rule and rule.renames_topics]
@@ -124,7 +129,10 @@ def without_effect(
 
 
 def _beside(case: _Case) -> Reason | None:
-    """The rule made a name, and it is the wanted one but for what the right side begins with."""
+    """Return the reason if a rule produced a name that is not the wanted one only because of how its right side begins.
+
+    The wanted name would appear if the right side began differently: with or without `~/` or a slash.
+    """
     right, made, space = case.rule.right, case.right, case.node.rsplit("/", 1)[0]
     if case.given is not None and case.left not in case.given:
         return None
@@ -152,7 +160,10 @@ def _beside(case: _Case) -> Reason | None:
 
 
 def _away(case: _Case) -> Reason | None:
-    """The wanted name is on the rule's left side: either the rule took it away, or old and new are swapped."""
+    """Return the reason if the wanted name is on the rule's left side.
+
+    Then either the rule took the name away, or the old and the new name are swapped.
+    """
     left, right, rule = case.left, case.right, case.rule
     if not case.is_for(rule) or left != case.wanted or left in case.used or right not in case.used:
         return None
@@ -179,7 +190,7 @@ def _away(case: _Case) -> Reason | None:
 
 
 def _own_nodes(rules: Sequence[str], nodes: Sequence[str]) -> list[str]:
-    """The nodes that the program with these rules can have made."""
+    """Return the nodes that can belong to the program with these rules."""
     found = list(nodes)
     for rule in map(parse, rules):
         if rule and rule.left in ("__node", "__name") and not rule.prefix:
@@ -222,7 +233,7 @@ def _order(case: _Case) -> Reason | None:
             if made not in case.used or not matched:
                 return None
             return RULE_ORDER(
-                f"{case.said} `{earlier.text}` stands before it and matches the same name, and the first rule wins.",
+                f"{case.said} `{earlier.text}` comes before it and matches the same name, and the first rule wins.",
                 "Only the first rule that matches a name counts.",
             )
     return None
@@ -286,7 +297,7 @@ def _no_match(case: _Case) -> Reason | None:
 
 
 def _idle(case: _Case) -> bool:
-    """Whether the rule is for topics of the node and finds nothing there, and no rule before it takes its name."""
+    """Whether the rule applies to topics of the node, matches none, and no earlier rule matches the same name."""
     if (
         case.rule.kind == "service"
         or not case.is_for(case.rule)
@@ -304,12 +315,12 @@ _REASONS: tuple[Callable[[_Case], Reason | None], ...] = (
 
 
 def node_without_effect(rules: Sequence[str], wanted: str, nodes: Sequence[str]) -> Reason | None:
-    """Why a rule for one node of a process, which was meant to make the node `wanted`, made nothing.
+    """Return why a rule for one node of a process, which was meant to produce the node name `wanted`, had no effect.
 
     Args:
-        rules: of one program, in the order in which they were given.
-        wanted: the full name that should be there, and is not.
-        nodes: full names of the nodes on the graph.
+        rules: the rules of one program, in the order in which they were given.
+        wanted: the full name that should be on the graph and is not.
+        nodes: the full names of the nodes on the graph.
     """
     space, _, base = wanted.rpartition("/")
     for rule in map(parse, rules):
@@ -345,11 +356,11 @@ def node_without_effect(rules: Sequence[str], wanted: str, nodes: Sequence[str])
 
 
 def renames_nothing(parameter_rules: Sequence[str], wanted: str) -> Reason | None:
-    """Why `-p`, given the name that should be there for a value, did not make it.
+    """Return why a rule after `-p` whose value is the wanted name did not produce that name.
 
     Args:
-        parameter_rules: of one program, `name:=value` each.
-        wanted: the full name of a node, a topic or a service that should be there, and is not.
+        parameter_rules: the parameter rules of one program, each as `name:=value`.
+        wanted: the full name of a node, a topic or a service that should be on the graph and is not.
     """
     for text in parameter_rules:
         value = text.partition(":=")[2].strip("'\"")

@@ -1,1 +1,1 @@
-"""For the authors of a course: beginning courses and labs, linting them, mutants, packages for an installed ROS 2."""
+"""Tools for the authors of a course: create courses and labs, lint and release them, and mutate their solutions."""

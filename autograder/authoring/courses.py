@@ -1,4 +1,4 @@
-"""Writes courses: a new one, a new lab, and the one that sample classes are graded in."""
+"""Create courses and labs: a new course, a new lab, and the course in which sample classes are graded."""
 
 from __future__ import annotations
 
@@ -17,19 +17,20 @@ from autograder.gradebook.settings import CONFIG_FILE
 FIRST_LAB = "lab1_greeter"
 _TEMPLATES = Path(__file__).with_name("templates")
 _SETTINGS = """\
-# Heading of the page that students begin with.
+# The heading of the students' start page.
 title = "The labs"
-# The labs in the course's order; those that are not listed follow by their names.
+# The labs in the course's order. Labs that are not listed follow in the order of their names.
 labs = ["{lab}"]
 
-# What hints call your lectures, and the page of each; the sections that explain a reason, by its code.
+# The names that hints use for your lectures, with the page of each lecture, and the sections of a lecture, each with
+# the codes of the reasons that it explains.
 # [lectures]
 # "Week 1" = "01_names"
 # [sections."Week 1"]
 # "Remap rules" = ["rule-order", "rule-prefix"]
 """
 _IGNORED = """\
-# What is made again, and what is known of students.
+# Files that can be generated again, and files with students' data.
 /build/
 /gradebook/
 /handed_in/
@@ -40,14 +41,14 @@ _IGNORED = """\
 
 
 def new_course(root: Path) -> list[Path]:
-    """Write a course with one lab into a folder that is empty or not there yet, and return its files.
+    """Write a course with one lab into a folder that is empty or does not exist yet, and return the course's files.
 
     Raises:
-        KitError: there is something in the folder.
+        KitError: the folder is not empty, or it is a file.
     """
     if root.exists() and (not root.is_dir() or any(root.iterdir())):
         what = "is not empty" if root.is_dir() else "is a file"
-        raise KitError(f"{root} {what}, and stays as it is.", "Name a folder that does not exist yet.")
+        raise KitError(f"{root} {what}, so it was not changed.", "Name a folder that does not exist yet.")
     files = {
         SETTINGS_FILE: _SETTINGS.format(lab=FIRST_LAB),
         CONFIG_FILE: TEMPLATE.read_text(encoding="utf-8"),
@@ -59,10 +60,10 @@ def new_course(root: Path) -> list[Path]:
 
 
 def new_lab(root: Path, name: str) -> list[Path]:
-    """Write a lab of one program and one table into a course, and return its files.
+    """Write a lab with one program and one table into a course, and return the lab's files.
 
     Raises:
-        KitError: the name cannot be a lab's, or there is such a lab.
+        KitError: the name is not allowed for a lab, or there is already a lab with this name.
     """
     if not re.fullmatch(r"[a-z][a-z0-9_]{0,63}", name):
         raise KitError(
@@ -71,7 +72,7 @@ def new_lab(root: Path, name: str) -> list[Path]:
     paths = CoursePaths(root)
     notebook = paths.solutions / name / f"{name}.ipynb"
     if notebook.exists() or (paths.labs / name).exists():
-        raise KitError(f"There is a lab `{name}` already, and it stays as it is.", "Choose another name.")
+        raise KitError(f"There is already a lab `{name}`, and it was not changed.", "Choose another name.")
     requirements, canaries = paths.requirements(name), paths.canaries(name)
     raw = json.loads((_TEMPLATES / "lab.ipynb").read_text(encoding="utf-8"))
     raw["cells"][0]["source"] = raw["cells"][0]["source"].replace("LAB_TITLE", name.replace("_", " ").capitalize())
@@ -82,7 +83,7 @@ def new_lab(root: Path, name: str) -> list[Path]:
 
 
 def sample_course(root: Path) -> Path:
-    """Make the course for sample classes below the course at `root`, and return its folder."""
+    """Create the course for sample classes below the course at `root`, and return its folder."""
     sample = CoursePaths(root).sample_course
     sample.mkdir(parents=True, exist_ok=True)
     for path in (CoursePaths(root).solutions, CoursePaths(root).labs, root / "tests"):

@@ -1,6 +1,6 @@
-"""A lab's autograder for Gradescope: a zip to upload, from which it builds an image that checks each submission.
+"""Write a lab's autograder for Gradescope. From this zip, Gradescope builds an image that checks each submission.
 
-Source: Gradescope's "Autograder Specifications": `setup.sh` and `run_autograder` lie at the top of the zip, which is
+Source: Gradescope's "Autograder Specifications". `setup.sh` and `run_autograder` are at the top of the zip, which is
 unpacked to /autograder/source.
 """
 
@@ -20,19 +20,19 @@ from autograder.setup.places import ROOT, STUDENT_LOCK
 
 _TEMPLATES = Path(__file__).with_name("templates")
 _ALWAYS = (1980, 1, 1, 0, 0, 0)
-"""Date of every file, so that equal sources give equal zips."""
+"""The date of every file in the zip. It is always the same, so that equal sources give equal zips."""
 
 
 def write_gradescope(root: Path, lab: str, path: Path) -> Path:
     """Write the zip and return its path.
 
     Args:
-        root: of the course.
-        lab: that it checks.
-        path: of the zip.
+        root: the course's folder.
+        lab: the lab whose submissions are checked.
+        path: the zip file to write.
 
     Raises:
-        KitError: there is no such lab, or the kit was installed from a wheel, without the list of what it needs.
+        KitError: there is no such lab, or the kit was installed from a wheel, which does not contain the lock.
     """
     if not (ROOT / STUDENT_LOCK).is_file():
         raise KitError("The zip is made from a checkout of the kit.", "Run the command there, in your course's folder.")

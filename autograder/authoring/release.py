@@ -1,4 +1,4 @@
-"""Writes `labs/`: each lab as students get it, unless something in it is wrong, and the page that lists the labs."""
+"""Write `labs/`: each lab as students receive it, unless the lab has an error, and the page that lists the labs."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ _BOTTOM = """
 
 
 def start_page(labs: Path) -> str:
-    """Return the page for the labs in a folder, by the first heading of each and the sentence below it."""
+    """Return the page that lists the labs in a folder, with the first heading of each and the sentence below it."""
     rows = []
     for path in [labs / name / f"{name}.ipynb" for name in lab_names(labs.parent)]:
         if not path.is_file():
@@ -59,7 +59,7 @@ def start_page(labs: Path) -> str:
 
 
 def _sentence(text: str) -> str:
-    """The first sentence of a paragraph, in one line."""
+    """Return the first sentence of a paragraph in one line."""
     paragraph = " ".join(text.strip().split("\n\n")[0].split())
     return re.split(r"(?<=\.)\s", paragraph, maxsplit=1)[0]
 
@@ -68,7 +68,8 @@ def release(root: Path, lab: str) -> Path:
     """Write `labs/<lab>` and return that folder.
 
     Raises:
-        KitError: there is no such lab under `solutions`, nbgrader refuses, or the lab has an error; says in which cell.
+        KitError: there is no such lab under `solutions`, nbgrader could not generate it, or the lab has an error. The
+            message names the cell.
     """
     found = read_findings(root, lab)
     errors = [one for one in found if not one.warning]

@@ -1,7 +1,8 @@
-"""The requirements of a lab: every sentence of a task, and the check that holds it.
+"""The requirements of a lab: the sentences of its tasks, and the check for each of them.
 
-`requirements.yaml` of a lab's sample class says which words of the task's text are a requirement, which check (and
-which part of it) holds them, and which sample student breaks them; and which sentences only explain.
+The file `requirements.yaml` of a lab's sample class lists the parts of the lab's text that are requirements. For each
+requirement it names the check (and the part of the check) that tests it, and the sample student who violates it. It
+also lists the sentences that require nothing.
 """
 
 from __future__ import annotations
@@ -20,14 +21,14 @@ from autograder.course.lab import Lab
 _TASK = re.compile(
     r"\*\*(Write|Repair|Complete|Change|Describe|Fill|Now)\b|^Write\b|\bWrite (one|two|three|the|a)\b", re.MULTILINE
 )
-"""What a text that sets a task says."""
+"""The words by which a text that sets a task is recognised."""
 _QUANTIFIER = re.compile(
     r"\b(each|every|again|only|once|twice|most|least|latest|first|last|all|both|never|always|until|while|within|any|another"
     r"|nothing|none|above|below|between|before|after|more|less|fewer|higher|lower|than|negative|zero|default|same|other"
     r"|times|longer|in order|ms)\b|\d ?(s|Hz)\b|\bas (long|soon|often|many) as\b|\bseconds?\b",
     re.IGNORECASE,
 )
-"""Words that a check does not hold if it tries them once, with one value, in one order."""
+"""Words that take more than one try, one value or one order to check."""
 _SENTENCE = re.compile(r"(?<=[.!?:])[)*`_]*\s+(?=[A-Z`*(_\"])")
 
 
@@ -36,39 +37,39 @@ class Requirement:
     """One requirement of a task."""
 
     text: str
-    """Words of the lab's text."""
+    """The part of the lab's text that states the requirement."""
     check: str
-    """grade_id of the check that holds it."""
+    """The grade_id of the check that tests it."""
     part: str
-    """Part of that check; empty: the whole of it."""
+    """The part of the check; empty for the whole check."""
     student: str
-    """Sample student who breaks it; empty where a course has no sample class."""
+    """The sample student who violates it; empty if the course has no sample class."""
     tried: str = ""
-    """How the check tries what the words say of a number, a time or a repetition, such as `two values and zero`."""
+    """How the check tries a number, a time or a repetition that the words ask for, such as `two values and zero`."""
     once: str = ""
-    """Sample student who keeps it the first time, or for one value, and breaks it then; empty if there is none."""
+    """The sample student who obeys it only the first time, or only for one value; empty if there is none."""
 
     @property
     def quantified(self) -> bool:
-        """Whether the words say how often, how many, how long, or for which values something holds."""
+        """Return whether the words say how often, how many, how long, or for which values something holds."""
         return _QUANTIFIER.search(self.text) is not None
 
 
 @dataclass(frozen=True)
 class Requirements:
-    """What is required in a lab."""
+    """The requirements of a lab."""
 
     required: list[Requirement]
     remarks: list[str]
-    """Words of the tasks that require nothing."""
+    """Sentences of the tasks that require nothing."""
 
     def uncovered(self, lab: Lab) -> list[str]:
-        """Sentences of tasks that are neither a requirement nor said to be none."""
+        """Return the sentences of tasks that are neither listed as a requirement nor as requiring nothing."""
         words = [one.text for one in self.required] + self.remarks
         return [unit for unit in tasks(lab) if not any(text in unit or unit in text for text in words)]
 
     def strangers(self, lab: Lab) -> list[str]:
-        """Words that are not in the lab's text."""
+        """Return the listed texts that do not occur in the lab."""
         whole = plain(" ".join(source_of(cell) for cell in lab.released))
         return [text for text in [one.text for one in self.required] + self.remarks if text not in whole]
 
@@ -77,13 +78,13 @@ class Requirements:
         return [one.text for one in self.required if one.quantified and not one.tried]
 
     def unheld(self, lab: Lab) -> list[str]:
-        """Checks that test no requirement."""
+        """Return the checks that test no requirement."""
         held = {one.check for one in self.required}
         return [check.grade_id for check in lab.checks if check.grade_id not in held]
 
 
 def plain(text: str) -> str:
-    """Text on one line, without Markdown's emphasis."""
+    """Return a text in one line and without bold type of Markdown."""
     return " ".join(text.replace("**", "").split())
 
 
@@ -91,7 +92,7 @@ def read(path: Path) -> Requirements:
     """Read a lab's requirements.
 
     Raises:
-        KitError: the file says something else.
+        KitError: the file does not have the form of a list of requirements.
     """
     try:
         told: dict[str, Any] = yaml.safe_load(path.read_text(encoding="utf-8"))
@@ -105,7 +106,7 @@ def read(path: Path) -> Requirements:
 
 
 def tasks(lab: Lab) -> list[str]:
-    """Every sentence and every list item of the texts that set a task."""
+    """Return every sentence and every list item of the texts that set a task."""
     checks = {check.grade_id for check in lab.checks}
     units: list[str] = []
     texts: list[str] = []
@@ -123,7 +124,7 @@ def tasks(lab: Lab) -> list[str]:
 
 
 def _units(text: str) -> list[str]:
-    """The sentences from the first that sets the task on; headings, code and tables set none."""
+    """Return the sentences of a text, from the first one that sets a task, without headings, code and tables."""
     match = _TASK.search(text)
     if match is None:
         return []

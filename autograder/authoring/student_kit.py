@@ -1,11 +1,11 @@
-"""Writes what students get: the labs, the lectures, and the kit as a wheel without solutions or hidden tests.
+"""Write the student's kit: the labs, the lectures, and the kit as a wheel without solutions or hidden tests.
 
-The labs are in `kit` only. Set-up copies them once to where a student works, so that unpacking a new version never
-replaces a student's work.
+The labs are only in the folder `kit`. Set-up copies them once to the folder in which a student works, so that unpacking
+a new version never replaces a student's work.
 
-Before the files are given out, they are searched for every hidden test, solution and mark scheme of the labs' sources.
-Spaces do not count. Except for a marked solution, each single line is searched for as well. Texts shorter than 24
-characters are skipped, and so is whatever students receive in the released lab anyway.
+Before the files are handed out, they are searched for every hidden test, solution and mark scheme in the sources of the
+labs. Spaces do not count. Except for a marked solution, each single line is searched for as well. Texts shorter than 24
+characters are skipped, and so are texts that students receive in the released lab anyway.
 """
 
 from __future__ import annotations
@@ -32,18 +32,18 @@ from autograder.setup.places import KIT_FOLDER, ROOT, STUDENT_LOCK
 _REGION = re.compile(r"BEGIN (HIDDEN TESTS|SOLUTION|MARK SCHEME)[^\n]*\n(.*?)^[^\n]*END \1", re.DOTALL | re.MULTILINE)
 _MARK = re.compile(r"#+ (BEGIN|END) (HIDDEN TESTS|SOLUTION|MARK SCHEME)$")
 _TELLING = 24
-"""Minimum length, without spaces, of a text that is searched for. Shorter ones occur everywhere."""
+"""The minimum length, without spaces, of a text that is searched for. Shorter texts occur everywhere."""
 _PACKED = (".whl", ".zip")
 
 
 @dataclass(frozen=True)
 class Secret:
-    """A text of a lab that students may not get."""
+    """A text of a lab that students must not receive."""
 
     lab: str
     kind: str
     text: str
-    """Without spaces and ends of lines."""
+    """The text without spaces and line breaks."""
 
 
 def secrets_of(root: Path, labs: Sequence[str]) -> list[Secret]:
@@ -58,7 +58,7 @@ def secrets_of(root: Path, labs: Sequence[str]) -> list[Secret]:
         for cell in json.loads(source.read_text(encoding="utf-8"))["cells"]:
             text = source_of(cell)
             regions = _REGION.findall(text)
-            if nbgrader_of(cell).get("solution") and "BEGIN SOLUTION" not in text:  # then all of it is one
+            if nbgrader_of(cell).get("solution") and "BEGIN SOLUTION" not in text:  # then the whole cell is the answer
                 regions.append(("answer", text))
             for kind, inner in regions:
                 pieces = [inner] if kind == "SOLUTION" else [inner, *inner.split("\n")]
@@ -69,7 +69,7 @@ def secrets_of(root: Path, labs: Sequence[str]) -> list[Secret]:
 
 
 def leaks(folder: Path, secrets: Sequence[Secret]) -> list[str]:
-    """Say which files of a folder, or of the wheels and zips in it, hold a secret, or the mark that begins one."""
+    """Return a line for each secret, or mark of a secret, in the files of a folder and of the wheels and zips in it."""
     found = []
     for name, text in _texts(folder):
         dense = _dense(text)
@@ -90,7 +90,10 @@ def _sources(notebook: Path) -> list[str]:
 
 
 def _texts(folder: Path) -> Iterator[tuple[str, str]]:
-    """Every file as text; of a notebook the cells, in which no quotation mark is written as two characters."""
+    """Yield the name and text of every file, and for a notebook also the text of its cells.
+
+    In a notebook's JSON, quotation marks are escaped. In the text of its cells, they are not.
+    """
     for path in sorted(path for path in folder.rglob("*") if path.is_file()):
         name = str(path.relative_to(folder))
         if path.suffix in _PACKED:
@@ -109,14 +112,14 @@ def _as_text(name: str, content: bytes) -> Iterator[tuple[str, str]]:
 
 
 NAME = "ros2-labs"
-"""Of the folder, and of the zip."""
+"""The name of the folder and of the zip."""
 INSTRUCTORS = ("authoring", "gradebook", "report/class_page.py", "report/templates/class.html")
-"""What of the package `autograder` students do without."""
+"""The parts of the package `autograder` that students do not get."""
 STUDENTS = {
     "cli": ("__init__", "app", "check", "doctor", "machine", "main", "package", "ros2", "submit"),
     "intake": ("__init__", "record"),
 }
-"""The modules of a folder that students need; the others are an instructor's."""
+"""The modules that students get from each of these folders. The others are for instructors."""
 
 _TEMPLATES = Path(__file__).with_name("templates") / "kit"
 _PLACES = {
@@ -127,25 +130,25 @@ _PLACES = {
     "workflow.yml": ".github/workflows/check.yml",
     "Dockerfile": "binder/Dockerfile",
 }
-"""Where each template goes."""
+"""The path of the file that is made from each template."""
 _BOOK_ROW = "| `lectures` | the lectures: open `lectures/index.html` in a browser |\n"
 _SLIDES = re.compile(r'\s*<a href="\.\./slides/[^"]*">Slides</a>')
-"""A page's link to its talk: the slides and what is said to them stay with those who teach."""
+"""A link from a page to its slides. The slides and their notes are only for teachers."""
 _NOT_OURS = shutil.ignore_patterns(".*", "__pycache__", "*.pyc", "nodes", "*.new")
 _EPOCH = (1980, 1, 1, 0, 0, 0)
-"""The time of every file in the zip: equal sources give equal zips."""
+"""The time of every file in the zip. It is always the same, so that equal sources give equal zips."""
 
 
 def write_kit(root: Path, book: Path | None, into: Path) -> Path:
-    """Write the student's kit of the course at `root`, a folder and a zip, and return the zip.
+    """Write the student's kit of the course at `root` as a folder and a zip, and return the path of the zip.
 
     Args:
-        root: of the course; its `labs` are taken as they are.
-        book: a folder with the lectures as HTML; None leaves them out.
-        into: the folder that gets both.
+        root: the course's folder. Its `labs` are copied as they are.
+        book: a folder with the lectures as HTML; None if the kit contains no lectures.
+        into: the folder in which the folder and the zip are written.
 
     Raises:
-        KitError: there are no labs, the wheel cannot be built, or a solution or hidden test would be given out.
+        KitError: there are no labs, the wheel cannot be built, or the kit would contain a solution or hidden test.
     """
     paths = CoursePaths(root)
     names = [name for name in lab_names(root) if (paths.labs / name / f"{name}.ipynb").is_file()]
@@ -185,7 +188,7 @@ def write_kit(root: Path, book: Path | None, into: Path) -> Path:
 
 
 def _settings_file(settings: CourseSettings, names: Sequence[str]) -> str:
-    """What students get of `course.toml`: the title, these labs, and where the lectures explain what."""
+    """Return the students' `course.toml`: the title, these labs, and the sections that explain the reasons."""
     lines = [f"title = {_toml(settings.title)}", f"labs = {_toml(list(names))}", "", "[lectures]"]
     lines += [f"{_toml(name)} = {_toml(page)}" for name, page in settings.lectures.items()]
     for lecture, titles in settings.sections.items():
@@ -200,10 +203,10 @@ def _toml(value: str | list[str]) -> str:
 
 
 def build_wheel(into: Path) -> Path:
-    """Build the kit without what only instructors use, and return the wheel.
+    """Build a wheel of the kit without the parts that only instructors use, and return the wheel's path.
 
     Raises:
-        KitError: it cannot be built.
+        KitError: the wheel cannot be built.
     """
     with tempfile.TemporaryDirectory() as name:
         source = Path(name)
@@ -216,7 +219,7 @@ def build_wheel(into: Path) -> Path:
             dropped += [path for path in (package / folder).glob("*.py") if path.stem not in kept]
         for path in dropped:
             shutil.rmtree(path) if path.is_dir() else path.unlink(missing_ok=True)
-        # The gradebook is an instructor's, and nbgrader's configuration is another one.
+        # The gradebook package is only for instructors, so students get the nbgrader configuration of `grading`.
         project = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
         project = project.replace('"autograder/gradebook/environment/', '"autograder/grading/environment/')
         (source / "pyproject.toml").write_text(project, encoding="utf-8")

@@ -4,8 +4,8 @@ import sys
 
 
 def main() -> None:
-    """Run `autograder`. Its modules are loaded only then, because `ros2` does not need them."""
-    if sys.argv[1:2] == ["ros2"]:  # Typer must not read its words, and it must start quickly
+    """Run `autograder`. Its modules are imported here, because `ros2` does not need them."""
+    if sys.argv[1:2] == ["ros2"]:  # Typer must not parse the words of `ros2`, and `ros2` must start quickly
         _ros2(sys.argv[2:])
     from autograder.cli.main import main as run
 
@@ -13,7 +13,7 @@ def main() -> None:
 
 
 def ros2() -> None:
-    """Run `ros2`: that of an installed ROS, if there is one, or else the kit's."""
+    """Run `ros2`: the command of an installed ROS if there is one, and otherwise the kit's own."""
     _ros2(sys.argv[1:])
 
 

@@ -1,4 +1,4 @@
-"""The application that the commands register with, and the options that several of them have."""
+"""The Typer application with which the commands are registered, and the options that several commands have."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ CourseOption = Annotated[
     Path | None,
     typer.Option(help="The folder of the course; default: the course that you are in, otherwise the kit's own."),
 ]
-"""For instructors. `check` has its own option, because its default is always the kit's own course."""
+"""The option of instructors' commands. `check` has its own option, because its default is the kit's own course."""
 ForceOption = Annotated[bool, typer.Option("--force", help="Also run submissions that did not change.")]
-SeedOption = Annotated[int | None, typer.Option(help="Draw the same varying values as the run with this seed.")]
+SeedOption = Annotated[int | None, typer.Option(help="Use the same random values as the run with this seed.")]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON, for programs.")]

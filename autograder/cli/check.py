@@ -1,4 +1,4 @@
-"""`autograder check`: one notebook."""
+"""The command `autograder check`, which checks one notebook."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import typer
 from autograder.cli.app import JsonOption, SeedOption, app
 from autograder.core.errors import KitError
 from autograder.core.files import signature
-from autograder.core.results import Isolation  # its values stand in the command's help
+from autograder.core.results import Isolation  # imported here because the command's help lists its values
 
 if TYPE_CHECKING:
     from autograder.core.results import SubmissionResult
@@ -23,15 +23,15 @@ if TYPE_CHECKING:
     from autograder.report.audience import Audience
 
 COULD_NOT_FIND_OUT = 3
-"""The exit status when no check failed, and the grader could not find out about one."""
+"""The exit status if no check failed, but the grader could not decide about at least one."""
 _LOOK = 0.3
-"""Seconds between two looks at whether the notebook was saved."""
+"""Seconds between two tests whether the notebook was saved."""
 
 
 @app.command()
 def check(
     notebook: Annotated[Path, typer.Argument(help="The notebook to check.")],
-    lab: Annotated[str | None, typer.Option(help="The lab it answers, if its name does not say so.")] = None,
+    lab: Annotated[str | None, typer.Option(help="The lab of the notebook, if its name does not say so.")] = None,
     as_json: JsonOption = False,
     junit: Annotated[Path | None, typer.Option(help="Also write JUnit XML to this file.")] = None,
     gradescope: Annotated[Path | None, typer.Option(help="Also write Gradescope's results.json to this file.")] = None,
@@ -49,7 +49,7 @@ def check(
         Path | None, typer.Option(help="The folder of the course whose checks are run; default: the kit's own.")
     ] = None,
 ) -> None:
-    """Check one notebook in the same way as grading does, and report what is wrong and why.
+    """Check one notebook in the same way as grading does, and report what failed and why.
 
     Exit status: 0 all checks passed; 1 some failed; 2 wrong usage or set-up; 3 none failed, but some are undecided.
     """
@@ -84,10 +84,13 @@ def check(
 
 
 def isolation_for(wanted: Isolation | None) -> Isolation:
-    """Return the isolation that was asked for; a student's own programs run in any case, and it is said how.
+    """Return the isolation to use.
+
+    In a student's kit, the default is the best isolation that this machine offers. If it is not full, a note says so.
 
     Raises:
-        KitError: this machine does not offer it.
+        KitError: this machine does not offer the isolation that was asked for, or full isolation outside of a student's
+            kit.
     """
     from autograder.course.paths import is_students_kit
     from autograder.sandbox.isolation import choose, most
@@ -103,14 +106,14 @@ def isolation_for(wanted: Isolation | None) -> Isolation:
 def checked(
     notebook: Path, lab: Lab, settings: Settings, book: Book, audience: Audience | None = None
 ) -> SubmissionResult:
-    """Run the checks on a notebook, and say meanwhile on a terminal what is waited for.
+    """Run the checks on a notebook, and show the progress on a terminal.
 
     Args:
-        notebook: to check.
-        lab: that it answers.
-        settings: how to run it.
-        book: the course's lectures, to which the report points.
-        audience: for whom the report is printed, each verdict as soon as it is there; None prints none.
+        notebook: the notebook to check.
+        lab: the lab of the notebook.
+        settings: how the notebook is run.
+        book: the course's lectures, to which the report refers.
+        audience: the reader for whom the report is printed while the checks run; None prints no report.
     """
     from autograder.grading.runner import WORKERS_FOR_ONE, run_submission
     from autograder.report.terminal import LiveReport
@@ -135,7 +138,7 @@ def _write_exports(result: SubmissionResult, audience: Audience, junit: Path | N
 
 
 def _tell_github(result: SubmissionResult, audience: Audience, notebook: Path) -> None:
-    """Annotations go to the log, where GitHub reads them; the summary goes to the file that it names."""
+    """Print the annotations, which GitHub reads from the log, and write the summary to the file that GitHub names."""
     from autograder.report.audience import result_for
     from autograder.report.github import commands, summary
 

@@ -1,4 +1,4 @@
-"""`autograder doctor`: what this machine offers for grading, and how to fix what is missing."""
+"""The command `autograder doctor`, which reports what this machine offers and how to fix what is missing."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ from autograder.setup.refusals import SetUpError, refuse_foreign_ros
 
 GIB = 1 << 30
 NEEDED_SPACE = 2 * GIB
-"""Bytes: results and feedback of a class, and what the programs of all submissions that run at once may write."""
+"""The bytes needed for the results and feedback of a class, and for files that running programs of students write."""
 ROS_TIME_LIMIT = 30.0
-"""Seconds for importing rclpy and receiving one message; it takes about one."""
+"""Seconds that importing rclpy and receiving one message may take. Usually it takes about one second."""
 
-# A message that arrives is the only proof that rclpy, its middleware and this machine's loopback work together.
+# Only a message that arrives proves that rclpy, its middleware and this machine's loopback interface work together.
 TRY_ROS = """
 import json, importlib.metadata, rclpy
 from rclpy.executors import SingleThreadedExecutor
@@ -57,33 +57,33 @@ print(json.dumps(found))
 """
 
 TRY_PROBE = "import json; from autograder.sandbox.inside.probe import attach; print(json.dumps(attach.prepare()))"
-"""Runs in a separate process, because the probe wraps rclpy's functions."""
+"""A program that runs in a separate process, because the probe wraps functions of rclpy."""
 
 
 IN_CHECKOUT = (ROOT / "Makefile").is_file()
-"""Or else the kit was installed from its wheel, and `make` has nothing to do with it."""
+"""Whether the kit runs from a checkout. If not, it was installed from its wheel, and there are no `make` commands."""
 ANEW = "make distclean setup" if IN_CHECKOUT else "install the kit again in a new environment"
 
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing looked at."""
+    """The result of one test of the machine."""
 
     name: str
     good: bool
     found: str
     do: str = ""
-    """What to do about it: about a lack, or, where `good`, to gain something."""
+    """What to do to fix it or, if `good`, to improve something."""
 
 
 def run(as_json: bool) -> int:
-    """Look at everything and print it; return 0 if the machine can grade, 2 if something is lacking."""
+    """Run all tests and print their findings. Return 0 if the machine can grade, and 2 if something is missing."""
     looks = (python, environment, foreign_ros, ros, probe, isolation, cores, compiler, space)
     findings: list[Finding] = []
     for look in looks:
         try:
             findings.append(look())
-        except Exception as error:  # the doctor must reach the end, most of all on a broken machine
+        except Exception as error:  # the command must finish, especially on a broken machine
             findings.append(Finding(look.__name__, False, f"{type(error).__name__}: {error}", "This is unexpected."))
     healthy = all(finding.good for finding in findings)
     if as_json:
@@ -94,7 +94,7 @@ def run(as_json: bool) -> int:
 
 
 def show(findings: list[Finding], healthy: bool) -> None:
-    """Print the findings as a table, and what to do below it."""
+    """Print the findings as a table, and below it what to do."""
     console = Console(highlight=False)
     if not console.is_terminal:
         console.width = 120
@@ -111,7 +111,7 @@ def show(findings: list[Finding], healthy: bool) -> None:
 
 
 def python() -> Finding:
-    """Whether this Python is one that the ROS wheels exist for."""
+    """Check whether there are ROS wheels for this Python."""
     version = platform.python_version()
     good = OLDEST <= sys.version_info[:2] <= NEWEST
     how = "make setup PYTHON=/path/to/python3.12" if IN_CHECKOUT else "install the kit into an environment that has one"
@@ -120,7 +120,7 @@ def python() -> Finding:
 
 
 def environment() -> Finding:
-    """Whether `.venv` is finished and agrees with the lock."""
+    """Check whether `.venv` is complete and agrees with the lock."""
     name = "environment"
     if Path(sys.prefix).resolve() != VENV:
         return Finding(
@@ -128,7 +128,7 @@ def environment() -> Finding:
         )
     state = read_marker()
     if not state:
-        return Finding(name, False, f"{VENV} is unfinished, or was moved", "Run: make setup")
+        return Finding(name, False, f"{VENV} is incomplete, or was moved", "Run: make setup")
     old = [lock for lock, made_of in state["locks"].items() if made_of != digest(lock)]
     if old:
         return Finding(name, False, f"{VENV} is older than {' and '.join(old)}", "Run: make setup")
@@ -136,7 +136,7 @@ def environment() -> Finding:
 
 
 def foreign_ros() -> Finding:
-    """Whether this shell has another ROS distribution sourced."""
+    """Check whether another ROS distribution is sourced in this shell."""
     try:
         refuse_foreign_ros(os.environ)
     except SetUpError as error:
@@ -145,7 +145,7 @@ def foreign_ros() -> Finding:
 
 
 def ros() -> Finding:
-    """Whether rclpy really works: it is imported, and one message goes from a publisher to a subscription."""
+    """Check whether rclpy works: import it, and send one message from a publisher to a subscription."""
     name = "ROS 2"
     try:
         process = subprocess.run(
@@ -158,7 +158,10 @@ def ros() -> Finding:
         )
     except subprocess.TimeoutExpired:
         return Finding(
-            name, False, f"no message arrived in {ROS_TIME_LIMIT:g} s", "Let no firewall block UDP on 127.0.0.1."
+            name,
+            False,
+            f"no message arrived in {ROS_TIME_LIMIT:g} s",
+            "Check that no firewall blocks UDP on 127.0.0.1.",
         )
     if process.returncode:
         return Finding(name, False, (process.stderr.strip().splitlines() or ["rclpy does not start"])[-1], ANEW)
@@ -174,7 +177,10 @@ def ros() -> Finding:
 
 
 def probe() -> Finding:
-    """Whether a failed check can be explained: the probe watches rclpy from inside a program, by some private names."""
+    """Check whether the probe works, which watches rclpy inside a program in order to explain failed checks.
+
+    The probe uses some private names of rclpy, which a new version may change.
+    """
     name = "explanations"
     process = subprocess.run(
         [sys.executable, "-P", "-c", TRY_PROBE],
@@ -197,7 +203,7 @@ def probe() -> Finding:
 
 
 def isolation() -> Finding:
-    """How well students' programs can be kept apart here."""
+    """Check how well students' programs can be isolated on this machine."""
     from autograder.sandbox.isolation import preflight
 
     level = preflight()
@@ -208,13 +214,13 @@ def isolation() -> Finding:
 
 
 def cores() -> Finding:
-    """How many cores this process may use; one is enough, but slow."""
+    """Report how many cores this process may use. One core is enough, but slow."""
     count = len(os.sched_getaffinity(0))
     return Finding("cores", True, str(count), "" if count > 1 else "With two or more cores, grading is faster.")
 
 
 def compiler() -> Finding:
-    """Whether packages with interfaces can be built here; everything else works without."""
+    """Check whether packages with interfaces can be built on this machine. Everything else works without a compiler."""
     from autograder.packages.workspace import INSTALL, missing_tools
 
     lacking = missing_tools()
@@ -225,7 +231,7 @@ def compiler() -> Finding:
 
 
 def space() -> Finding:
-    """Free space where results are written."""
+    """Check the free space in the folder in which results are written."""
     try:
         folder = course_root()
     except KitError:

@@ -1,4 +1,4 @@
-"""`autograder explain`: all that is known of one submission, or of one check of it."""
+"""The command `autograder explain`, which shows everything that is known about a submission or one of its checks."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ def explain(
     lab: Annotated[str, typer.Option(help="The lab, if the student handed in several.")] = "",
     course: CourseOption = None,
 ) -> None:
-    """Show all that grading found out: outcomes, evidence, output, flags, pictures, and messages as an MCAP file.
+    """Show everything that grading found: outcomes, evidence, output, flags, pictures, and messages as an MCAP file.
 
-    To get the messages, the check is run once more, with the same values.
+    To get the messages, the check is run again with the same random values.
     """
     from autograder.course.paths import CoursePaths, course_root
     from autograder.course.settings import read_book
@@ -77,7 +77,7 @@ def _name(check: CheckResult) -> str:
 
 
 def _pictures(checks: list[CheckResult], folder: Path) -> list[Path]:
-    """Write the pictures of checks, and return where they are."""
+    """Write the pictures of checks to files, and return their paths."""
     from autograder.core.files import write_beside
 
     written = []
@@ -90,7 +90,7 @@ def _pictures(checks: list[CheckResult], folder: Path) -> list[Path]:
 
 
 def _messages(root: Path, result: SubmissionResult, check: CheckResult, bag: Path) -> None:
-    """Run the check once more, write what it received, and say what that is worth."""
+    """Run the check again, write the messages that it received, and say whether its result is the same as before."""
     from autograder.course.lab import load_lab
     from autograder.course.paths import CoursePaths
     from autograder.grading.messages import received, write_mcap
@@ -105,7 +105,7 @@ def _messages(root: Path, result: SubmissionResult, check: CheckResult, bag: Pat
     if read_submission(notebook, lab).digest != result.digest:
         screen.print("The submission or the lab has changed since; these are the messages of the current version.")
     settings = Settings(isolation=choose(result.isolation), seed=result.seed)
-    with working(f"Running {check.grade_id} once more for its messages"):
+    with working(f"Running {check.grade_id} again for its messages"):
         again, messages = received(notebook, result.student, lab, settings, [check.grade_id])
     if [one.points for one in again] != [check.points]:
         now = again[0].points if again else None

@@ -1,4 +1,4 @@
-"""`autograder grade`: a class."""
+"""The command `autograder grade`, which grades a class."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ FormatOption = Annotated[
 AcceptOption = Annotated[
     list[Accepted] | None,
     typer.Option(
-        help="Continue although something stopped the run. smaller: students of the roster, or of the last time, are"
+        help="Continue although something stopped the run. smaller: students from the roster or the last run are"
         " missing. replaced: one submission would replace another one. roster: somebody is not in the roster."
         " You can give this option several times."
     ),
 ]
 LEFT_OUT = 3
-"""The exit status when something that was handed in could not be taken in."""
+"""The exit status if a part of the submissions was left out or could not be read."""
 
 
 @app.command()
@@ -50,7 +50,9 @@ def grade(
     ] = None,
     force: ForceOption = False,
     isolation: IsolationOption = Isolation.FULL,
-    jobs: Annotated[int, typer.Option(min=0, help="How many run at once; 0 lets the machine decide.")] = 0,
+    jobs: Annotated[
+        int, typer.Option(min=0, help="How many submissions run at once; 0: depends on the number of CPUs.")
+    ] = 0,
     seed: SeedOption = None,
     as_json: JsonOption = False,
     scheduler: Annotated[
@@ -97,15 +99,15 @@ def grade(
 
 
 def _status(collected: Collected, results: Sequence[SubmissionResult], submissions: Path | None) -> int:
-    # The sample class has somebody on purpose whose notebook cannot be read.
+    # The sample class contains a student whose notebook cannot be read on purpose.
     return LEFT_OUT if collected.refused or (submissions and _unread(results)) else 0
 
 
 def _places(course: Path | None, lab: str, submissions: Path | None) -> tuple[Path, Path]:
-    """The course to grade in, and where the submissions lie.
+    """Return the course's folder and the folder or zip of the submissions.
 
     Raises:
-        KitError: there are none, or they hold the course.
+        KitError: there are no submissions, or the course's folder is inside them.
     """
     from autograder.course.paths import course_root
 
@@ -131,7 +133,7 @@ def _places(course: Path | None, lab: str, submissions: Path | None) -> tuple[Pa
 
 
 def _show_intake(as_json: bool, collected: Collected) -> None:
-    """Say what was taken in, before the class is run."""
+    """Print what was taken in, before the class is run."""
     from autograder.report.terminal import console, plain
 
     if as_json:
@@ -141,11 +143,15 @@ def _show_intake(as_json: bool, collected: Collected) -> None:
 
 
 def _unread(results: Sequence[SubmissionResult]) -> list[str]:
-    """Sentences about those whose notebook nobody could read: a person has to look at it."""
+    """Return sentences about students whose notebooks could not be read, so that a person has to look at them."""
     from autograder.grading.runner import not_understood
 
     reasons = {result.student: not_understood(result) for result in results}
-    return [f"{student}: {why} There are no points yet: a person decides." for student, why in reasons.items() if why]
+    return [
+        f"{student}: {why} There are no points yet, because a person decides."
+        for student, why in reasons.items()
+        if why
+    ]
 
 
 def _show(run: ClassRun, paths: CoursePaths, lab: str, as_json: bool) -> None:
@@ -158,7 +164,9 @@ def _show(run: ClassRun, paths: CoursePaths, lab: str, as_json: bool) -> None:
     left_out += [f"{plain(name)} is not in the gradebook: {plain(why)}" for name, why in run.unrecorded.items()]
     if as_json:
         store = ResultStore(paths.root)
-        for number, result in enumerate(run.results):  # one after the other: a class of thousands is large
+        for number, result in enumerate(
+            run.results
+        ):  # one after the other, because a class of thousands needs much memory
             whole = store.last(lab, result.student) or result
             print(",\n" if number else "[", whole.model_dump_json(), sep="", end="")
         print("]")
@@ -190,7 +198,7 @@ def _show(run: ClassRun, paths: CoursePaths, lab: str, as_json: bool) -> None:
 
 
 def _by_hand(grade: Grade) -> str:
-    """What people gave of what they can give, and what waits for them."""
+    """Say how many points people gave of those that they can give, and what they still have to grade."""
     cells = [cell for cell in grade.cells if cell.by_hand or cell.points is None or not cell.is_check]
     given = [cell for cell in cells if cell.points is not None]
     most = sum(cell.max_points for cell in cells)
@@ -201,7 +209,7 @@ def _by_hand(grade: Grade) -> str:
 
 
 def _run_again(results: Sequence[SubmissionResult]) -> str:
-    """How many checks the machine had too little time for, and what came of those."""
+    """Say how many checks were run again because the machine was busy, and how many of them are decided now."""
     checks = [check for result in results for check in result.checks]
     again = [check for check in checks if check.run_again]
     unknown = sum(check.points is None for check in again)

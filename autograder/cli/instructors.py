@@ -1,3 +1,3 @@
-"""The commands of who keeps a course and grades it; students get the kit without them and what they import."""
+"""The commands for instructors. The kit that students get contains neither these commands nor what they import."""
 
-from autograder.cli import explain, grade, labs, results  # noqa: F401  each registers its commands
+from autograder.cli import explain, grade, labs, results  # noqa: F401  each module registers its commands

@@ -1,4 +1,4 @@
-"""Commands for who keeps a course: `new`, `lint`, `release`, `kit` and `gradescope`."""
+"""Commands for the authors of a course: `new`, `trust`, `lint`, `release`, `kit` and `gradescope`."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from autograder.cli.app import CourseOption, IsolationOption, app
 from autograder.core.results import Isolation
 
 new = typer.Typer(no_args_is_help=True)
-app.add_typer(new, name="new", help="Begin a course, or a lab in a course.")
+app.add_typer(new, name="new", help="Create a course, or a lab in a course.")
 
 
 @new.command("course")
@@ -57,7 +57,7 @@ def new_lab(
     name: Annotated[str, typer.Argument(help="Lower-case letters, digits and underscores, such as lab2_talkers.")],
     course: CourseOption = None,
 ) -> None:
-    """Write a small, complete lab with checks into the course, which you change into your own."""
+    """Write a small, complete lab with checks into the course. You then change it into your own lab."""
     from autograder.authoring.courses import new_lab as write
     from autograder.course.paths import course_root
 
@@ -70,10 +70,10 @@ def lint(
     lab: Annotated[str | None, typer.Argument(help="The lab; default: all of them.")] = None,
     static: Annotated[bool, typer.Option("--static", help="Only read the lab, and run nothing.")] = False,
     isolation: IsolationOption = Isolation.FULL,
-    jobs: Annotated[int, typer.Option(min=1, help="How many runs go on at once.")] = 4,
+    jobs: Annotated[int, typer.Option(min=1, help="The number of runs at the same time.")] = 4,
     course: CourseOption = None,
 ) -> None:
-    """Say what is wrong with a lab: in its cells and checks, in what students would receive, and when it runs."""
+    """Find mistakes in a lab: in its cells and checks, in what students would receive, and when it runs."""
     from autograder.authoring.lint.runs import run_findings
     from autograder.authoring.lint.static import course_findings, read_findings, release_findings
     from autograder.course.lab import lab_names, load_lab
@@ -110,7 +110,7 @@ def release(
     lab: Annotated[str | None, typer.Argument(help="The lab; default: all of them.")] = None,
     course: CourseOption = None,
 ) -> None:
-    """Generate what students receive, `labs/`, from `solutions/`; refuse a lab in which `lint` finds an error."""
+    """Generate `labs/`, which students receive, from `solutions/`. A lab in which `lint` finds an error is refused."""
     from autograder.authoring.release import START_PAGE, start_page
     from autograder.authoring.release import release as generate
     from autograder.core.files import write_beside
@@ -131,7 +131,7 @@ def kit(
     ] = None,
     course: CourseOption = None,
 ) -> None:
-    """Write what students get into build/release, as a folder and a zip: labs, a lock, the kit without solutions."""
+    """Write the student's kit to build/release, as a folder and a zip: labs, a lock, and the kit without solutions."""
     from autograder.authoring.student_kit import write_kit
     from autograder.course.paths import CoursePaths, course_root
 

@@ -1,4 +1,4 @@
-"""`autograder doctor`, what this machine offers, `jupyter` and `ros2`, what runs on it."""
+"""The commands `autograder doctor`, `autograder jupyter` and `autograder ros2`."""
 
 from __future__ import annotations
 
@@ -34,12 +34,12 @@ def jupyter(
     labs = CoursePaths(course_root()).labs
     if not labs.is_dir():
         raise KitError(f"There are no labs in {labs}.", "Make them from the solutions: autograder release")
-    # A student's kit is shown whole: its lectures can be opened beside the labs.
+    # JupyterLab shows the whole folder of a student's kit, so that the lectures can be opened beside the labs.
     whole = ["--LabApp.default_url=/lab/tree/labs/README.md"] if is_students_kit() else []
     os.chdir(labs.parent if whole else labs)
-    # The settings are not those of the whole environment: an instructor who starts `jupyter lab` there has formgrader.
+    # These settings are not installed in the environment, so an instructor who starts `jupyter lab` has formgrader.
     environment = os.environ | {"JUPYTER_CONFIG_PATH": str(JUPYTER_SETTINGS)}
-    # What runs in a notebook starts the environment's programs by their bare name.
+    # Code in a notebook starts the environment's programs by their names alone.
     environment["PATH"] = os.pathsep.join((os.path.dirname(sys.executable), os.environ.get("PATH", os.defpath)))  # noqa: PTH120
     root = ["--allow-root"] if os.getuid() == 0 else []
     command = [sys.executable, "-P", "-m", "jupyterlab", *whole, *root, *(words or [])]

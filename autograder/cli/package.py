@@ -1,4 +1,4 @@
-"""`autograder package`: what a student wrote, for an installed ROS 2."""
+"""The command `autograder package`, which writes a lab's programs as packages for an installed ROS 2."""
 
 from __future__ import annotations
 
@@ -14,7 +14,9 @@ from autograder.core.errors import KitError
 @app.command()
 def package(
     lab: Annotated[str, typer.Argument(help="The lab, such as lab3_remapping.")],
-    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Where to write them, such as the src of a workspace.")],
+    folder: Annotated[
+        Path, typer.Argument(metavar="DIR", help="The folder for the packages, such as the src of a workspace.")
+    ],
     notebook: Annotated[
         Path | None, typer.Option(help="The notebook with the programs; default: the lab as students receive it.")
     ] = None,

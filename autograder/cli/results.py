@@ -1,4 +1,4 @@
-"""Commands about a class that is graded: `report`, `export` and `similar`."""
+"""Commands for a graded class: `report`, `export` and `similar`."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ import typer
 
 from autograder.cli.app import CourseOption, JsonOption, app
 from autograder.core.errors import KitError
-from autograder.report.export import FORMATS, SEVERAL_LABS  # small, and the command's help names them all
+from autograder.report.export import FORMATS, SEVERAL_LABS  # imported here because the command's help lists all formats
 
 if TYPE_CHECKING:
     from autograder.report.export.entry import Entry
 
 LEFT_OUT = 3
-"""The exit status when somebody of the class is not in an export."""
+"""The exit status if a student of the class is not in an export."""
 
 
 @app.command()
@@ -76,7 +76,7 @@ def export(
 
 
 def _say(left_out: list[str], entries: list[Entry]) -> None:
-    from autograder.report.terminal import plain  # students named themselves
+    from autograder.report.terminal import plain  # students may have chosen their names themselves
 
     waiting = sum(1 for entry in entries if entry.grade is not None and entry.grade.waiting)
     if waiting:
@@ -84,7 +84,7 @@ def _say(left_out: list[str], entries: list[Entry]) -> None:
         print(f"{told}; those count 0 until then.", file=sys.stderr)
     stale = sum(1 for entry in entries if entry.grade is not None and entry.grade.stale)
     if stale:
-        print(f"{stale} have points that were given by hand for something that has changed since.", file=sys.stderr)
+        print(f"{stale} have points that were given by hand before the work changed.", file=sys.stderr)
     for sentence in left_out:
         print(plain(sentence), file=sys.stderr)
 
@@ -97,7 +97,7 @@ def similar(
     as_json: JsonOption = False,
     course: CourseOption = None,
 ) -> None:
-    """List pairs of submissions that are similar in more than what the lab hands out; a person has to judge them."""
+    """List pairs of submissions that are similar apart from what the lab hands out. A person has to judge them."""
     import json
     from dataclasses import asdict
 

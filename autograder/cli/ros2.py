@@ -1,4 +1,4 @@
-"""`ros2` in a terminal: what the real tool's command line says about a running system."""
+"""The command `ros2` in a terminal, which gives the same information about a running system as the real tool."""
 
 from __future__ import annotations
 
@@ -14,11 +14,12 @@ from autograder.sandbox.environment import group_environment, profile_environmen
 from autograder.setup.refusals import SetUpError, refuse_foreign_ros
 
 _TRIED = "AUTOGRADER_ROS2_TRIED"
-"""The environment variable with each `ros2` that was run in place of the kit's: one that comes back here is none."""
+"""The environment variable that lists each `ros2` that was run instead of the kit's. If such a program only starts the
+kit's command again, it is not tried a second time."""
 
 
 def real_ros2() -> str | None:
-    """The `ros2` of an installed ROS on the PATH, if there is one besides the kit's own and scripts that start it."""
+    """Return the `ros2` of an installed ROS on the PATH; None if there is only the kit's own, or a script for it."""
     tried = os.environ.get(_TRIED, "").split(os.pathsep)
     for folder in os.environ.get("PATH", "").split(os.pathsep):
         found = Path(folder) / "ros2"
@@ -32,7 +33,7 @@ def real_ros2() -> str | None:
 def ros2(words: Sequence[str]) -> int:
     """Run `ros2 WORDS` on the graph of ROS_DOMAIN_ID, and return its exit status.
 
-    Where an installed ROS has the tool, that runs in place of this process.
+    If an installed ROS has the tool, that tool replaces this process.
     """
     _join_notebook()
     installed = real_ros2()
@@ -45,7 +46,7 @@ def ros2(words: Sequence[str]) -> int:
     except SetUpError as error:
         print(f"error: {error.what}\n  {error.do}", file=sys.stderr)
         return 2
-    except BrokenPipeError:  # a reader such as `head` has seen enough
+    except BrokenPipeError:  # the reader, such as `head`, has closed the pipe
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except KeyboardInterrupt:
@@ -53,7 +54,7 @@ def ros2(words: Sequence[str]) -> int:
 
 
 def _join_notebook() -> None:
-    """If a notebook of this user runs programs in ROS_DOMAIN_ID, join the multicast group of that notebook."""
+    """Join the multicast group of a notebook if a notebook of this user runs programs in ROS_DOMAIN_ID."""
     with contextlib.suppress(ValueError):  # the tool itself rejects a value that is not a number
         group = group_of(int(os.environ.get("ROS_DOMAIN_ID") or 0))
         if group is not None:

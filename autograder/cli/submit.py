@@ -1,4 +1,4 @@
-"""`autograder submit`: a notebook, ready to be handed in."""
+"""The command `autograder submit`, which prepares a notebook for handing in."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import typer
 
 from autograder.cli.app import app
 from autograder.core.errors import KitError
-from autograder.core.results import Isolation  # its values stand in the command's help
+from autograder.core.results import Isolation  # imported here because the command's help lists its values
 
 FOLDER = "handed_in"
 
@@ -19,7 +19,7 @@ FOLDER = "handed_in"
 @app.command()
 def submit(
     notebook: Annotated[Path, typer.Argument(help="The saved notebook to hand in.")],
-    lab: Annotated[str | None, typer.Option(help="The lab it answers, if its name does not say so.")] = None,
+    lab: Annotated[str | None, typer.Option(help="The lab of the notebook, if its name does not say so.")] = None,
     output: Annotated[
         Path | None, typer.Option("--output", "-o", metavar="DIR", help=f"Where to put the copy; default: {FOLDER}.")
     ] = None,
@@ -75,7 +75,7 @@ def submit(
 
 
 def _checks(packed: Path, lab: str, isolation: Isolation | None, course: Path | None, gap: bool) -> str:
-    """Run the visible checks on what is handed in, show a line for each, and return the points in words."""
+    """Run the visible checks on the copy that is handed in, print a line for each, and return the points in words."""
     from autograder.cli.check import checked, isolation_for
     from autograder.course.lab import load_lab
     from autograder.course.paths import trusted_course

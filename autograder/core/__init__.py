@@ -1,1 +1,1 @@
-"""What every other package may use: errors, files, results. It knows nothing of ROS and nothing of nbgrader."""
+"""Errors, files, results and other basics that every package may use. Nothing here depends on ROS or nbgrader."""

@@ -1,4 +1,4 @@
-"""Who waits for a CPU: what the processes of a launch have had of them, and by how much that made a message late."""
+"""Measure how much CPU time the processes of a launch got, and how late a message may be because they had to wait."""
 
 from __future__ import annotations
 
@@ -12,51 +12,51 @@ from pathlib import Path, PurePosixPath
 from autograder.core.processes import cpu_time, descendants, read_text, stat_fields, threads
 
 _CPU_TO_BEGIN = 1.0
-"""Seconds of CPU that a program may take to begin; one that computes on takes what it gets."""
+"""Seconds of CPU time that any program may need to start. A program that keeps computing uses all it can get."""
 _PIECE = 1.0
 """Seconds between two measurements."""
 _CPUS = "AUTOGRADER_CPUS"
 _TICKS = os.sysconf("SC_CLK_TCK")
-"""How many of the kernel's units of time a second has."""
+"""The number of the kernel's clock ticks in one second."""
 
 
 @dataclass(frozen=True)
 class CpuWait:
-    """What a thread has had of the CPUs."""
+    """How long a thread has run on a CPU and has waited for one."""
 
     when: float
-    """Seconds on the monotonic clock at which this was read."""
+    """The time of the reading, in seconds on the monotonic clock."""
     used: float
-    """Seconds for which it ran."""
+    """Seconds for which the thread ran."""
     waited: float
-    """Seconds for which it was ready to run and got no CPU, up to its last turn."""
+    """Seconds for which the thread was ready to run but got no CPU, up to the last time it got one."""
     turns: int
-    """How often it got one."""
+    """How often the thread got a CPU."""
     ready: bool
-    """Whether it runs or waits for its turn now."""
+    """Whether the thread now runs or waits for a CPU."""
 
 
 @dataclass(frozen=True)
 class CpuUse:
-    """What a process has had of the CPUs."""
+    """How much CPU time a process has used, and how long its threads have waited for a CPU."""
 
     own: float
-    """Seconds, of all its threads, those that have ended included."""
+    """Seconds of CPU time that all threads of the process have used, including threads that have ended."""
     age: float
-    """Seconds since it began."""
+    """Seconds since the process started."""
     threads: dict[int, CpuWait]
     children: float = 0.0
-    """Seconds of those of its children that have ended."""
+    """Seconds of CPU time that the child processes have used which have ended."""
 
     def computes(self) -> bool:
-        """Whether it has computed for most of the time in which nobody kept it from that."""
+        """Return whether the process has computed for most of the time in which it did not have to wait for a CPU."""
         free = self.age - max((wait.waited for wait in self.threads.values()), default=0.0)
         cpu = self.own + self.children
         return cpu > _CPU_TO_BEGIN and cpu > free / 2
 
 
 def computes(pid: int) -> bool:
-    """Whether a process has computed for most of the time in which nobody kept it from that."""
+    """Return whether a process has computed for most of the time in which it did not have to wait for a CPU."""
     if cpu_time(pid) <= _CPU_TO_BEGIN:
         return False
     with contextlib.suppress(OSError, IndexError, ValueError):
@@ -65,9 +65,9 @@ def computes(pid: int) -> bool:
 
 
 def cpu_uses() -> dict[int, CpuUse]:
-    """Return what this process and its descendants have had of the CPUs, by process.
+    """Return how much CPU time this process and its descendants have used, by process id.
 
-    Empty where the kernel does not count that (proc(5), `/proc/PID/schedstat`).
+    The result is empty if the kernel does not count it (see `/proc/PID/schedstat` in proc(5)).
     """
     uses: dict[int, CpuUse] = {}
     for pid in (os.getpid(), *descendants(os.getpid())):
@@ -97,21 +97,21 @@ def _cpu_waits(pid: int) -> dict[int, CpuWait]:
 
 
 def kept_waiting(before: dict[int, CpuUse], after: dict[int, CpuUse], share: float = 1.0) -> dict[int, float]:
-    """Return by how many seconds each of these processes may have been late because of others.
+    """Return by how many seconds each of these processes may have been late because of other programs.
 
     The CPU time of the other threads of this launch is subtracted from a wait, because they may have caused that part
-    themselves. So a program that computes all the time, in however many threads and processes, gains nothing by it. The
-    threads of a process wait side by side.
+    of it. A program that computes all the time therefore gains nothing, however many threads and processes it has. The
+    threads of a process wait at the same time, so only the longest wait counts.
 
     Args:
-        before: what each of them had of the CPUs.
-        after: and what it had later.
-        share: of one CPU that all of them together may have; 1.0 if they may have a whole one. A program that computes
-            all the time uses up the quota, and then every process waits.
+        before: the CPU use of each process at the start of the period.
+        after: the CPU use of each process at the end of the period.
+        share: the part of one CPU that all processes together may use; 1.0 if they may use a whole CPU or more. A
+            program that computes all the time uses up the quota, and then every process waits.
     """
     weight = {pid: 1 / share if pid != os.getpid() and use.computes() else 1.0 for pid, use in after.items()}
     together = sum(weight[pid] * (use.own - (before[pid].own if pid in before else 0.0)) for pid, use in after.items())
-    # What has ended is in its parent's account now, with all that it had before this piece.
+    # The CPU time of a process that has ended now belongs to its parent, including the time from before this period.
     ended = sum(use.children for use in after.values()) - sum(before[pid].children for pid in before if pid in after)
     known_before = sum(use.own + use.children for pid, use in before.items() if pid not in after)
     together += max(0.0, ended - known_before) / share
@@ -124,7 +124,7 @@ def kept_waiting(before: dict[int, CpuUse], after: dict[int, CpuUse], share: flo
 
 
 def _since(before: CpuWait | None, after: CpuWait) -> tuple[float, float]:
-    """For how many seconds a thread has waited since then, and for how many it ran."""
+    """Return for how many seconds a thread has waited between two readings, and for how many it ran."""
     if before is None:
         before = CpuWait(after.when, 0.0, 0.0, 0, ready=False)
     used = after.used - before.used
@@ -134,12 +134,15 @@ def _since(before: CpuWait | None, after: CpuWait) -> tuple[float, float]:
 
 
 def _still_waits(before: CpuWait, after: CpuWait) -> bool:
-    """Whether a thread has waited, or run, without a break since then: the kernel adds a wait when it is over."""
+    """Return whether a thread has waited, or run, without a break between two readings.
+
+    The kernel counts a wait only when it is over.
+    """
     return after.ready and before.ready and after.turns == before.turns
 
 
 def _with_open_waits(before: dict[int, CpuUse], after: dict[int, CpuUse]) -> dict[int, CpuUse]:
-    """Return what the processes had later, with the waits that are not over, so that none is counted a second time."""
+    """Return the later CPU use with the waits that are not over added, so that they are not counted a second time."""
     noted = {}
     for pid, use in after.items():
         threads = dict(use.threads)
@@ -152,20 +155,21 @@ def _with_open_waits(before: dict[int, CpuUse], after: dict[int, CpuUse]) -> dic
 
 
 class Withheld:
-    """The time that others have withheld from the processes of a launch, and from the one that watches it.
+    """The time for which other programs kept the processes of a launch, and the process that watches it, from the CPUs.
 
-    It is measured piece by piece: what these processes used in one second does not excuse what others took in another.
+    It is measured in short periods, so that CPU time that these processes used in one second is not subtracted from
+    what other programs took in another second.
     """
 
     def __init__(self) -> None:
-        """Nothing has been measured yet."""
+        """Start without any measurement."""
         self._share = min(1.0, cpus())
         self._before: tuple[float, dict[int, CpuUse]] | None = None
         self._pieces: list[tuple[float, float, float, float]] = []
-        """Of each piece when it began and ended, and what was withheld in it: from all together, and from one."""
+        """For each period: its start, its end, the seconds that all processes lost, and the most that one lost."""
 
     def measure(self, least: float = _PIECE) -> None:
-        """Measure up to now, if the last time was at least so many seconds ago."""
+        """Measure up to now, unless the last measurement was less than `least` seconds ago."""
         now = time.monotonic()
         if self._before is not None and now - self._before[0] < least:
             return
@@ -177,26 +181,26 @@ class Withheld:
         self._before = now, uses
 
     def from_all(self, when: float) -> float:
-        """Return by how many seconds a message may have come late that went through all the processes, one by one.
+        """Return by how many seconds a message may be late if it went through all the processes, one after another.
 
         Args:
-            when: seconds on the monotonic clock; what was withheld before that does not count.
+            when: the start of the time that counts, in seconds on the monotonic clock.
         """
         return sum(kept * min(1.0, (end - when) / (end - begin)) for begin, end, kept, _ in self._pieces if end > when)
 
     def from_one(self, when: float) -> float:
-        """Return for how many seconds, at the most, a single process had no chance to run; `when` as in `from_all`."""
+        """Return the most seconds for which a single process was kept from running; for `when` see `from_all`."""
         return sum(kept * min(1.0, (end - when) / (end - begin)) for begin, end, _, kept in self._pieces if end > when)
 
 
 def cpus() -> float:
-    """Return how many CPUs this process and those below it may have together; less than one with a small quota."""
+    """Return how many CPUs this process and its descendants may use together; less than 1 if the quota is small."""
     given = os.environ.get(_CPUS)
     return float(given) if given else min([float(len(os.sched_getaffinity(0))), *_quotas()])
 
 
 def _quotas() -> Iterator[float]:
-    """The CPUs that each control group around this process may use (cgroups(7), in either version)."""
+    """Yield how many CPUs each control group around this process may use (cgroups(7), version 1 or 2)."""
     with contextlib.suppress(OSError):
         for line in Path("/proc/self/cgroup").read_text().splitlines():
             _, kinds, path = line.split(":", 2)
@@ -220,5 +224,5 @@ def _quota(group: Path) -> Iterator[float]:
 
 
 def cpus_environment() -> dict[str, str]:
-    """Return the variable that tells a process in a sandbox, which sees no control group, of `cpus`."""
+    """Return an environment variable that gives `cpus` to a process in a sandbox, which cannot see control groups."""
     return {_CPUS: f"{cpus():g}"}

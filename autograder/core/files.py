@@ -1,4 +1,4 @@
-"""Writing files whole or not at all, and reading those of others without being led elsewhere."""
+"""Write files completely or not at all, and read other people's files safely, without following links."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from autograder.core.errors import KitError
 
 
 def write_beside(path: Path, content: str | bytes) -> None:
-    """Write a file beside its place and move it there, so that no reader ever sees half of it.
+    """Write a file under a temporary name and then rename it, so that no reader ever sees half of it.
 
     Raises:
-        OSError: it cannot be written; its `filename` says which.
+        OSError: the file cannot be written; `filename` is its path.
     """
     beside = path.with_name(f".{path.name}.{os.getpid()}")
     try:
@@ -29,16 +29,16 @@ def write_beside(path: Path, content: str | bytes) -> None:
     except OSError as error:
         with contextlib.suppress(OSError):
             beside.unlink()
-        error.filename = str(path)  # a full disk names no file, and nobody knows the one beside it
+        error.filename = str(path)  # otherwise the error names the temporary file, or none if the disk is full
         raise
 
 
 _BESIDE = re.compile(r"\..+\.(\d+)")
-"""The name of a file that `write_beside` has not moved yet, with the number of the process that writes it."""
+"""The temporary name of a file in `write_beside`, with the id of the process that writes it."""
 
 
 def remove_unfinished(folder: Path) -> None:
-    """Remove the files below a folder that `write_beside` left where its process was killed in the middle."""
+    """Remove temporary files of `write_beside` below a folder if the process that wrote them was killed."""
     for path in folder.rglob(".*"):
         found = _BESIDE.fullmatch(path.name)
         if found and path.is_file() and not Path("/proc", found[1]).exists():
@@ -46,7 +46,7 @@ def remove_unfinished(folder: Path) -> None:
 
 
 def signature(path: Path) -> tuple[int, ...] | None:
-    """Return what tells one state of a file from the next; None if there is none. It follows no link."""
+    """Return a value that changes when the file changes; None if there is no file. Links are not followed."""
     try:
         state = path.lstat()
     except OSError:
@@ -55,23 +55,25 @@ def signature(path: Path) -> tuple[int, ...] | None:
 
 
 def read_plain(folder: Path, parts: Sequence[str], most: int) -> bytes:
-    """Read a file that somebody else placed below a folder: never through a link, never from anything but a file.
+    """Read a regular file that somebody else put below a folder, without following any link.
 
     Args:
-        folder: where the way begins; how one gets there is the caller's business.
-        parts: the names from there to the file.
-        most: bytes that are read.
+        folder: the folder to start from. Its own path may contain links.
+        parts: the names of the folders below it, and of the file.
+        most: the largest number of bytes to read.
 
     Raises:
-        OSError: it cannot be read, or a part of the way is not what it must be; `strerror` says why, for a person.
+        OSError: the file cannot be read, or a part of the path is a link or has the wrong kind. `strerror` gives the
+            reason in words for a person.
     """
-    passing = os.O_PATH | os.O_DIRECTORY  # a folder may be one that can be entered but not listed
+    passing = os.O_PATH | os.O_DIRECTORY  # works also if the folder can be entered but not listed
     here = os.open(folder, passing)
     try:
         for number, part in enumerate(parts, start=1):
             last = number == len(parts)
-            # Looked at first, for opening a device may already do something. O_NOFOLLOW and the second look hold where
-            # the name has come to mean something else since; O_NONBLOCK, since a FIFO would wait for its writer.
+            # The kind is checked before opening, because opening a device may already have an effect. O_NOFOLLOW and
+            # the second check are needed because the name may have been given to something else in the meantime, and
+            # O_NONBLOCK because opening a FIFO would wait for its writer.
             _refuse_kind(part, os.stat(part, dir_fd=here, follow_symlinks=False).st_mode, last)
             how = os.O_RDONLY | os.O_NONBLOCK if last else passing
             there = os.open(part, how | os.O_NOFOLLOW, dir_fd=here)
@@ -106,18 +108,18 @@ def _refuse_kind(name: str, mode: int, last: bool) -> None:
 
 @contextlib.contextmanager
 def only_one(path: Path, what: str) -> Iterator[None]:
-    """Hold the lock of a file as long as the block runs.
+    """Hold a lock file while the block runs.
 
     Args:
-        path: of the lock; its folder is made.
-        what: holds it, as the subject of a sentence.
+        path: the lock file; its folder is created.
+        what: the activity that needs the lock, as the subject of a sentence.
 
     Raises:
-        KitError: another process holds it.
-        OSError: it cannot be written; its `filename` says which.
+        KitError: another process holds the lock.
+        OSError: the lock file cannot be written; `filename` is its path.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
-    # Inherited by nothing: a child that lives on must not keep the lock.
+    # O_CLOEXEC: a child process that outlives this one must not keep the lock.
     with os.fdopen(os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644), "r+") as file:
         try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -131,6 +133,6 @@ def only_one(path: Path, what: str) -> Iterator[None]:
             os.ftruncate(file.fileno(), 0)
             os.write(file.fileno(), f"process {os.getpid()}, since {time.strftime('%H:%M:%S')}".encode())
         except OSError as error:
-            error.filename = str(path)  # a full disk names no file
+            error.filename = str(path)  # if the disk is full, the error names no file
             raise
         yield

@@ -1,6 +1,7 @@
-"""The place where a person looks on while checks run: a notebook. Where a submission is graded there is none.
+"""The interface between the checks and the notebook in which they run. When a submission is graded, there is none.
 
-The checks ask it what the student's cells wrote, and let it show what happens; they do not know what it is.
+The checks ask the front end which files the student's cells wrote, and tell it what to show. They know only this
+interface, not the notebook.
 """
 
 from __future__ import annotations
@@ -11,54 +12,54 @@ from typing import Any, Protocol
 
 
 class Watcher(Protocol):
-    """Shows what goes on in one launch."""
+    """Shows what happens during one launch."""
 
     def begin(self, sentence: str) -> bool:
-        """Something is waited for from now on; whether nothing else was."""
+        """Say what the check waits for from now on. Return False if another wait is already shown."""
 
     def end(self) -> None:
-        """It is there, or will not come."""
+        """Say that the wait is over, whether or not it was successful."""
 
     def close(self) -> None:
-        """The programs have ended."""
+        """Say that the programs have ended."""
 
 
 class FrontEnd(Protocol):
-    """What the checks need of it."""
+    """The methods of a notebook that the checks use."""
 
     @property
     def programs(self) -> Path:
-        """The folder in which the programs and files of the cells lie."""
+        """The folder that holds the programs and files of the cells."""
 
     @property
     def number(self) -> int:
-        """The number in the brackets beside the cell that runs."""
+        """The execution number of the running cell, which Jupyter shows in brackets beside it."""
 
     @property
     def scored(self) -> bool:
-        """Whether the cell that runs asks for a score."""
+        """Whether the running cell asks for a score."""
 
     def ready(self) -> None:
-        """Wait until what a first launch needs is loaded."""
+        """Wait until everything that the first launch needs is loaded."""
 
     def has(self, file_name: str) -> bool:
-        """Whether a cell wrote this file."""
+        """Return whether a cell wrote this file."""
 
     def why_missing(self, magic: str, name: str) -> tuple[str, str]:
-        """Why there is no such file, and what to do."""
+        """Return why there is no such file, and what to do about it."""
 
     def blank(self, file_names: set[str]) -> dict[str, bool]:
-        """Of each of these files that is an answer, whether its cell is still as students receive it."""
+        """Return for each of these files that is an answer whether its cell is still as students receive it."""
 
     def remarks(self, file_names: set[str]) -> list[str]:
-        """What the student should know about the cells that these files came from."""
+        """Return what the student should know about the cells that these files came from."""
 
     def origin(self, file_names: set[str]) -> str:
-        """Those cells, in words."""
+        """Say in words which cells these files came from."""
 
     def watch(self, observer: Any, programs: Callable[[], Sequence[Any]]) -> Watcher:
-        """Begin to show what goes on in a launch: what is waited for, and what its programs print."""
+        """Start to show what happens during a launch: what the check waits for, and what the programs print."""
 
 
 active: FrontEnd | None = None
-"""The notebook in which `%load_ext autograder` was run."""
+"""The notebook in which `%load_ext autograder` was run; None if there is none."""

@@ -1,4 +1,4 @@
-"""What a submission is worth, as the gradebook has it: the one number that every table, page and export shows."""
+"""The grade of a submission as the gradebook holds it. Every table, page and export shows this one number."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ class CellGrade:
 
     grade_id: str
     points: float | None
-    """With extra credit; None: a person has yet to grade it."""
+    """The points, with extra credit; None if a person has yet to grade the cell."""
     max_points: float
     is_check: bool
-    """Or else an answer that a person grades."""
+    """Whether this is a check; if not, it is an answer that a person grades."""
     by_hand: bool
-    """A person gave the points, or some of them."""
+    """Whether a person gave the points or some of them."""
     comment: str = ""
     """What a person wrote about the answer."""
     stale: bool = False
-    """A person gave the points for something that has changed since, and should look at it again."""
+    """Whether the work has changed since a person gave the points, so that the person should look at it again."""
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class Grade:
     lab: str
     cells: tuple[CellGrade, ...]
     penalty: float
-    """Points that nbgrader takes off for who was late."""
+    """Points that nbgrader takes off because the submission was late."""
 
     @property
     def waiting(self) -> list[CellGrade]:
@@ -45,12 +45,12 @@ class Grade:
 
     @property
     def earned(self) -> float:
-        """Points that are left after the penalty, where a cell that a person has yet to grade counts 0."""
+        """The points after the penalty. A cell that a person has yet to grade counts 0."""
         return max(0.0, sum(cell.points or 0.0 for cell in self.cells) - self.penalty)
 
     @property
     def score(self) -> float | None:
-        """What was earned; None as long as a check waits for an instructor's verdict.
+        """The earned points; None as long as a check waits for an instructor's verdict.
 
         An explanation that nobody has graded yet counts 0 here, and `waiting` names it.
         """
@@ -58,5 +58,5 @@ class Grade:
 
     @property
     def max_score(self) -> float:
-        """Points that the submission could have."""
+        """The most points that the submission can get."""
         return sum(cell.max_points for cell in self.cells)

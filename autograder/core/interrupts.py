@@ -1,9 +1,9 @@
-"""Interrupts of a notebook's cell: Jupyter's Interrupt, or Ctrl-C.
+"""Handle interrupts of a notebook's cell, from Jupyter's Interrupt button or from Ctrl-C.
 
-Python raises KeyboardInterrupt between any two of its instructions. In the middle of the kit's work that would leave a
-participant, a program or a lock behind, and the next check would pay for it. An interrupt that finds the cell's own
-code is raised at once. One that finds the kit at work waits until the kit reaches a safe place (`here`), or until the
-cell's own code runs again.
+Python raises KeyboardInterrupt between any two of its instructions. In the middle of the kit's work this would leave a
+participant, a program or a lock behind, and the next check might fail because of it. An interrupt that arrives while
+the cell's own code runs is raised at once. An interrupt that arrives while the kit's code runs waits until the kit
+reaches a safe place (`here`), or until the cell's own code runs again.
 """
 
 from __future__ import annotations
@@ -14,34 +14,36 @@ from types import FrameType
 from typing import Any
 
 _AGAIN = 0.1
-"""Seconds after which an interrupt that found the kit at work is tried again: the cell may have its own code back."""
+"""Seconds after which a waiting interrupt is tried again, because the cell's own code may run again by then."""
 _KIT = __name__.partition(".")[0]
 
 
 class Interrupted(KeyboardInterrupt):
-    """Somebody has interrupted what the kit did for a cell. In a notebook it reads as a sentence."""
+    """Somebody has interrupted the kit's work for a cell. A notebook shows it as a sentence."""
 
     def _render_traceback_(self) -> list[str]:
-        """What IPython shows in place of a traceback through the kit."""
+        """Return what IPython shows instead of a traceback through the kit."""
         return [str(self)]
 
 
 class CellInterrupts:
-    """The interrupts of one cell; used in the main thread, which is where Python handles signals.
+    """Handles the interrupts of one cell. It is used in the main thread, where Python handles signals.
 
     Args:
-        variables: of the cells: code that has them as its globals is a cell's.
+        variables: the global variables of the cells. Code that has these globals belongs to a cell.
     """
 
     def __init__(self, variables: dict[str, Any]) -> None:
-        """Take the interrupts from now on."""
+        """Handle all interrupts from now on."""
         self.sentence = ""
-        """What a cell says that was interrupted; empty: in code of its own, what Python says."""
+        """The sentence that an interrupted cell shows. If it is empty, an interrupt of the cell's own code shows what
+        Python shows."""
         self._variables = variables
         self._asked = False
-        """Whether an interrupt waits. All that the handler may touch: whatever it interrupts may hold any lock."""
+        """Whether an interrupt waits. The handler changes only such flags, because the code that it interrupts may hold
+        any lock."""
         self._reminded = False
-        """Whether the next signal, or one that is on its way, is no new interrupt."""
+        """Whether the next signal comes from `_remind` and is no new interrupt."""
         self._sending = threading.Lock()
         self._closing = threading.Event()
         self._before = signal.signal(signal.SIGINT, self._on_interrupt)
@@ -49,16 +51,16 @@ class CellInterrupts:
         self._reminder.start()
 
     def close(self) -> None:
-        """Leave them to whoever had them before. One that still waits came too late: the cell is done."""
+        """Give interrupts back to the previous handler. Drop one that still waits, because the cell has ended."""
         self._closing.set()
         self._reminder.join()
         signal.signal(signal.SIGINT, self._before)
 
     def raise_waiting(self) -> None:
-        """Raise an interrupt that waits.
+        """Raise the waiting interrupt, if there is one.
 
         Raises:
-            Interrupted: there is one.
+            Interrupted: an interrupt was waiting.
         """
         if self._asked and threading.current_thread() is threading.main_thread():
             with self._sending:
@@ -68,7 +70,7 @@ class CellInterrupts:
     def _on_interrupt(self, number: int, frame: FrameType | None) -> None:
         reminded, self._reminded = self._reminded, False
         if reminded and not self._asked:
-            return  # what this reminds of has been raised meanwhile
+            return  # the interrupt that this signal repeats has been raised in the meantime
         self._asked = not self._in_cell(frame)
         if self._asked:
             return
@@ -77,7 +79,7 @@ class CellInterrupts:
         signal.default_int_handler(number, frame)
 
     def _in_cell(self, frame: FrameType | None) -> bool:
-        """Whether the cell's own code runs, or what it has called; an import is never left half done."""
+        """Return whether the cell's own code runs, or code that it called. During an import the answer is False."""
         while frame is not None:
             if frame.f_globals is self._variables:
                 return True
@@ -88,7 +90,7 @@ class CellInterrupts:
         return False
 
     def _remind(self) -> None:
-        """Try again what waits: the kit may have returned to the cell's own code without a safe place."""
+        """Send a waiting interrupt again: the kit may have returned to the cell without reaching a safe place."""
         while not self._closing.wait(_AGAIN):
             with self._sending:
                 if self._asked:
@@ -100,12 +102,12 @@ _active: CellInterrupts | None = None
 
 
 def begin(variables: dict[str, Any]) -> None:
-    """Hold interrupts from now on; without this, as in grading, they come as Python raises them.
+    """Hold interrupts until a safe place from now on. In grading this is not called, and Python raises them as usual.
 
-    Outside of the main thread, where no cell runs, nothing is done.
+    Outside the main thread, where no cell runs, this does nothing.
 
     Args:
-        variables: of the cells.
+        variables: the global variables of the cells.
     """
     global _active
     if _active is None and threading.current_thread() is threading.main_thread():
@@ -113,13 +115,13 @@ def begin(variables: dict[str, Any]) -> None:
 
 
 def say(sentence: str) -> None:
-    """The cell that runs says this if it is interrupted; see `CellInterrupts`."""
+    """Set the sentence that the running cell shows if it is interrupted; see `CellInterrupts`."""
     if _active is not None:
         _active.sentence = sentence
 
 
 def end() -> None:
-    """Hold them no longer. Kernels call it in other threads, too, for requests that come while a cell runs."""
+    """Stop holding interrupts. Kernels also call this in other threads while a cell runs; there it does nothing."""
     global _active
     if threading.current_thread() is threading.main_thread():
         ended, _active = _active, None
@@ -128,12 +130,12 @@ def end() -> None:
 
 
 def held() -> bool:
-    """Whether interrupts wait for the kit's safe places."""
+    """Return whether interrupts wait for a safe place of the kit."""
     return _active is not None
 
 
 def here() -> None:
-    """Mark a safe place, such as a wait: an exception raised here leaves nothing half done.
+    """Mark a safe place, such as a wait, where an exception leaves nothing half done.
 
     Raises:
         Interrupted: somebody has interrupted the cell.

@@ -1,4 +1,4 @@
-"""Reading the process list: who descends from whom, how much memory and CPU time is whose."""
+"""Read the process list: the descendants of a process, its memory and its CPU time."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from dataclasses import dataclass
 from autograder.core.errors import KitError
 
 _OF_A_LAUNCH = 192
-"""Threads that the programs of a launch may have together (`sandbox.limits`)."""
+"""The number of threads that the programs of a launch may have together (`sandbox.limits`)."""
 
 
 @dataclass(frozen=True)
 class Process:
-    """One line of the process list."""
+    """A process in the process list."""
 
     pid: int
     parent: int
@@ -24,10 +24,12 @@ class Process:
 
 
 def read_text(path: str) -> str:
-    """Return a file of /proc. A launch is looked at ten times a second, so without what `pathlib` and `open` add.
+    """Return the text of a file in /proc, without the overhead of `pathlib` and `open`.
+
+    This matters because a launch is inspected ten times a second.
 
     Raises:
-        OSError: it cannot be read, such as after the end of the process.
+        OSError: the file cannot be read, for example because the process has ended.
     """
     file = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
     try:
@@ -40,10 +42,10 @@ def read_text(path: str) -> str:
 
 
 def stat_fields(folder: str) -> list[str]:
-    """Return the fields of proc(5)'s `stat` from the third on, the state, of a process or a thread.
+    """Return the fields of the `stat` file of a process or thread (proc(5)), from the third field, the state, on.
 
     Raises:
-        OSError: it has ended.
+        OSError: the process or thread has ended.
     """
     return read_text(f"{folder}/stat").rpartition(")")[2].split()
 
@@ -52,16 +54,16 @@ def threads(pid: int) -> list[int]:
     """Return the ids of a process's threads.
 
     Raises:
-        OSError: it has ended.
+        OSError: the process has ended.
     """
     return [int(entry) for entry in os.listdir(f"/proc/{pid}/task")]
 
 
 def no_threads(who: str) -> KitError | None:
-    """Return what to say if the machine allows fewer threads than a launch may have; None if it allows them.
+    """Return an error if the machine allows fewer threads than a launch may have; None if it allows enough.
 
     Args:
-        who: could not go on, such as "`talker`".
+        who: the program that could not go on, such as "`talker`".
     """
     if _can_start(_OF_A_LAUNCH):
         return None
@@ -72,9 +74,9 @@ def no_threads(who: str) -> KitError | None:
 
 
 def _can_start(count: int) -> bool:
-    """Whether the system lets this process start so many more threads now; found out by starting them.
+    """Return whether this process can start `count` more threads now. To find out, start them.
 
-    A limit may be the user's, a container's or the system's, and not each of them can be read.
+    The limit may come from the user, the container or the system, and not every limit can be read.
     """
     over = threading.Event()
     before = threading.stack_size(256 * 1024)
@@ -95,7 +97,7 @@ def _can_start(count: int) -> bool:
 
 
 def descendants(root: int) -> dict[int, Process]:
-    """Return the living processes below `root`, without itself. What cannot be read has just ended."""
+    """Return the living descendants of the process `root`. A process that cannot be read has just ended."""
     everyone: dict[int, list[str]] = {}
     children: dict[int, list[int]] = {}
     for entry in os.listdir("/proc"):
@@ -118,9 +120,9 @@ def descendants(root: int) -> dict[int, Process]:
 
 
 def memory(pid: int) -> int:
-    """Return the bytes of memory, swapped out or not, that belong to no file; 0 if the process is gone.
+    """Return the bytes of memory, swapped out or not, that belong to no file; 0 if the process has ended.
 
-    What is mapped to be shared counts in full, and so do pages that a fork still shares.
+    Shared mappings count in full, and so do pages that are still shared after a fork.
     """
     total = 0
     with contextlib.suppress(OSError):
@@ -133,7 +135,7 @@ def memory(pid: int) -> int:
 
 
 def proportional_memory(pid: int) -> int:
-    """Return the bytes of memory that are this process's own; a shared page counts in parts. 0 if it is gone."""
+    """Return the bytes of memory of a process, with a proportional part of each shared page; 0 if it has ended."""
     total = 0
     with contextlib.suppress(OSError):
         for line in read_text(f"/proc/{pid}/smaps_rollup").splitlines():
@@ -143,7 +145,7 @@ def proportional_memory(pid: int) -> int:
 
 
 def cpu_time(pid: int) -> float:
-    """Return the seconds of CPU that a process has had, with those of its children that have ended; 0 if it is gone."""
+    """Return the seconds of CPU time of a process and of its children that have ended; 0 if the process has ended."""
     with contextlib.suppress(OSError):
         fields = stat_fields(f"/proc/{pid}")
         return sum(map(int, fields[11:15])) / os.sysconf("SC_CLK_TCK")
@@ -151,7 +153,7 @@ def cpu_time(pid: int) -> float:
 
 
 def wants_cpu(pid: int) -> bool:
-    """Whether a thread of a process computes, or waits for a CPU or a disk; not if the process is gone."""
+    """Return whether a thread of a process computes or waits for a CPU or a disk; False if the process has ended."""
     with contextlib.suppress(OSError):
         for thread in threads(pid):
             with contextlib.suppress(OSError, IndexError):
@@ -161,7 +163,7 @@ def wants_cpu(pid: int) -> bool:
 
 
 def pid_of(handle: int) -> int:
-    """Return the process id, as this process sees it, behind a pidfd; -1 if it has been reaped."""
+    """Return the id of the process that a pidfd refers to, as seen from this process; -1 if it has been reaped."""
     for line in read_text(f"/proc/self/fdinfo/{handle}").splitlines():
         if line.startswith("Pid:"):
             return int(line.split()[1])

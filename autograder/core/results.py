@@ -1,7 +1,7 @@
-"""The result of grading one submission: the one object behind the notebook, terminal, JSON and JUnit views.
+"""The result of grading one submission. The notebook, the terminal, JSON and JUnit all show this object.
 
-The JSON form is versioned by `SCHEMA_VERSION`. It is written where submissions are run, and read where nbgrader records
-them.
+`SCHEMA_VERSION` is the version of its JSON form. The process that runs a submission writes the JSON, and the process
+that records it in nbgrader's gradebook reads it.
 """
 
 from __future__ import annotations
@@ -20,20 +20,21 @@ from autograder.core.version import VERSION
 
 
 class Picture(BaseModel):
-    """A drawing as SVG, with what it shows in words.
+    """A drawing as SVG, with a description in words.
 
-    As the last line of a cell it is shown. A front end that trusts no notebook, nbgrader's feedback and a browser
-    without a network show it too: it is an `<img>` that holds its own data, and in such a one nothing can run.
+    A notebook shows it if it is the last value of a cell. It is an `<img>` element that contains its own data and in
+    which no script can run. It is therefore also shown in notebooks that Jupyter does not trust, in nbgrader's feedback
+    and in a browser without a network.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     svg: str
     alt: str
-    """What the picture shows, in words."""
+    """A description of the picture in words."""
 
     def html(self) -> str:
-        """Return the `<img>`, on white paper, so that a dark page does not swallow the lines."""
+        """Return the `<img>` element with a white background, so that the lines are visible on a dark page."""
         data = base64.b64encode(self.svg.encode()).decode()
         return (
             f'<img alt="{escape(" ".join(self.alt.split()))}" src="data:image/svg+xml;base64,{data}" '
@@ -53,34 +54,34 @@ SCHEMA_VERSION = 2
 
 
 def encodable(text: str) -> str:
-    """Replace what JSON can spell but UTF-8 cannot: halves of surrogate pairs."""
+    """Replace halves of surrogate pairs, which JSON can hold but UTF-8 cannot encode."""
     return text.encode("utf-8", "replace").decode("utf-8")
 
 
 Text = Annotated[str, AfterValidator(lambda text: plain(encodable(text)))]
-"""A text that may quote a student's program, whose notes can hold anything: it can always be written and shown."""
+"""A text that may quote a student's program. Whatever the program wrote, the text can be saved and shown."""
 
 
 class Status(StrEnum):
-    """What became of one expectation."""
+    """The result of one expectation."""
 
     PASSED = "passed"
     FAILED = "failed"
     NOT_CHECKED = "not checked"
-    """Something earlier in the same check failed, so this was not looked at."""
+    """Something earlier in the same check failed, so this expectation was not checked."""
     UNKNOWN = "could not find out"
-    """The grader itself failed. No points are taken; the instructor decides."""
+    """The grader itself failed. No points are taken off; the instructor decides."""
 
 
 class Isolation(StrEnum):
-    """How a student's programs were kept away from everything else."""
+    """How a student's programs were isolated from everything else."""
 
     FULL = "full"
-    """bubblewrap: own user, process, IPC and network namespaces, seccomp, limits."""
+    """bubblewrap with separate user, process, IPC and network namespaces, and with seccomp and limits."""
     REDUCED = "reduced"
-    """Landlock, seccomp and limits; the network and the process list are shared."""
+    """Landlock, seccomp and limits. The network and the process list are shared with the machine."""
     NONE = "none"
-    """No isolation at all: plain child processes with limits."""
+    """No isolation: the programs are ordinary child processes with limits."""
 
 
 class _Model(BaseModel):
@@ -88,7 +89,7 @@ class _Model(BaseModel):
 
 
 class Outcome(_Model):
-    """One expectation and what came of it, worded for a student."""
+    """One expectation and its result, in words for a student."""
 
     status: Status
     title: Text
@@ -96,79 +97,79 @@ class Outcome(_Model):
     expected: Text = ""
     observed: Text = ""
     because: Text = ""
-    """The first broken link of the chain, as a sentence."""
+    """The first thing that went wrong, as a sentence."""
     hint: Text = ""
-    """What to look at next, and where to read on."""
+    """What to look at next, and where to read more."""
     code: str = ""
     """A short stable word for the reason, such as `qos-reliability`; tests and statistics use it."""
     hidden: bool = False
-    """It stems from a hidden test: students see that it failed and the hint, nothing else."""
+    """Whether it comes from a hidden test. Students then see only that it failed, and the hint."""
     picture: Picture | None = None
-    """What explains the reason better than words."""
+    """A picture that explains the reason better than words."""
     part: str = ""
-    """Title of the part of the check that it belongs to; empty: it holds for all parts of its launch."""
+    """The title of the part of the check that it belongs to; empty if it holds for all parts of its launch."""
 
 
 class Part(_Model):
-    """One requirement of a check that gives points of its own."""
+    """A part of a check that has its own points."""
 
     title: str
     max_points: float
     points: float
     more_at_grading: bool = False
-    """What is visible of it holds; the points are decided by tests that are hidden here."""
+    """Whether the visible tests of this part passed, and hidden tests at grading decide about the points."""
 
 
 class NodeLog(_Model):
-    """What one program of the student's printed, capped, and how it ended."""
+    """The output of one of the student's programs, up to a limit, and how the program ended."""
 
     program: str
     text: str = ""
     truncated: bool = False
     exit_status: int | None = None
-    """None: it was still running when the check stopped it. Negative: the number of the signal that ended it."""
+    """None if the program was still running when the check stopped it; negative if a signal ended it (-SIGNAL)."""
     stopped_by: str = ""
-    """The limit that ended it, such as `memory limit`; empty if none did."""
+    """The limit that ended the program, such as `memory limit`; empty if no limit did."""
 
 
 class CellResult(_Model):
-    """What one cell of checks found out, and the points for it; which check of a lab that is, is not its business."""
+    """The result of one check cell and its points. It does not know which check of which lab this is."""
 
     max_points: float
     points: float | None = None
-    """None: the grader could not find out; an instructor decides."""
+    """None if the grader could not find out; an instructor then decides."""
     seconds: float = 0.0
     starved: float = 0.0
-    """Seconds for which others kept the programs, or the grader, from the CPUs when something was decided against them;
-    0 if that cannot have made a difference."""
+    """Seconds for which other processes kept the programs, or the grader, from the CPUs before an expectation failed;
+    0 if this cannot have made a difference."""
     outcomes: list[Outcome] = Field(default_factory=list)
     parts: list[Part] = Field(default_factory=list)
-    """The parts that give points independently of each other; empty: all or nothing."""
+    """The parts that give points independently of each other; empty if the check gives all of its points or none."""
     more_at_grading: bool = False
-    """Hidden tests were taken out of this copy of the check: what is passed here is not yet earned."""
+    """Whether hidden tests were removed from this copy of the check, so that a pass here has not yet earned points."""
 
     flags: list[Text] = Field(default_factory=list)
-    """What an instructor should look at, such as what contradicts itself, or cannot be read; it changes no points."""
+    """What an instructor should look at, such as a contradiction or unreadable data. Flags change no points."""
     not_attempted: list[str] = Field(default_factory=list)
-    """Files of answer cells that are still as students receive them; for this the check did not pass."""
+    """Files of answer cells that are still as students receive them. If there are any, the check has not passed."""
     logs: list[NodeLog] = Field(default_factory=list)
-    """What the programs printed that it launched."""
+    """The output of the programs that the check launched."""
 
     @property
     def sure_points(self) -> float | None:
-        """Points that grading will give as well, whatever its hidden tests find; None: nobody could find out."""
+        """Points that grading will give as well, whatever its hidden tests find; None if the grader could not tell."""
         if self.points is None or not self.more_at_grading:
             return self.points
         return sum(part.points for part in self.parts if not part.more_at_grading)
 
     @property
     def possible_points(self) -> float:
-        """Points that grading can still give: all but those that are lost already."""
+        """Points that grading can still give: the maximum without what is already lost."""
         return self.max_points if self.points is None else self.points
 
     @property
     def status(self) -> Status:
-        """The worst outcome: could not find out, then failed, then passed."""
+        """The status of the worst outcome. "Could not find out" is worse than "failed", and "failed" than "passed"."""
         statuses = {outcome.status for outcome in self.outcomes}
         if self.points is None or Status.UNKNOWN in statuses:
             return Status.UNKNOWN
@@ -176,7 +177,7 @@ class CellResult(_Model):
 
     @property
     def first_failure(self) -> Outcome | None:
-        """The outcome that decided, if the check did not pass."""
+        """The first outcome that failed or is unknown; None if there is none."""
         return next((o for o in self.outcomes if o.status in (Status.FAILED, Status.UNKNOWN)), None)
 
 
@@ -187,35 +188,35 @@ class CheckResult(CellResult):
     title: str = ""
     """The nearest heading above its cell."""
     run_again: bool = False
-    """It was run a second time, alone, because others had kept its programs from the CPUs."""
+    """Whether the check was run a second time, alone, because other processes had kept its programs from the CPUs."""
 
 
 class SubmissionResult(_Model):
-    """Everything that is known of one graded submission."""
+    """Everything that is known about one graded submission."""
 
     schema_version: int = SCHEMA_VERSION
     kit_version: str = VERSION
     student: str
     lab: str
     digest: str
-    """SHA-256 over the submission's files, the lab's source and the kit's: it changes when any of them does."""
+    """SHA-256 over the submission's files, the lab's source and the kit's source. It changes when any of them does."""
     isolation: Isolation
     seed: int = 0
-    """Seed of the values that differ from run to run."""
+    """Seed of the random values that differ from run to run."""
     problems: list[Outcome] = Field(default_factory=list)
-    """What is wrong with the submission as a whole: a broken notebook, a forged cell."""
+    """Problems of the whole submission, such as a broken notebook or a forged cell."""
     checks: list[CheckResult] = Field(default_factory=list)
     seconds: dict[str, float] = Field(default_factory=dict)
     """Durations in seconds, by step."""
 
     @property
     def points(self) -> float:
-        """Points earned so far; a check nobody could decide counts 0 until an instructor does."""
+        """Points earned so far. A check that could not be decided counts 0 until an instructor decides."""
         return sum(check.sure_points or 0.0 for check in self.checks)
 
     @property
     def possible_points(self) -> float:
-        """Points that grading can still give; more than `points` where hidden tests or a person decide."""
+        """Points that grading can still give; more than `points` if hidden tests or a person still have to decide."""
         return sum(check.possible_points for check in self.checks)
 
     @property
@@ -225,11 +226,11 @@ class SubmissionResult(_Model):
 
     @property
     def flags(self) -> list[str]:
-        """Contradictions that a person should look at, of all checks, each once."""
+        """What an instructor should look at, from all checks; each flag is listed once."""
         return list(dict.fromkeys(flag for check in self.checks for flag in check.flags))
 
     def without_pictures(self) -> SubmissionResult:
-        """The same without what is most of it, for who holds a whole class in memory."""
+        """Return a copy without pictures, which take most of the memory, for code that holds the results of a class."""
         checks = [
             check.model_copy(
                 update={"outcomes": [outcome.model_copy(update={"picture": None}) for outcome in check.outcomes]}
@@ -239,10 +240,15 @@ class SubmissionResult(_Model):
         return self.model_copy(update={"checks": checks})
 
     def save(self, path: Path) -> None:
-        """Write the result as JSON, whole or not at all."""
+        """Write the result as JSON, completely or not at all."""
         write_beside(path, self.model_dump_json(indent=1) + "\n")
 
     @classmethod
     def load(cls, path: Path) -> SubmissionResult:
-        """Read a result; pydantic's ValidationError if it is not one of this schema version."""
+        """Read a result from JSON.
+
+        Raises:
+            ValidationError: the file does not have the form of this schema version.
+            OSError: the file cannot be read.
+        """
         return cls.model_validate_json(path.read_text(encoding="utf-8"))

@@ -1,9 +1,9 @@
-"""YAML that a student wrote: one safe way to read it, for tables of answers, parameter files and launch files.
+"""Read YAML that a student wrote, safely: tables of answers, parameter files and launch files.
 
-What it accepts is what `yaml.safe_load` makes of plain YAML. Every tag beyond the plain types, and everything too large
-or too deep is refused, where what an alias stands for counts as if it were written out; and whatever is wrong with a
-text becomes one `Refused`, whose sentence and place name the line as the notebook shows it. In a table of answers a
-line that stands twice is no reason to refuse the others.
+The values are those that `yaml.safe_load` returns for plain YAML. Tags other than the plain types are refused, and so
+is a text that is too large or too deeply nested; an alias counts as if its value were written out. Every fault becomes
+one `Refused`, whose sentence and place give the line as the notebook shows it. In a table of answers, a line that
+appears twice does not make the other lines invalid.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import yaml
 from autograder.reasons import Group, Kind, Refused
 
 NOT_YAML = Kind(
-    "not-yaml", "the file is not YAML, or is a list or one text where lines `name: value` belong", Group.FILES
+    "not-yaml", "the file is not YAML, or is a list or a single text instead of lines `name: value`", Group.FILES
 )
 YAML_REFUSED = Kind(
     "yaml-refused",
@@ -29,13 +29,13 @@ FILE_MISSING = Kind("file-missing", "no cell has written this file", Group.FILES
 FILE_TOO_LARGE = Kind("file-too-large", "the file is larger than an answer cell may be", Group.FILES)
 
 FILE_BYTES = 64 * 1024
-"""The largest file that is read, in bytes of UTF-8: as large as an answer cell may be."""
+"""The size of the largest file that is read, in bytes of UTF-8. It is also the limit for an answer cell."""
 DEPTH = 40
-"""Lists and mappings that may stand inside one another."""
+"""The deepest nesting of lists and mappings that is allowed."""
 VALUES = 5000
-"""Values, keys included, that one file may have."""
+"""The number of values, including keys, that one file may have."""
 NUMBER_LENGTH = 60
-"""Characters of a number: many more than any number of ROS needs."""
+"""The number of characters that a number may have; no number in ROS needs as many."""
 
 _PREFIX = "tag:yaml.org,2002:"
 _KINDS = {
@@ -46,7 +46,7 @@ _KINDS = {
     "timestamp": "a date",
 }
 _PLAIN_TAGS = {_PREFIX + kind for kind in ("str", "bool", "int", "float", "null", "seq", "map")}
-# PyYAML's own words for what students run into most, and the same in theirs.
+# PyYAML's messages for the most common faults, and what students read instead.
 _PROBLEMS = {
     "mapping values are not allowed": "a `:` is not expected there. Check the indentation of this line and the colon of"
     " the line above, or put a text that holds a colon in quotes",
@@ -59,39 +59,39 @@ _PROBLEMS = {
     "expected the node content": "a value is expected there; perhaps a bracket above is not closed",
     "expected ',' or": "a bracket is not closed, or a comma is missing",
     "found another document": "a second document begins there. Leave out the line `---`",
-    "expected '<document start>'": "the lines above are a whole value already, to which this does not belong",
-    "found unexpected document separator": "`---` stands inside a value",
+    "expected '<document start>'": "the lines above are already a complete value, so this line cannot follow them",
+    "found unexpected document separator": "`---` is inside a value",
     "second occurrence": "two anchors have this name. Give this one another",
-    "undefined alias": "no anchor of this name stands above it",
+    "undefined alias": "no anchor with this name is defined above it",
     "for merging": "`<<` takes a mapping, such as `*name`",
     "special characters are not allowed": "a character that cannot be printed is not allowed",
 }
 
 
 class RefusedHere(Refused):
-    """What PyYAML does not take for YAML, and ROS 2 may, which reads with libyaml: a tab between words, for example."""
+    """A text that PyYAML refuses but that ROS 2, which uses libyaml, may accept: a tab between words, for example."""
 
 
 @dataclass(frozen=True)
 class Twice:
-    """In a table, the value of a key that stands there more than once."""
+    """The value that a table gets for a key that appears in it more than once."""
 
     lines: tuple[int, int]
-    """The first two of them, as the notebook counts them in the cell."""
+    """The first two lines with the key, as the notebook numbers the lines of the cell."""
 
     def __str__(self) -> str:
-        """What is wrong, as the end of a sentence about the key."""
-        return "stands there twice, in lines {} and {} of the cell".format(*self.lines)
+        """Say what the fault is, as the end of a sentence about the key."""
+        return "appears twice, in lines {} and {} of the cell".format(*self.lines)
 
 
 class Written(dict[Any, Any]):
-    """A mapping that also knows the text of each value that is a plain one: `010`, where YAML makes 8 of it."""
+    """A mapping that also holds the text of each plain value, such as `010`, which YAML reads as 8."""
 
     written: dict[Any, str]
 
 
 def cell_line(index: int, text: str) -> int:
-    """Return the line of a cell at which a character of its file stands: the magic above the file is line 1."""
+    """Return the cell's line number for a position in its file. The magic above the file is line 1 of the cell."""
     return text.count("\n", 0, index) + 2
 
 
@@ -99,13 +99,13 @@ def load(text: str, name: str = "the file", table: bool = False, written: bool =
     """Read a YAML text.
 
     Args:
-        text: what stands below the cell's first line.
-        name: what the sentence of an error calls it.
-        table: whether it is a table of answers, in which the value of a key that stands there twice is a `Twice`.
-        written: whether each mapping is a `Written`.
+        text: the text below the cell's first line.
+        name: the name of the text in error messages.
+        table: whether this is a table of answers. A key that appears twice in it gets a `Twice` as its value.
+        written: whether each mapping is returned as a `Written`.
 
     Raises:
-        Refused: it is not YAML, or not plain enough. Nothing else is ever raised.
+        Refused: the text is not YAML, or uses more than plain YAML. Nothing else is ever raised.
     """
     if len(text) > FILE_BYTES or len(text.encode("utf-8", "replace")) > FILE_BYTES:
         raise Refused(FILE_TOO_LARGE(f"{name} is larger than {FILE_BYTES // 1024} KiB."))
@@ -119,7 +119,7 @@ def load(text: str, name: str = "the file", table: bool = False, written: bool =
         raise _error(text, name, refused.index, f": {refused}", YAML_REFUSED) from None
     except yaml.MarkedYAMLError as error:
         problem = error.problem or error.context or ""
-        # Of what is never closed, and of a key without its colon, the beginning helps: the end is noticed lines later.
+        # If a quotation mark is not closed or a colon is missing, show where it begins: PyYAML notices it lines later.
         begun = "end of stream" in problem or "could not find expected ':'" in problem
         mark = (error.context_mark if begun else None) or error.problem_mark or error.context_mark
         wrong = _error(text, name, mark.index if mark else None, f" is not YAML: {_in_plain_words(problem)}")
@@ -128,7 +128,7 @@ def load(text: str, name: str = "the file", table: bool = False, written: bool =
         raise wrong from None
     except yaml.reader.ReaderError as error:
         raise _error(text, name, error.position, f" is not YAML: {_in_plain_words(error.reason)}") from None
-    except Exception:  # PyYAML lets through whatever int(), float() and its own slips raise
+    except Exception:  # PyYAML does not catch the errors of int() and float(), nor those of its own defects
         raise _error(text, name, None, " is not YAML: it cannot be read") from None
 
 
@@ -136,7 +136,7 @@ def read(path: Path, table: bool = False, written: bool = False) -> Any:
     """Read a student's YAML file; for `table` and `written` see `load`.
 
     Raises:
-        Refused: it is missing, is no text, or `load` refuses it.
+        Refused: the file is missing, is not text, or is refused by `load`.
     """
     name = f"`{path.name}`"
     try:
@@ -144,7 +144,7 @@ def read(path: Path, table: bool = False, written: bool = False) -> Any:
             content = file.read(FILE_BYTES + 1)
     except OSError:
         because = f"No cell that begins with `%%file {path.name}` was found."
-        hint = "Check the first line of the cell; it must stand there unchanged."
+        hint = "Check the first line of the cell, which must not be changed."
         raise Refused(FILE_MISSING(because, hint)) from None
     try:
         text = content.decode("utf-8", "strict" if len(content) <= FILE_BYTES else "replace")
@@ -159,8 +159,10 @@ def _error(text: str, name: str, index: int | None, what: str, kind: Kind = NOT_
 
 
 def _taken_elsewhere(text: str, index: int, problem: str) -> bool:
-    """Whether ROS 2, which reads parameter files with libyaml, may take what PyYAML does not: a tab that is no
-    indentation, a second document, an anchor's name that stands twice."""
+    """Return whether ROS 2, which reads parameter files with libyaml, may accept what PyYAML refuses.
+
+    This is so for a tab that is not indentation, a second document, and an anchor that is defined twice.
+    """
     if "second occurrence" in problem:
         return True
     begin = text.rfind("\n", 0, index) + 1
@@ -175,7 +177,7 @@ def _in_plain_words(problem: str) -> str:
 
 
 class _RefusedError(Exception):
-    """Something that is refused here though YAML has it; where it stands."""
+    """A part of YAML that is not allowed here, and its position."""
 
     def __init__(self, mark: Any, because: str) -> None:
         super().__init__(because)
@@ -183,19 +185,19 @@ class _RefusedError(Exception):
 
 
 class _Loader(yaml.SafeLoader):
-    """PyYAML's safe loader for plain YAML; it refuses while it reads, before anything can grow."""
+    """PyYAML's safe loader, limited to plain YAML. It refuses a text while it reads, before it uses much memory."""
 
     def __init__(self, text: str, table: bool, written: bool) -> None:
         super().__init__(text)
         self._text, self._table, self._written = text, table, written
         self._depth = self._values = 0
-        self._open: set[str] = set()  # anchors whose value is still being read
+        self._open: set[str] = set()  # the anchors whose value is still being read
 
     def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
         event: Any = self.peek_event()  # type: ignore[no-untyped-call]
         if isinstance(event, yaml.AliasEvent):
             if event.anchor in self._open:
-                raise _RefusedError(event.start_mark, f"`*{event.anchor[:40]}` stands inside what it is to repeat")
+                raise _RefusedError(event.start_mark, f"`*{event.anchor[:40]}` is inside the value that it repeats")
             return self._written_out(super().compose_node(parent, index), event.start_mark, self._depth)
         if getattr(event, "tag", None) not in (None, "!", *_PLAIN_TAGS):
             tag = event.tag.replace(_PREFIX, "!!")[:40]
@@ -213,10 +215,10 @@ class _Loader(yaml.SafeLoader):
         if self._values > VALUES:
             raise _RefusedError(mark, f"the file has more than {VALUES} values")
         if depth >= DEPTH:
-            raise _RefusedError(mark, f"more than {DEPTH} lists and mappings stand inside one another")
+            raise _RefusedError(mark, f"lists and mappings are nested more than {DEPTH} levels deep")
 
     def _written_out(self, node: yaml.Node | None, mark: Any, depth: int) -> yaml.Node | None:
-        """A copy of what an alias stands for, all of whose values count: a short text stays as small as it looks."""
+        """Return a copy of an alias's value and count all of its values, so that a short text cannot become large."""
         self._count(mark, depth)
         if isinstance(node, yaml.SequenceNode):
             items: list[Any] = [self._written_out(item, mark, depth + 1) for item in node.value]
@@ -241,7 +243,7 @@ class _Loader(yaml.SafeLoader):
             raise _RefusedError(node.start_mark, because) from None
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
-        """The mapping, whose keys must be plain and differ: of two equal ones the first would be lost."""
+        """Return the mapping. Its keys must be plain and different, because of two equal keys one would be lost."""
         if not isinstance(node, yaml.MappingNode):
             raise _RefusedError(node.start_mark, "`key: value` lines are expected there")
         first: dict[Any, yaml.Node] = {}
@@ -259,13 +261,13 @@ class _Loader(yaml.SafeLoader):
                     continue
                 raise _RefusedError(
                     key_node.start_mark,
-                    f"the key `{key_node.value[:40]}` stands a second time; it is also in line {line}",
+                    f"the key `{key_node.value[:40]}` appears a second time; it is also in line {line}",
                 )
             first[key] = key_node
         return {**super().construct_mapping(node, deep), **twice}
 
     def make_mapping(self, node: yaml.MappingNode) -> Iterator[dict[Any, Any]]:
-        """The mapping, filled when all of it is known, as PyYAML makes each."""
+        """Yield an empty mapping and fill it afterwards, as PyYAML's own constructors do."""
         made: dict[Any, Any] = Written() if self._written else {}
         yield made
         made.update(self.construct_mapping(node))

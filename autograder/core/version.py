@@ -1,3 +1,3 @@
-"""The kit's version, which stands in every result; the wheel takes its own from here."""
+"""The kit's version. It is stored in every result, and the wheel's version is read from here."""
 
 VERSION = "0.2.0"

@@ -1,1 +1,1 @@
-"""A course: its folder, its labs, the marks in their notebooks."""
+"""A course: its folders, its settings, its labs and the cells of their notebooks."""

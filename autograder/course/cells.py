@@ -1,7 +1,7 @@
-"""What one cell of a lab says: its source, its grade_id, the file it names, and what students do not see of it.
+"""Read a cell of a lab: its source, its grade_id, the file that it names, and the lines that students do not see.
 
-The first line of an answer cell may say which file the rest of the cell is: `%%node talker`, `%%file camera.yaml`. What
-students do not receive stands between `BEGIN …` and `END …`, as in nbgrader.
+The first line of an answer cell may say which file the rest of the cell is written to: `%%node talker`, `%%file
+camera.yaml`. Lines that students do not receive are between `BEGIN …` and `END …`, as in nbgrader.
 """
 
 from __future__ import annotations
@@ -19,72 +19,72 @@ from typing import Any
 from autograder.core.results import encodable
 
 CODE_STUB = "# YOUR CODE HERE"
-"""What students find in place of a solution: a comment in Python and in YAML."""
+"""The line that students find instead of a solution. It is a comment both in Python and in YAML."""
 TEXT_STUB = "YOUR ANSWER HERE"
 
 _HEADING = re.compile(r"^(#{1,6})\s+(.*?)\s*#*\s*$", re.MULTILINE)
 _FENCED = re.compile(r"^(```|~~~).*?^\1[`~]*$", re.MULTILINE | re.DOTALL)
-"""Code, in which such a line is a comment."""
+"""A code block, in which a line that begins with `#` is no heading."""
 
 MORE_AT_GRADING = "# More is checked here when the lab is graded."
-"""The line that stands in a released check cell where hidden tests were taken out."""
+"""The line that replaces hidden tests in a released check cell."""
 
 MARK = re.compile(r"\b(BEGIN|END) (SOLUTION|HIDDEN TESTS|MARK SCHEME)\b")
-"""Each of the marks: which end of a region, and of which."""
+"""A mark: whether it begins or ends a region, and the kind of the region."""
 
 _HIDDEN = "HIDDEN TESTS"
 
 CELL_BYTES = 64 * 1024
-"""The largest answer cell that is read, in bytes of UTF-8."""
+"""The size of the largest answer cell that is read, in bytes of UTF-8."""
 
 NAME_LENGTH = 100
-"""Characters of a file's name; file systems allow 255 bytes."""
+"""The number of characters that a file name may have. File systems allow 255 bytes."""
 
 _NODE_NAME = re.compile(r"[a-z][a-z0-9_]{0,63}")
 _FILE_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}(\.[A-Za-z0-9_-]{1,32})*\.(yaml|yml|json|csv)")
 _PACKAGE_FILE = re.compile(r"src(/[A-Za-z0-9_][A-Za-z0-9_.-]{0,63}){2,5}")
-"""A file of a ROS package, in the place that it has in a colcon workspace."""
+"""The path of a file of a ROS package in a colcon workspace."""
 
 FOR_CHECKS = "for-checks"
-"""The tag of a cell that students run and need not read: it is folded in the released notebook, as checks are."""
+"""The tag of a cell that students run but need not read. Like a check, it is collapsed in the released notebook."""
 
 
 def nbgrader_of(cell: dict[str, Any]) -> dict[str, Any]:
-    """Return a cell's nbgrader metadata; empty if it has none, or something else in its place."""
+    """Return a cell's nbgrader metadata; empty if the cell has none or if it is not a mapping."""
     metadata = cell.get("metadata")
     nbgrader = metadata.get("nbgrader") if isinstance(metadata, dict) else None
     return nbgrader if isinstance(nbgrader, dict) else {}
 
 
 def grade_id_of(cell: dict[str, Any]) -> str:
-    """Return a cell's grade_id; empty if it has none."""
+    """Return a cell's grade_id; empty if the cell has none."""
     grade_id = nbgrader_of(cell).get("grade_id")
     return encodable(grade_id) if isinstance(grade_id, str) else ""
 
 
 def cell_digest(source: str) -> str:
-    """Return what tells one text of a cell from another; blanks at the ends of lines and of the cell do not count."""
+    """Return a digest of a cell's text, without spaces at the ends of lines and blank lines around the text."""
     lines = [line.rstrip() for line in source.replace("\r\n", "\n").strip().split("\n")]
     return hashlib.sha256("\n".join(lines).encode("utf-8", "replace")).hexdigest()[:16]
 
 
 def blank_mark(source: str) -> dict[str, str]:
-    """Return metadata for an answer cell, below `autograder`, by which a notebook knows that it is still untouched."""
+    """Return metadata for an answer cell, under the key `autograder`, that shows later whether the cell was changed."""
     return {"blank": cell_digest(source)}
 
 
 def blank_mark_of(cell: dict[str, Any]) -> str:
-    """Return the digest in a cell's `blank_mark`; empty if it has none."""
+    """Return the digest in a cell's `blank_mark`; empty if the cell has no such mark."""
     metadata = cell.get("metadata")
     mark = metadata.get("autograder") if isinstance(metadata, dict) else None
     return str(mark.get("blank", "")) if isinstance(mark, dict) else ""
 
 
 def source_of(cell: dict[str, Any]) -> str:
-    """Return a cell's source as one string that can be encoded; notebooks hold it as a string or as lines.
+    """Return a cell's source as one string that UTF-8 can encode. Notebooks store it as a string or a list of lines.
 
     Raises:
-        ValueError: it is neither.
+        ValueError: the source is neither a string nor a list of lines.
     """
     source = cell.get("source", "")
     if isinstance(source, list) and all(isinstance(line, str) for line in source):
@@ -95,19 +95,19 @@ def source_of(cell: dict[str, Any]) -> str:
 
 
 def for_checks(cell: dict[str, Any]) -> bool:
-    """Whether a cell holds what only checks use, such as a lab's own expectations: it has the tag `for-checks`."""
+    """Return whether a cell has the tag `for-checks`: only checks use it, for example a lab's own expectations."""
     metadata = cell.get("metadata")
     tags = metadata.get("tags") if isinstance(metadata, dict) else None
     return isinstance(tags, list) and FOR_CHECKS in tags
 
 
 def headings(markdown: str) -> list[tuple[int, str]]:
-    """Return the headings in a cell's text, each with its level, from 1."""
+    """Return the headings in a cell's text as pairs of level and title. Levels start at 1."""
     return [(len(marks), text) for marks, text in _HEADING.findall(_FENCED.sub("", markdown))]
 
 
 class BadNameError(ValueError):
-    """The name in the cell's first line cannot be the name of a file; the message says why, for a student."""
+    """The name in a cell's first line is not allowed as the name of a file. The message tells a student why."""
 
 
 @dataclass(frozen=True)
@@ -117,22 +117,22 @@ class CellFile:
     magic: str
     """`node` or `file`."""
     name: str
-    """The name as it stands in the cell."""
+    """The name as it is written in the cell."""
     text: str
-    """The file's text. A program begins with the cell's first line as a comment, so that its lines have the numbers
-    that JupyterLab shows; of another file, which may have no comments, that line is left out."""
+    """The text of the file. A program begins with the cell's first line as a comment, so that its line numbers are
+    those that JupyterLab shows. In other files this line is left out, because their format may have no comments."""
 
     @property
     def file_name(self) -> str:
-        """The file's name in the folder of the submission's programs."""
+        """The name of the file in the folder of the submission's programs."""
         return f"{self.name}.py" if self.magic == "node" else self.name
 
 
 def check_name(magic: str, name: str) -> None:
-    """Refuse every name that is not plainly a program or a data file in the same folder.
+    """Refuse a name unless it is the plain name of a program or data file, or the path of a package's file.
 
     Raises:
-        BadNameError: with the reason.
+        BadNameError: the name is refused; the message gives the reason.
     """
     if not name:
         example = "talker" if magic == "node" else "camera.yaml"
@@ -154,17 +154,17 @@ def check_name(magic: str, name: str) -> None:
 
 @cache
 def names_installed_module(name: str) -> bool:
-    """Whether a program of this name would stand before a module of Python's or of an installed package."""
+    """Return whether a program with this name would hide a module of Python or of an installed package."""
     folders = {sysconfig.get_path(kind) for kind in ("stdlib", "platstdlib", "purelib", "platlib")}
     spec = PathFinder.find_spec(name, sorted(folders))
     return name in sys.stdlib_module_names or (spec is not None and spec.origin is not None)
 
 
 def check_free(file: CellFile) -> None:
-    """Refuse a program that would hide a module which it, or another program, may want to import.
+    """Refuse a program that would hide an installed module, which it or another program may want to import.
 
     Raises:
-        BadNameError: with the reason.
+        BadNameError: the name is refused; the message gives the reason.
     """
     if file.magic == "node" and names_installed_module(file.name):
         raise BadNameError(
@@ -174,14 +174,14 @@ def check_free(file: CellFile) -> None:
 
 
 def parse(source: str) -> CellFile | None:
-    """Read a cell's first line; None if the cell names no file.
+    """Return the file that a cell's first line names; None if the cell names no file.
 
     Raises:
-        BadNameError: it wants to name a file, but not with a name that is allowed.
+        BadNameError: the first line names a file, but the name is not allowed.
     """
     lines = source.replace("\r\n", "\n").split("\n")
     above = next((number for number, line in enumerate(lines) if line.strip()), len(lines))
-    if above < len(lines):  # IPython takes off what the first line is indented by
+    if above < len(lines):  # IPython removes the indentation of the first line from all lines
         indent = lines[above].removesuffix(lines[above].lstrip(" \t"))
         lines = [line.removeprefix(indent) for line in lines]
     match = re.fullmatch(r"%%(node|file)(\s.*)?", lines[above]) if above < len(lines) else None
@@ -195,7 +195,7 @@ def parse(source: str) -> CellFile | None:
 
 
 def without_region(source: str, mark: str, stub: str | None = None) -> str:
-    """Drop the lines between `BEGIN mark` and `END mark`, or put a stub in their place, as nbgrader does."""
+    """Remove the lines between `BEGIN mark` and `END mark`, or replace them with a stub, as nbgrader does."""
     lines: list[str] = []
     inside = False
     for line in source.split("\n"):
@@ -211,7 +211,7 @@ def without_region(source: str, mark: str, stub: str | None = None) -> str:
 
 
 def without_hidden_tests(source: str) -> str:
-    """Return a check cell as students receive it: a line says where more is checked at grading."""
+    """Return a check cell as students receive it, with a line in each place where more is checked at grading."""
     return without_region(source, _HIDDEN, MORE_AT_GRADING)
 
 

@@ -1,7 +1,7 @@
 """A lab as the instructor wrote it: which cells are trusted, which are answers, and what students receive.
 
-The notebook under `solutions/` is the only source. Where there is none, as in a student's copy of the course, the
-notebook under `labs/` serves: it has the same cells without the hidden tests.
+The notebook under `solutions/` is the only source. If there is none, as in a student's copy of the course, the
+notebook under `labs/` is used. It has the same cells without the solutions and the hidden tests.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ from autograder.course.settings import read_settings
 
 @cache
 def kit_digest() -> str:
-    """SHA-256 over the kit's own source: its version stays the same between two releases, its checks do not."""
+    """Return the SHA-256 of the kit's own source. Between two releases the checks change, but the version does not."""
     package = Path(__file__).resolve().parent.parent
     files = sorted(path for path in package.rglob("*") if path.suffix in (".py", ".html", ".xml"))
     parts = [(str(path.relative_to(package)), hashlib.sha256(path.read_bytes()).hexdigest()) for path in files]
@@ -55,9 +55,9 @@ class Cell(BaseModel):
     title: str = ""
     """The nearest heading above it."""
     points: float | None = None
-    """None: a set-up cell that is run but not graded."""
+    """The points of a check; None for a set-up cell, which is run but not graded."""
     source: str
-    """With the hidden tests and their markers."""
+    """The source with the hidden tests and their markers."""
 
 
 @dataclass(frozen=True)
@@ -69,27 +69,27 @@ class Answer:
     blank: str
     """The source that students receive."""
     solution: str
-    """The source that solves it, without the markers."""
+    """The source of the model answer, without the markers."""
     file: CellFile | None
     """The file that the blank cell names; None for an answer in plain text."""
     points: float | None
-    """What a person can give for it; None if it is not graded by hand."""
+    """The points that a person can give for it; None if it is not graded by hand."""
 
 
 @dataclass(frozen=True, eq=False)
 class Lab:
-    """A lab, read from its notebook; a file that has not changed gives the same object again."""
+    """A lab, read from its notebook. `load_lab` returns the same object again if the file has not changed."""
 
     name: str
     notebook: Path
     raw: dict[str, Any]
     """The notebook's JSON."""
     cells: tuple[Cell, ...]
-    """The trusted code cells in order, set-up cells and check cells."""
+    """The trusted code cells in the notebook's order: set-up cells and check cells."""
     answers: dict[str, Answer]
-    """By grade_id, in order."""
+    """The answer cells by grade_id, in the notebook's order."""
     given: dict[str, str]
-    """Files of locked cells, by file name: programs that students use but do not write."""
+    """The text of each file that a locked cell names, by file name: programs that students use but do not write."""
     released: tuple[dict[str, Any], ...]
     """The cells that students receive."""
 
@@ -100,12 +100,12 @@ class Lab:
 
     @property
     def max_points(self) -> float:
-        """Points that the checks can give; answers graded by hand come on top."""
+        """The most points that the checks can give, without those for answers that are graded by hand."""
         return sum(cell.points or 0.0 for cell in self.cells)
 
     @cached_property
     def digest(self) -> str:
-        """SHA-256 over everything that can change a result: the trusted cells, the files they use, and the kit."""
+        """SHA-256 over what can change a result: the kit, the trusted cells, the given files and the answer cells."""
         parts = [
             kit_digest(),
             [cell.model_dump(exclude={"title"}) for cell in self.cells],
@@ -116,11 +116,15 @@ class Lab:
 
     @cached_property
     def source_digest(self) -> str:
-        """SHA-256 over the lab's notebook: all that the gradebook knows of it, and feedback shows."""
+        """SHA-256 over the lab's whole notebook, which the gradebook and the feedback depend on."""
         return hashlib.sha256(json.dumps(self.raw).encode()).hexdigest()
 
     def files_with(self, sources: Mapping[str, str]) -> dict[str, str]:
-        """The files of a submission: the lab's own, and those of the answers, whose cells are given by `grade_id`."""
+        """Return the files of a submission by name: the lab's own files and those of the answers.
+
+        Args:
+            sources: the source of each answer cell, by grade_id.
+        """
         files = dict(self.given)
         for grade_id, answer in self.answers.items():
             file = parse(sources[grade_id]) if answer.file is not None else None
@@ -129,7 +133,7 @@ class Lab:
         return files
 
     def clean_notebook(self, sources: dict[str, str]) -> dict[str, Any]:
-        """Return the released notebook with these sources in its answer cells: nothing else of a student's is in it."""
+        """Return the released notebook with a student's answers in it, and nothing else from the student."""
         cells = copy.deepcopy(list(self.released))
         for cell in cells:
             grade_id = grade_id_of(cell)
@@ -156,7 +160,7 @@ def load_lab(root: Path, name: str) -> Lab:
     """Read a lab of the course at `root`.
 
     Raises:
-        KitError: there is no such lab, or its notebook cannot be used; says which cell.
+        KitError: there is no such lab, or its notebook cannot be used. The message says why.
     """
     candidates = [root / folder / name / f"{name}.ipynb" for folder in ("solutions", "labs")]
     notebook = next((path for path in candidates if path.is_file()), None)
@@ -196,7 +200,7 @@ def _read(name: str, notebook: Path, raw: dict[str, Any], released_only: bool) -
         blank = source
         points = float(nbgrader["points"]) if nbgrader.get("grade") else None
         if nbgrader.get("solution"):
-            # A released notebook holds no solutions; whatever stands in its answers is what there is to start from.
+            # A released notebook holds no solutions, so its answer cells are already what students start from.
             blank = source if released_only else _without_solution(source, cell["cell_type"])
             answers[grade_id] = Answer(
                 grade_id, cell["cell_type"], blank, _without_markers(source), _file(grade_id, blank), points

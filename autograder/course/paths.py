@@ -1,4 +1,4 @@
-"""Where everything of a course lies: the one place that knows the names in it."""
+"""The paths of all files and folders of a course. Their names are defined only here."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from autograder.setup.places import KIT_FOLDER, ROOT
 
 
 def course_root(named: Path | None = None) -> Path:
-    """Return the course that was named, or else the one that the working folder lies in, or else the kit's own.
+    """Return the named course, or else the course around the working folder, or else the kit's own course.
 
-    For who works on a course; whose checks are run on what somebody handed in, `trusted_course` says.
+    This is for people who work on a course. Use `trusted_course` to run checks on a submission.
 
     Raises:
-        KitError: there is none.
+        KitError: there is no course.
     """
     if named is not None:
         return _named(named)
@@ -24,19 +24,19 @@ def course_root(named: Path | None = None) -> Path:
         if is_course(folder):
             return folder
     raise KitError(
-        "There is no course here: no folder with `solutions` or `labs`.",
+        "There is no course here: no folder with labs in `solutions` or `labs`.",
         "Run it inside the course's folder, or begin one: autograder new course DIR",
     )
 
 
 def trusted_course(named: Path | None) -> Path:
-    """Return the course whose checks may be run on a notebook: the one that was named, or the kit's own.
+    """Return the course whose checks may be run on a notebook: the named course, or else the kit's own.
 
-    Never what lies beside the notebook, above it, or in the working folder: whoever handed in the notebook may have put
-    it there, and check cells are trusted code.
+    A course beside or above the notebook or in the working folder is never used. Check cells are trusted code, and
+    whoever handed in the notebook may have put that course there.
 
     Raises:
-        KitError: there is none.
+        KitError: there is no such course.
     """
     own = ROOT / KIT_FOLDER if is_students_kit() else ROOT
     if named is not None:
@@ -55,22 +55,22 @@ def _named(folder: Path) -> Path:
 
 
 def is_students_kit() -> bool:
-    """Whether this is the environment of a student's kit, which has no solutions and grades nobody.
+    """Return whether this is the environment of a student's kit, which has no solutions and cannot grade a class.
 
-    Such a kit has two courses: `labs/`, where the student works, and below `kit/` the labs as they were handed out,
-    whose checks are run.
+    Such a kit has two courses. The student works in `labs/`. The labs below `kit/` are as they were handed out, and
+    their checks are run.
     """
     return is_course(ROOT / KIT_FOLDER)
 
 
 def book_of_kit() -> Path | None:
-    """Return the folder of the lectures in a student's kit; None if this is none, or it came without."""
+    """Return the folder of the lectures in a student's kit; None if this is no student's kit or it has no lectures."""
     folder = ROOT / "lectures"
     return folder if is_students_kit() and (folder / "index.html").is_file() else None
 
 
 def is_course(folder: Path) -> bool:
-    """Whether it has a course's settings, or a lab; many folders called `labs` hold something else."""
+    """Return whether a folder has a course's settings or a lab. Many folders called `labs` hold something else."""
     return (folder / SETTINGS_FILE).is_file() or any(
         path.stem == path.parent.name for name in ("solutions", "labs") for path in (folder / name).glob("*/*.ipynb")
     )
@@ -94,61 +94,61 @@ class CoursePaths:
 
     @property
     def build(self) -> Path:
-        """Everything that grading makes."""
+        """Everything that grading creates."""
         return self.root / "build"
 
     @property
     def submitted(self) -> Path:
-        """What was taken in: `<student>/<lab>/<lab>.ipynb`, as nbgrader wants it."""
+        """The submissions, as `<student>/<lab>/<lab>.ipynb`, which is the layout that nbgrader expects."""
         return self.build / "submitted"
 
     @property
     def autograded(self) -> Path:
-        """nbgrader's notebooks with the reports in them."""
+        """nbgrader's autograded notebooks, which contain the reports."""
         return self.build / "autograded"
 
     @property
     def feedback(self) -> Path:
-        """A page for each student and lab."""
+        """The feedback pages, one for each student and lab."""
         return self.build / "feedback"
 
     @property
     def results(self) -> Path:
-        """What checking found out: `<lab>/<student>.json`."""
+        """The results of the checks, as `<lab>/<student>.json`."""
         return self.build / "results"
 
     def taken(self, lab: str) -> Path:
-        """Who is in the class of a lab, and what their learning platform calls them."""
+        """Return the file that records who is in the class of a lab and what the learning platform calls them."""
         return self.build / "taken" / f"{lab}.json"
 
     @property
     def tried(self) -> Path:
-        """The same of what has run and does not count yet."""
+        """Results of runs that do not count yet, as in `results`."""
         return self.build / "tried"
 
     @property
     def to_run_again(self) -> Path:
-        """The same of what has run once, with checks that are to be run again alone."""
+        """Results of first runs with checks that must be run again alone, as in `results`."""
         return self.build / "to_run_again"
 
     @property
     def doubtful(self) -> Path:
-        """The same of what ran while a known answer got another verdict than it must."""
+        """Results of runs during which a known answer got a wrong verdict, as in `results`."""
         return self.build / "doubtful"
 
     @property
     def gradebook(self) -> Path:
-        """nbgrader's database: apart from what grading can make again, for it holds what people decided."""
+        """nbgrader's database, outside `build` because it holds people's decisions, which cannot be made again."""
         return self.root / "gradebook" / "gradebook.db"
 
     @property
     def lock(self) -> Path:
-        """Held by the grading that is at work."""
+        """The lock file that a running grading holds."""
         return self.build / "grading.lock"
 
     @property
     def gradebook_url(self) -> str:
-        """The database's address, as SQLAlchemy wants it."""
+        """The database's address in the form that SQLAlchemy expects."""
         return f"sqlite:///{self.gradebook}"
 
     @property
@@ -157,7 +157,7 @@ class CoursePaths:
         return self.build / "grades.csv"
 
     def class_page(self, lab: str) -> Path:
-        """The page about a lab's class, for instructors."""
+        """Return the page about a lab's class, which is for instructors."""
         return self.build / "report" / f"{lab}.html"
 
     @property
@@ -172,34 +172,34 @@ class CoursePaths:
 
     @property
     def release(self) -> Path:
-        """What students get: a folder, and the same as a zip."""
+        """What students get, as a folder and as a zip."""
         return self.build / "release"
 
     @property
     def sample_course(self) -> Path:
-        """The course that the sample classes are graded in, so that nobody's gradebook holds sample students."""
+        """The course in which the sample classes are graded, so that no real gradebook contains sample students."""
         return self.build / "sample"
 
     def sample_class(self, lab: str) -> Path:
-        """Where the sample class of a lab is put together."""
+        """Return the folder in which the sample class of a lab is put together."""
         return self.sample_course / "classes" / lab
 
     def requirements(self, lab: str) -> Path:
-        """What of a lab's text is required, and which check holds it."""
+        """Return the file that lists the requirements in a lab's text and the check for each of them."""
         return self.root / "tests" / "classes" / lab / "requirements.yaml"
 
     def canaries(self, lab: str) -> Path:
-        """Wrong answers to a lab of which it is known how many points they get."""
+        """Return the file with wrong answers to a lab and the points that each of them must get."""
         return self.root / "tests" / "classes" / lab / "canaries.yaml"
 
     def submitted_notebook(self, student: str, lab: str) -> Path:
-        """The notebook that a student handed in."""
+        """Return the notebook that a student handed in."""
         return self.submitted / student / lab / f"{lab}.ipynb"
 
     def autograded_notebook(self, student: str, lab: str) -> Path:
-        """nbgrader's copy of it with the reports."""
+        """Return nbgrader's copy of a submitted notebook, which contains the reports."""
         return self.autograded / student / lab / f"{lab}.ipynb"
 
     def feedback_page(self, student: str, lab: str) -> Path:
-        """What the student gets to read."""
+        """Return the page with a student's feedback."""
         return self.feedback / student / lab / f"{lab}.html"

@@ -1,6 +1,6 @@
-"""A course's settings, `course.toml`: with the sections of its lectures that explain the reasons.
+"""Read a course's settings from `course.toml`, which also says which sections of the lectures explain which reasons.
 
-What concerns nbgrader stands in nbgrader's own file, `nbgrader_config.py`.
+Settings of nbgrader are in nbgrader's own file, `nbgrader_config.py`.
 """
 
 from __future__ import annotations
@@ -20,20 +20,20 @@ SETTINGS_FILE = "course.toml"
 
 
 class CourseSettings(BaseModel):
-    """What `course.toml` may say; a course without one has these values."""
+    """The settings that `course.toml` may contain. A course without this file has the default values."""
 
     model_config = ConfigDict(extra="forbid")
 
     title: str = "The labs"
-    """Heading of the students' start page."""
+    """The heading of the students' start page."""
     labs: list[str] = []
-    """The labs in the course's order; those that it leaves out follow by their names."""
+    """The labs in the course's order. Labs that are not listed follow in the order of their names."""
     executor: str = "local"
-    """Who runs the jobs of a class, `NAME` or `NAME://ADDRESS`, by the names of `autograder.grading.executors`."""
+    """The executor that runs the jobs of a class, as `NAME` or `NAME://ADDRESS`; see `autograder.grading.executors`."""
     lectures: dict[str, str] = {}
-    """The lectures, by the names that hints use for them, such as `Week 2`: the page of each in the book."""
+    """The page of each lecture in the book, by the name that hints use for the lecture, such as `Week 2`."""
     sections: dict[str, dict[str, list[str]]] = {}
-    """By a lecture's name and a section's title: the codes of the reasons that this section explains."""
+    """The codes of the reasons that a section explains, by the lecture's name and the section's title."""
 
     @model_validator(mode="after")
     def _each_code_has_one_section(self) -> Self:
@@ -51,7 +51,7 @@ def read_settings(root: Path) -> CourseSettings:
     """Read the settings of the course at `root`.
 
     Raises:
-        KitError: the file cannot be read, or says what no course can say.
+        KitError: the file is not valid TOML, or contains an unknown setting or a wrong value.
     """
     path = root / SETTINGS_FILE
     try:
@@ -59,14 +59,16 @@ def read_settings(root: Path) -> CourseSettings:
     except FileNotFoundError:
         return CourseSettings()
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise KitError(f"{path} is no TOML: {error}.", "Repair that line.") from error
+        raise KitError(f"{path} is not valid TOML: {error}.", "Repair that line.") from error
     except ValidationError as error:
         first = error.errors()[0]
         key = ".".join(map(str, first["loc"]))
         if first["type"] == "extra_forbidden":
             known = ", ".join(CourseSettings.model_fields)
-            raise KitError(f"{path} sets `{key}`, which is no setting of a course.", f"Settings: {known}.") from error
-        if not key:  # what the settings say together
+            raise KitError(
+                f"{path} sets `{key}`, which is not a setting of a course.", f"Settings: {known}."
+            ) from error
+        if not key:  # the settings contradict each other
             raise KitError(f"{path}: {first['msg'].removeprefix('Value error, ')}.", "Repair that table.") from error
         raise KitError(f"{path}: `{key}` cannot be {first['input']!r}: {first['msg']}.", "Repair that line.") from error
 
@@ -76,35 +78,35 @@ class Section:
     """A section of a lecture."""
 
     lecture: str
-    """As hints name it, such as `Week 2`."""
+    """The lecture's name in hints, such as `Week 2`."""
     title: str
     page: str
-    """The lecture's page in the book, without its ending."""
+    """The lecture's page in the book, without the file ending."""
 
     def __str__(self) -> str:
-        """As a hint names it."""
+        """Return the section as a hint names it."""
         return f"{self.lecture}, section '{self.title}'"
 
     @property
     def place(self) -> str:
-        """Its place in the book, as a link from the book's first page."""
+        """The link to the section from the book's first page."""
         slug = re.sub(r"[^a-z0-9]+", "-", self.title.lower()).strip("-")
         return f"{self.page}.html#{slug}"
 
 
 @dataclass(frozen=True)
 class Book:
-    """A course's lectures; those of a course that names none are empty."""
+    """The lectures of a course. The book is empty if the course has no lectures."""
 
     pages: dict[str, str] = field(default_factory=dict)
-    """The lectures' pages by the names that hints use."""
+    """The lectures' pages, by the names that hints use."""
     sections: dict[str, Section] = field(default_factory=dict)
     """The section that explains a reason, by the reason's code."""
     address: str = ""
-    """Link to the folder of the lectures as HTML; empty if there is none."""
+    """The link to the folder of the lectures as HTML; empty if there is none."""
 
     def named_in(self, text: str) -> Section | None:
-        """Return the section that a text points to, as `Week 2, section 'Groups'` does; None if none."""
+        """Return the section that a text refers to, as in `Week 2, section 'Groups'`; None if it refers to none."""
         names = "|".join(map(re.escape, self.pages)) or "(?!)"
         found = re.search(rf"\b({names}), (?:section )?'([^']+)'", text, re.IGNORECASE)
         if found is None:
@@ -114,18 +116,18 @@ class Book:
 
 
 NO_BOOK = Book()
-"""That of a course which says nothing of its lectures."""
+"""The book of a course without lectures in its settings."""
 
 
 def read_book(root: Path, address: str = "") -> Book:
-    """Read what `course.toml` says of the lectures of the course at `root`.
+    """Read what `course.toml` says about the lectures of the course at `root`.
 
     Args:
         root: the course's folder.
-        address: link to the folder of the lectures as HTML.
+        address: the link to the folder of the lectures as HTML.
 
     Raises:
-        KitError: the file cannot be read.
+        KitError: see `read_settings`.
     """
     settings = read_settings(root)
     explained = {

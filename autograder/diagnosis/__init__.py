@@ -1,14 +1,15 @@
-"""Why something did not happen: walks the chain from the program to the message and names the first broken link.
+"""Says why something did not happen: follows the chain from the program to the message and names the first broken link.
 
     program started? → still alive? → node name? → namespace? → topic name? → message type? → QoS pair?
     → error in a callback? → blocked callback? → spun at all? → lifecycle state? → timer due? → kept waiting by others?
 
-A link speaks only if what its docstring demands has been seen; a reason is established or not given. Where no link
-speaks, the report says what was observed, and so ruled out, without advice.
+A link gives a reason only if everything that its docstring requires has been seen, so every reason is established. If
+no link gives a reason, the report says what was observed, and therefore ruled out, without advice.
 
 What the graph shows is evidence. What the student's process says about itself (its output, its probe's events, its
-threads' stacks) is used here for the *reason* only; points never depend on it, but for one thing: of a program that
-has ended, what was seen before stands where its probe tells that the check's own message or request ended it.
+threads' stacks) is used here for the *reason* only, and points do not depend on it. There is one exception: after a
+program has ended, what was seen before still counts if its probe shows that the check's own message or request ended
+the program.
 """
 
 from autograder.diagnosis.callbacks import called_from_outside, failed_in_a_callback, why_all_alike

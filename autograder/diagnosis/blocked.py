@@ -1,4 +1,4 @@
-"""Callbacks that do not come to an end: what they wait for, and why that cannot come."""
+"""Callbacks that do not return: what they wait for, and why that cannot happen."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ WAITS_FOR_LOCK = Kind(
 )
 
 STUCK_AFTER = 1.5
-"""Seconds that a run must have taken to count as one that does not end."""
+"""The seconds that a run must have taken to count as one that does not end."""
 
 ONE_LOCK = "Callbacks that take the same lock run one after another, no matter which groups and threads they have."
 
@@ -61,7 +61,7 @@ _OWN_GROUP = "Give the client, or the callback that waits, a callback group of i
 
 
 def _blocked(inside: Inside, what: str) -> list[Call]:
-    """Calls of this kind, made in a callback, that have not come back."""
+    """Return the calls of this kind that were made in a callback and have not returned."""
     return [call for call in inside.calls if call.what == what and call.in_callback and call.blocks]
 
 
@@ -70,7 +70,7 @@ def _at(inside: Inside, call: Call) -> str:
 
 
 def call_same_group(inside: Inside) -> Reason | None:
-    """Must have seen: `call()` in a callback that has not come back, and client and callback in one exclusive group."""
+    """Must have seen: `call()` in a callback that has not returned, and client and callback in one exclusive group."""
     for call in _blocked(inside, "client.call"):
         client, callback = inside.things.get(call.target), inside.things.get(call.callback)
         executor = inside.executor_of(callback.node) if callback else None
@@ -87,7 +87,7 @@ def call_same_group(inside: Inside) -> Reason | None:
 
 
 def call_in_callback(inside: Inside) -> Reason | None:
-    """Must have seen: `call()` in a callback that has not come back, and every thread of the executor taken."""
+    """Must have seen: `call()` in a callback that has not returned, and every thread of the executor occupied."""
     for call in _blocked(inside, "client.call"):
         callback = inside.things.get(call.callback)
         executor = inside.executor_of(callback.node) if callback else None
@@ -119,7 +119,7 @@ def waits_for_a_service(inside: Inside) -> Reason | None:
 
 
 def asks_nobody(inside: Inside) -> Reason | None:
-    """Must have seen: a request that was not answered, sent a while ago to a service that is not on the graph."""
+    """Must have seen: an unanswered request, sent a while ago to a service that is not on the graph."""
     for client in inside.things.values():
         waited = client.runs > client.done and inside.now - client.last > STUCK_AFTER
         if client.kind == "client" and waited and not client.destroyed:
@@ -130,7 +130,7 @@ def asks_nobody(inside: Inside) -> Reason | None:
 
 
 def asks_another_type(inside: Inside) -> Reason | None:
-    """Must have seen: a request not answered for a while, and the service on the graph with another type only."""
+    """Must have seen: an unanswered request, sent a while ago, and the service on the graph with another type only."""
     for client in inside.things.values():
         waited = client.runs > client.done and inside.now - client.last > STUCK_AFTER
         if client.kind == "client" and waited and not client.destroyed:
@@ -146,7 +146,7 @@ def asks_another_type(inside: Inside) -> Reason | None:
 
 
 def _nobody_offers(client: Thing, services: dict[str, list[str]], said: str, else_do: str = "") -> Reason:
-    own = ("rcl_interfaces/", "type_description")  # what each node offers by itself
+    own = ("rcl_interfaces/", "type_description")  # the services that every node offers by default
     close = nearest(client.name, [n for n, types in services.items() if not types[0].startswith(own)])
     given = f" (`{client.given}` in the code)" if client.given and client.given != client.name else ""
     return WAITS_FOR_SERVICE(
@@ -161,7 +161,11 @@ def _nobody_offers(client: Thing, services: dict[str, list[str]], said: str, els
 
 
 def nested_spin(inside: Inside) -> Reason | None:
-    """Must have seen: a callback that spins, and has not ended since, has lost its node to that, or got nothing."""
+    """Must have seen: a callback that spins, and one of three consequences.
+
+    Either the callback has not returned since, or its node is in no spinning executor now, or the spinning ended before
+    its future was done.
+    """
     for call in inside.calls:
         if call.what == "spin" and call.in_callback and (harm := _harm_of_spinning(inside, call)):
             return NESTED_SPIN(
@@ -192,7 +196,7 @@ def _harm_of_spinning(inside: Inside, call: Call) -> str:
 
 
 def rate_in_callback(inside: Inside) -> Reason | None:
-    """Must have seen: `rate.sleep()` in a callback that has not come back, and every thread of the executor taken."""
+    """Must have seen: `rate.sleep()` in a callback that has not returned, and every thread of the executor occupied."""
     for call in _blocked(inside, "rate.sleep"):
         callback = inside.things.get(call.callback)
         executor = inside.executor_of(callback.node) if callback else None
@@ -206,7 +210,7 @@ def rate_in_callback(inside: Inside) -> Reason | None:
 
 
 def rate_unspun(inside: Inside) -> Reason | None:
-    """Must have seen: `rate.sleep()` outside a callback that has not come back, and no executor that spins."""
+    """Must have seen: `rate.sleep()` outside a callback that has not returned, and no executor that spins."""
     for call in inside.calls:
         spun = any(executor.spinning for executor in inside.executors)
         if call.what == "rate.sleep" and not call.in_callback and call.blocks and not spun and not _foreign(inside):
@@ -222,7 +226,7 @@ def _foreign(inside: Inside) -> bool:
 
 
 def await_same_group(inside: Inside) -> Reason | None:
-    """Must have seen: a callback that awaits a client's answer now, and both in one mutually exclusive group."""
+    """Must have seen: a callback that awaits a client's response now, and both in one mutually exclusive group."""
     for thing in inside.things.values():
         client = inside.things.get(thing.awaits.client)
         if not thing.running or not client or not thing.exclusive or client.group_id != thing.group_id:
@@ -238,7 +242,7 @@ def await_same_group(inside: Inside) -> Reason | None:
 
 
 def busy_wait(inside: Inside) -> Reason | None:
-    """Must have seen: a callback in one loop all the time, whose source asks a future, and an answer not taken."""
+    """Must have seen: a callback in the same loop all the time, which checks a future, and a response not processed."""
     for thing, since, place in _stuck(inside):
         asked = [client for client in inside.things.values() if client.kind == "client" and client.runs > client.done]
         if not place.loop or ".done()" not in place.loop or not asked:
@@ -257,7 +261,7 @@ def busy_wait(inside: Inside) -> Reason | None:
 
 
 def takes_turn(inside: Inside) -> Reason | None:
-    """Must have seen: one run of a callback that lasts, and its thread where it takes a lock, each time."""
+    """Must have seen: one long run of a callback, and its thread waiting for a lock at each look."""
     for thing, since, _ in _stuck(inside):
         for _, thread in thing.running:
             place = inside.turn(thread)
@@ -271,7 +275,7 @@ def takes_turn(inside: Inside) -> Reason | None:
 
 
 def stuck(inside: Inside) -> Reason | None:
-    """Must have seen: one run of a callback that lasts, and its thread in one line or loop of the student's."""
+    """Must have seen: one long run of a callback, and its thread in the same line or loop of the student's code."""
     for thing, since, place in _stuck(inside):
         return STUCK_CALLBACK(
             f"`{inside.name}`: {called(thing)} has been running one callback for {since:.1f} s. It is in {place}.",
@@ -282,7 +286,7 @@ def stuck(inside: Inside) -> Reason | None:
 
 
 def _stuck(inside: Inside) -> list[tuple[Thing, float, Place]]:
-    """Runs that last, with their age and their place. To execute a goal may take its time."""
+    """Return the long runs, each with its age and its place. An execute callback is left out: it may take long."""
     found = []
     for thing in inside.things.values():
         if thing.kind == "execute":

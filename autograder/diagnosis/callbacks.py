@@ -1,4 +1,4 @@
-"""What went wrong in a callback: rclpy lets it end the spinning, or swallows it."""
+"""Says what went wrong in a callback: an error that ends the spinning, or one that rclpy swallows."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ _AFTER = {
 _KINDS = {"service": SERVICE_EXCEPTION, "lifecycle": LIFECYCLE_EXCEPTION, "execute": EXECUTE_EXCEPTION}
 
 _GOAL_STATE = re.compile(r"invalid transition from state (\w+) with event (\w+)")
-"""What rclpy says where a goal cannot end so, in the state that it is in."""
+"""What rclpy says if a goal cannot end with this status in its current state."""
 
 _NEVER_AWAITED = re.compile(r"RuntimeWarning: coroutine '([\w.<>]{1,100})' was never awaited")
 
@@ -64,7 +64,7 @@ _NEVER_AWAITED = re.compile(r"RuntimeWarning: coroutine '([\w.<>]{1,100})' was n
 def failed(inside: Inside) -> Reason | None:
     """Must have seen: an exception leave a callback, a return value of the wrong type, or a message refused.
 
-    What goes wrong with one goal of an action, and leaves the node as it is, is told by `goals`.
+    Errors that concern only one goal of an action and do not affect the node are handled in `goals`.
     """
     for event in inside.events:
         found = None if _outlived(event) else of_event(inside, event)
@@ -74,7 +74,7 @@ def failed(inside: Inside) -> Reason | None:
 
 
 def thread_failed(inside: Inside) -> Reason | None:
-    """Must have seen: an exception end a thread of the program's own."""
+    """Must have seen: an exception end a thread that the program itself started."""
     for event in inside.all(ThreadError):
         error = f"{event.type}: {event.text}".strip(": ")
         if event.type == "SystemExit":
@@ -92,7 +92,7 @@ def thread_failed(inside: Inside) -> Reason | None:
 
 
 def never_awaited(inside: Inside) -> Reason | None:
-    """Must have seen: Python's own warning of a coroutine that was made and never awaited."""
+    """Must have seen: Python's own warning about a coroutine that was created and never awaited."""
     found = _NEVER_AWAITED.search(inside.program.output())
     if not found:
         return None
@@ -105,11 +105,11 @@ def never_awaited(inside: Inside) -> Reason | None:
 
 
 def failed_in_a_callback(scene: Scene) -> RunningProgram | None:
-    """A program with an error in a callback, which ends it.
+    """Return a program with an error in a callback that ends it.
 
-    A lifecycle node outlives its own. A node outlives a parameter callback that returns nothing, too: the value is
-    refused, and rclpy warns.
-    When it ends is luck: a multi-threaded executor of rclpy 7.1 looks for errors only at its next event.
+    An error in a lifecycle callback does not end the node, and neither does a parameter callback that returns nothing:
+    then the value is refused, and rclpy warns. It is not predictable when the program ends, because a multi-threaded
+    executor of rclpy 7.1 looks for errors only at its next event.
     """
     for program in scene.programs:
         for event in read(program.events()):
@@ -123,9 +123,10 @@ def failed_in_a_callback(scene: Scene) -> RunningProgram | None:
 
 
 def called_from_outside(program: RunningProgram) -> tuple[str, float] | None:
-    """What the first callback with an error answered, a topic, a service or a "parameter", and when it failed.
+    """Return what called the first callback with an error (a topic, a service or "parameter"), and when it failed.
 
-    Must have seen: that such a callback was the first thing that went wrong. A timer's fails at a moment of its own.
+    Must have seen: that such a callback was the first thing that went wrong. A timer's callback does not count, because
+    nothing from outside triggers it.
     """
     said = [event for event in read(program.events()) if not _outlived(event)]
     errors = [event for event in said if isinstance(event, CallbackError | BadReturn)]
@@ -136,14 +137,14 @@ def called_from_outside(program: RunningProgram) -> tuple[str, float] | None:
 
 
 def _outlived(event: Event) -> bool:
-    """Whether rclpy goes on after it: it aborts the goal, rejects it, or does not cancel it."""
+    """Whether rclpy continues after this error, and only aborts the goal, rejects it, or does not cancel it."""
     if isinstance(event, CallbackError):
         return event.kind == "execute"
     return isinstance(event, BadReturn) and event.kind in ("goal", "cancel")
 
 
 def of_event(inside: Inside, event: Event) -> Reason | None:
-    """What one event says, if it is an error."""
+    """Return the reason that an event gives, if it is an error."""
     if isinstance(event, BadMessage):
         return _bad_message(inside.name, event)
     if isinstance(event, BadReturn):
@@ -154,7 +155,7 @@ def of_event(inside: Inside, event: Event) -> Reason | None:
 
 
 def _no_callback(inside: Inside, event: CallbackError) -> Reason | None:
-    """Must have seen: nothing was called, and a timer or the like that was made without a function."""
+    """Must have seen: None called in place of a callback, and a timer or the like created without a function."""
     empty = [t for t in inside.things.values() if t.kind == event.kind and t.has_callback and not t.line and t.made]
     if event.line or "'NoneType' object is not callable" not in event.text or not empty:
         return None
@@ -227,13 +228,13 @@ def _bad_return(program: str, event: BadReturn) -> Reason:
 
 
 def _ended_already(error: str) -> bool:
-    """Whether a goal was to end that has ended before."""
+    """Whether the error says that the goal had already ended."""
     found = _GOAL_STATE.search(error)
     return found is not None and found[1] in ("SUCCEEDED", "CANCELED", "ABORTED")
 
 
 def _of_goal_state(error: str) -> str:
-    """What to do when a goal cannot end so, in the state that it is in; empty for another error."""
+    """Return what to do if a goal cannot end with this status in its current state; empty for another error."""
     found = _GOAL_STATE.search(error)
     if not found:
         return ""
@@ -255,7 +256,7 @@ def _error(program: str, event: CallbackError) -> Reason:
     error = f"{event.type}: {event.text}".strip(": ")
     at = f" ({event.line})" if event.line else ""
     name = "done" if event.kind == "task" else event.kind  # rclpy runs done callbacks as tasks
-    article = "An" if name[:1] in ("a", "e") else "A"  # of the names that there are
+    article = "An" if name[:1] in ("a", "e") else "A"  # no kind of callback begins with another vowel
     callback = f"{article} {name} callback of `{program}`{at}" if name else f"A callback of `{program}`{at}"
     source = quoted(event.code, error)
     if "no running event loop" in error:
@@ -299,12 +300,12 @@ LATE_BINDING = Kind(
 
 
 def why_all_alike(scene: Scene) -> Reason | None:
-    """Why callbacks that were to differ do the same."""
+    """Return why callbacks that should do different things all do the same."""
     return first((late_binding,), [inside for inside in scene.insides if inside.alive])
 
 
 def late_binding(inside: Inside) -> Reason | None:
-    """Must have seen: several callbacks from one lambda, and in the source that this reads its loop's own name."""
+    """Must have seen: several callbacks from one lambda, and in the source that it reads the variable of its loop."""
     made: dict[str, list[Thing]] = {}
     for thing in inside.callbacks:
         made.setdefault(thing.line, []).append(thing)

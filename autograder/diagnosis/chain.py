@@ -1,8 +1,8 @@
-"""The chain inside a living program: which links there are, and in which order they are asked.
+"""The chain of links inside a running program, and the order in which they are asked.
 
-Each link is a function that says in its docstring what it must have seen; it gives None where it has not seen that,
-and the next one is asked. What comes first explains what comes after it: an error in a callback ends the spinning, a
-blocked callback keeps others from running, and only where callbacks can run does it matter what they do.
+Each link is a function whose docstring says what it must have seen. If it has not seen that, it returns None, and the
+next link is asked. Earlier links explain later ones: an error in a callback ends the spinning, a blocked callback
+prevents others from running, and what callbacks do matters only if they can run.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 Link = Callable[["Inside"], Reason | None]
 
 SAID: tuple[Link, ...] = (callbacks.failed, callbacks.thread_failed)
-"""What a program says by itself; true whatever else the probe could see."""
+"""The links that need only what a program reports itself. They are asked even if the probe could not see everything."""
 
 SEEN: tuple[Link, ...] = (
     blocked.call_same_group,
@@ -42,14 +42,15 @@ SEEN: tuple[Link, ...] = (
     blocked.takes_turn,
     blocked.stuck,
 )
-"""What is concluded from all that the probe has seen; nothing where it could not see all."""
+"""The links that conclude from everything that the probe has seen. They are asked only about a program that is running
+and whose probe is attached."""
 
 
 def inside_reason(scene: Scene, node: str = "") -> Reason | None:
-    """Why a program that lives does nothing: the first broken link inside the program of `node`, or inside any."""
+    """Return why a running program does nothing: the first broken link inside the program of `node`, or inside any."""
     return reason_inside(scene.inside_of(node) if node else scene.insides)
 
 
 def reason_inside(insides: Sequence[Inside]) -> Reason | None:
-    """The first broken link inside one of these programs."""
+    """Return the reason of the first broken link inside one of these programs."""
     return first(SAID, insides) or first(SEEN, [inside for inside in insides if inside.alive])

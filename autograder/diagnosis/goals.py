@@ -1,6 +1,7 @@
-"""What became of an action's goals: why there is no such action, and why a goal did not go as it should.
+"""Says why there is no such action, and why a goal of an action did not end as it should.
 
-What is said here leaves the node as it is, so it is a reason for that action's goals only, and is asked for them alone.
+A fault that does not affect the rest of the node is a reason only for the goals of its action, so it is looked for only
+when these goals are diagnosed.
 """
 
 from __future__ import annotations
@@ -36,17 +37,17 @@ NO_SUCCEED = Kind(
 )
 
 SEND_GOAL = "/_action/send_goal"
-"""How the name of the service ends that takes an action's goals."""
+"""The end of the name of the service that accepts an action's goals."""
 
 _ENDS = {"succeeded": "succeed()", "canceled": "canceled()", "aborted": "abort()"}
-"""What an execute callback calls for a status."""
+"""The call by which an execute callback sets each status."""
 
 KEPT = 0.3
-"""Seconds that a run must have taken to count as one that keeps requests waiting."""
+"""The seconds that a run must have taken to count as one that keeps requests waiting."""
 
 
 def why_no_action(scene: Scene, name: str, action_type: type) -> Reason:
-    """Why there is no server for an action."""
+    """Return why there is no server for an action."""
     trouble = program_trouble(scene)
     if trouble:
         return trouble
@@ -69,14 +70,17 @@ def why_no_action(scene: Scene, name: str, action_type: type) -> Reason:
 
 
 def why_rejected(scene: Scene, name: str) -> Reason | None:
-    """Why a goal was rejected. Must have seen: the goal callback return something else than a GoalResponse."""
+    """Return why a goal was rejected.
+
+    Must have seen: the goal callback raise an exception, or return something other than a GoalResponse.
+    """
     return _said(scene, name, "goal")
 
 
 def why_not_finished(scene: Scene, name: str, status: str = "succeeded") -> Reason | None:
-    """Why a goal did not end as this status, or not at all.
+    """Return why a goal did not end with this status, or did not end at all.
 
-    Must have seen: an error leave the execute callback, its result refused, or a return without an end of the goal.
+    Must have seen: an error leave the execute callback, its result refused, or a return without the goal's end.
     """
     found = _said(scene, name, "execute")
     if found:
@@ -94,12 +98,19 @@ def why_not_finished(scene: Scene, name: str, status: str = "succeeded") -> Reas
 
 
 def why_no_result(scene: Scene, name: str) -> Reason | None:
-    """Why a goal that has ended got an empty result. Must have seen: an error leave the execute callback."""
+    """Return why a goal that has ended got an empty result.
+
+    Must have seen: an error leave the execute callback, or its feedback or result refused.
+    """
     return _said(scene, name, "execute")
 
 
 def why_no_feedback(scene: Scene, name: str) -> Reason | None:
-    """Why no feedback came. Must have seen: an execute callback that ran, and no call of `publish_feedback`."""
+    """Return why no feedback came.
+
+    Must have seen: an error in the execute callback; or an execute callback that ran, and no call of
+    `publish_feedback`.
+    """
     found = _said(scene, name, "execute")
     if found:
         return found
@@ -110,13 +121,16 @@ def why_no_feedback(scene: Scene, name: str) -> Reason | None:
             return NO_FEEDBACK(
                 f"`{inside.name}`: {called(thing)} {'runs' if thing.running else 'has run'}, and no feedback was "
                 "published.",
-                "`goal_handle.publish_feedback(...)` sends one feedback message; it belongs into the loop.",
+                "`goal_handle.publish_feedback(...)` sends one feedback message; call it in the loop.",
             )
     return None
 
 
 def why_wrong_feedback(scene: Scene, name: str) -> Reason | None:
-    """Why feedback says something else. Must have seen: a field of it whose value is not of its type."""
+    """Return why the feedback has other values than expected.
+
+    Must have seen: a field of the feedback whose value is not of the field's type.
+    """
     for inside in dict.fromkeys(inside for inside, _ in _of_action(scene, name)):
         for event in inside.all(BadMessage):
             if event.kind == "feedback" and event.name == name:
@@ -125,12 +139,12 @@ def why_wrong_feedback(scene: Scene, name: str) -> Reason | None:
 
 
 def why_not_canceled(scene: Scene, name: str) -> Reason | None:
-    """Why a server did not agree to cancel, or did so too late."""
+    """Return why a server did not agree to cancel a goal, or agreed too late."""
     return _said(scene, name, "cancel") or _no_cancel_callback(scene, name) or why_waits_for_a_goal(scene, name)
 
 
 def _no_cancel_callback(scene: Scene, name: str) -> Reason | None:
-    """Must have seen: the action's server, and no cancel callback of its own."""
+    """Must have seen: the action's server, and no cancel callback that the student gave it."""
     things = list(_of_action(scene, name))
     kinds = {thing.kind for _, thing in things}
     if not things or "action_server" not in kinds or "cancel" in kinds or not things[0][0].attached:
@@ -143,10 +157,10 @@ def _no_cancel_callback(scene: Scene, name: str) -> Reason | None:
 
 
 def why_waits_for_a_goal(scene: Scene, name: str) -> Reason | None:
-    """Why a request or a timer waits while a goal is executed.
+    """Return why a request or a timer waits while a goal is executed.
 
-    Must have seen: a run of the execute callback that took its time without awaiting anything, and an executor with
-    one thread; or a run of the accepted or goal callback that took its time, in the server's exclusive group.
+    Must have seen: a long run of the execute callback that did not await anything, and an executor with one thread; or
+    a long run of the accepted or goal callback, in the server's exclusive group.
     """
     for inside, thing in _of_action(scene, name):
         if not inside.attached or not _lasts(inside, thing):
@@ -178,7 +192,7 @@ def _lasts(inside: Inside, thing: Thing) -> bool:
 
 
 def _of_action(scene: Scene, name: str) -> Iterator[tuple[Inside, Thing]]:
-    """What the probes know of an action's servers and of their callbacks."""
+    """Yield what the probes know about an action's servers and their callbacks."""
     for inside in scene.insides:
         for thing in inside.things.values():
             if thing.name == name and thing.kind in ("action_server", "execute", "goal", "cancel", "accepted"):
@@ -186,7 +200,7 @@ def _of_action(scene: Scene, name: str) -> Iterator[tuple[Inside, Thing]]:
 
 
 def _said(scene: Scene, name: str, kind: str) -> Reason | None:
-    """What a program says of an error in one of the action's callbacks."""
+    """Return the reason if a program reports an error in one of the action's callbacks."""
     for inside in dict.fromkeys(inside for inside, _ in _of_action(scene, name)):
         for event in inside.events:
             found = of_event(inside, event) if _about(event, kind, name) else None

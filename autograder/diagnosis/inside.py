@@ -1,4 +1,4 @@
-"""What one program says about itself: its probe's events, its threads' stacks, its source."""
+"""What is known about one program from inside: its probe's events, its threads' stacks, its source."""
 
 from __future__ import annotations
 
@@ -30,7 +30,10 @@ _READER: TypeAdapter[Event] = TypeAdapter(Annotated[Event, Field(discriminator="
 
 
 def read(lines: Iterable[dict[str, Any]]) -> list[Event]:
-    """The lines that have the form of an event, in their order; a program can write others, which are ignored."""
+    """Return the lines that have the form of an event, in their order.
+
+    Other lines are ignored, because a student's program can write anything.
+    """
     found = []
     for line in lines:
         try:
@@ -44,10 +47,16 @@ _T = TypeVar("_T")
 
 
 class Inside:
-    """One program as its probe shows it. Where the probe could not attach, nothing is known and nothing is said."""
+    """One program as its probe shows it. If the probe could not attach, nothing is known about the program."""
 
     def __init__(self, program: RunningProgram, folder: Path, observer: Observer) -> None:
-        """Read the program's events; its source lies in `folder`, its launch's graph is what `observer` sees."""
+        """Read the program's events.
+
+        Args:
+            program: the program.
+            folder: the folder with its source.
+            observer: the observer of the graph of its launch.
+        """
         self.folder, self.observer = folder, observer
         self.program = program
         self.name = program.name
@@ -61,12 +70,12 @@ class Inside:
         self.parameters: list[ParameterSeen] = self.all(ParameterSeen)
 
     def all(self, kind: type[_T]) -> list[_T]:
-        """The events of one kind, in their order."""
+        """Return the events of one kind, in their order."""
         return [event for event in self.events if isinstance(event, kind)]
 
     @property
     def alive(self) -> bool:
-        """Whether the program runs and its probe can be believed to tell all."""
+        """Whether the program is running and its probe sees everything: it is attached and has not failed."""
         return self.attached and self.program.running()
 
     @property
@@ -76,13 +85,15 @@ class Inside:
 
     @property
     def callbacks(self) -> list[Thing]:
-        """Timers, subscriptions and services that are still there."""
+        """The timers, subscriptions and services that have not been destroyed."""
         return [thing for thing in self.things.values() if thing.has_callback and not thing.destroyed]
 
     @property
     def names_in_code(self) -> dict[str, set[str]] | None:
-        """The names that the code gives to topics, in full and before any rule, with their nodes; None if not all are
-        known."""
+        """The full names that the code gives to topics, before any rule is applied, with their nodes.
+
+        None if not all names are known.
+        """
         ends = [thing for thing in self.things.values() if thing.kind in ("publisher", "subscription")]
         if not self.attached or not all(thing.given and thing.node for thing in ends):
             return None
@@ -92,47 +103,47 @@ class Inside:
         return found
 
     def group(self, thing: Thing) -> list[Thing]:
-        """What is in the same callback group, itself included; clients too."""
+        """Return everything in the same callback group, including the thing itself and clients."""
         return [other for other in self.things.values() if thing.group_id and other.group_id == thing.group_id]
 
     def executor_of(self, node: str) -> ExecutorSeen | None:
-        """The executor that holds a node."""
+        """Return the executor that contains a node."""
         return next((executor for executor in self.executors if node in executor.nodes), None)
 
     def spinning(self, node: str) -> bool:
-        """Whether an executor that spins now holds the node."""
+        """Whether an executor that is spinning now contains the node."""
         return any(executor.spinning and node in executor.nodes for executor in self.executors)
 
     @cached_property
     def stacks(self) -> list[sources.Stacks]:
-        """Several looks at where the threads are."""
+        """The stacks of the threads, read several times."""
         return sources.look(self.program)
 
     @cached_property
     def source(self) -> sources.Source:
-        """The student's file."""
+        """The source of the program."""
         return sources.Source(self.folder / f"{self.name}.py")
 
     def place(self, thread: int) -> sources.Place | None:
-        """Where the student's own code on this thread is, in the callback that runs there."""
+        """Return where this thread is in the student's own code, in the callback that runs on it."""
         return self.source.place(self.name, [stacks.get(thread, []) for stacks in self.stacks])
 
     def turn(self, thread: int) -> sources.Place | None:
-        """Where this thread waits to take a lock or the like, in the student's own code."""
+        """Return where in the student's own code this thread waits to take a lock or the like."""
         return self.source.turn(self.name, [stacks.get(thread, []) for stacks in self.stacks]) if self.stacks else None
 
     def main_place(self) -> sources.Place | None:
-        """Where the program's main thread is, in the student's own code."""
+        """Return where the program's main thread is in the student's own code."""
         return self.source.place(self.name, [next(reversed(stacks.values()), []) for stacks in self.stacks], True)
 
     def main_in_rclpy(self) -> bool:
-        """Whether the program's main thread is inside a call of rclpy's that the student's own code made."""
+        """Whether the program's main thread is inside a call into rclpy that the student's own code made."""
         mains = [next(reversed(stacks.values()), []) for stacks in self.stacks]
         return bool(mains) and all(sources.inside_rclpy(self.name, frames) for frames in mains)
 
 
 def called(thing: Thing) -> str:
-    """A callback as a student knows it: `the timer of `tick` (line 12, every 0.5 s)`."""
+    """Describe a callback in words that a student knows: `the timer of `tick` (line 12, every 0.5 s)`."""
     function = re.match(r"(?:async )?def (\w+)", thing.code)
     if thing.kind == "timer":
         of = f" of `{function[1]}`" if function else ""
@@ -145,6 +156,6 @@ def called(thing: Thing) -> str:
 
 
 def listed(things: Sequence[Thing]) -> str:
-    """Several of them in a row."""
+    """Describe several callbacks as a list in words."""
     names = [called(thing) for thing in things]
     return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"

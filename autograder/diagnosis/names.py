@@ -1,4 +1,4 @@
-"""Why a node, a topic's end or a service is not there under the name that was looked for."""
+"""Says why there is no node, publisher, subscription or service with the expected name."""
 
 from __future__ import annotations
 
@@ -19,6 +19,11 @@ from autograder.sandbox.inside.probe.events import Thing
 NOT_MADE_YET = Kind(
     "not-made-yet",
     "a method in the source code creates the publisher or subscription in a line that the probe has not seen executed",
+    Group.NAMES,
+)
+TAKEN_AWAY = Kind(
+    "taken-away",
+    "the program made the publisher or subscription and destroyed it again",
     Group.NAMES,
 )
 NODE_NAME = Kind("node-name", "the node is not there, others are", Group.NAMES)
@@ -45,7 +50,7 @@ _MAKERS = {
 
 
 def _no_node_at_all(scene: Scene) -> Reason:
-    """Nothing is on the graph, though nothing is known to be wrong with a program."""
+    """Return why no node is on the graph, although no program is known to have failed."""
     if not scene.programs:
         return NOTHING_STARTED(
             "No program was started, so there is nothing to check.",
@@ -58,13 +63,13 @@ def _no_node_at_all(scene: Scene) -> Reason:
 
 
 def _namespace(rules: Sequence[str]) -> str:
-    """The namespace that a program was started in, without the slash at its end."""
+    """Return the namespace in which a program was started, without a slash at the end."""
     named = [rule.right for rule in map(remap_rules.parse, rules) if rule and rule.left == "__ns" and not rule.prefix]
     return named[0].rstrip("/") if named else ""
 
 
 def _around(scene: Scene, name: str) -> list[Inside]:
-    """The programs that were started in the namespace of a name, the innermost one; all where none was."""
+    """Return the programs that were started in the innermost namespace of a name; all programs if there are none."""
     started = [(_namespace(rules), inside) for inside, rules in zip(scene.insides, scene.rules, strict=False)]
     depth = max((len(space) for space, _ in started if name.startswith(f"{space}/")), default=-1)
     return [inside for space, inside in started if len(space) == depth and name.startswith(f"{space}/")] or (
@@ -73,7 +78,10 @@ def _around(scene: Scene, name: str) -> list[Inside]:
 
 
 def _twins(scene: Scene, name: str) -> set[str]:
-    """The nodes of further runs, elsewhere, of the programs around a name: they are where they belong, not misnamed."""
+    """Return the nodes of runs, in other namespaces, of the programs that also run in the namespace of a name.
+
+    These nodes have the right name for where they were started, so they are not misnamed.
+    """
     around = _around(scene, name)
     programs = {inside.name for inside in around}
     return {
@@ -94,7 +102,7 @@ def _deeper(wanted: str, there: Sequence[str]) -> str:
 
 
 def _given_as_a_parameter(scene: Scene, insides: Sequence[Inside], wanted: str) -> Reason | None:
-    """Why a name given with `-p` to one of these programs is not there."""
+    """Return why a name that was given with `-p` to one of these programs does not exist."""
     pairs = zip(scene.insides, scene.parameter_rules, strict=False)
     return next(
         (why for it, given in pairs if it in insides and (why := rule_effect.renames_nothing(given, wanted))), None
@@ -102,21 +110,21 @@ def _given_as_a_parameter(scene: Scene, insides: Sequence[Inside], wanted: str) 
 
 
 def _nothing_of(silent: Sequence[Inside]) -> Reason:
-    """Why programs that live show no node: what is wrong inside, or how far the first of them was seen to come."""
+    """Return why running programs have no node: what is wrong inside, or how far the first of them has got."""
     made = [name for name, node in silent[0].nodes.items() if not node.destroyed]
     saw = f"it has made the node `{made[0]}`, which is not on this graph" if made else "it shows no node"
     return reason_inside(silent) or NO_NODE(f"`{silent[0].name}` runs, but {saw}.")
 
 
 def _ending_in(base: str, names: Sequence[str]) -> list[str]:
-    """The nodes of this name in whatever namespace."""
+    """Return the nodes with this name in any namespace."""
     return [name for name in names if name.rsplit("/", 1)[-1] == base]
 
 
 def why_no_node(scene: Scene, wanted: str) -> Reason:
-    """Why the node `wanted` is not on the graph.
+    """Return why the node `wanted` is not on the graph.
 
-    Another node is brought up only where each program that was started around this name shows one of its own.
+    Another node is mentioned only if each program that was started in this namespace has a node of its own.
     """
     trouble = program_trouble(scene)
     if trouble:
@@ -140,7 +148,7 @@ def why_no_node(scene: Scene, wanted: str) -> Reason:
     if idle:
         return idle
     base = wanted.rsplit("/", 1)[-1]
-    there = _ending_in(base, own) or _ending_in(base, names)  # a twin, where no other is of this name
+    there = _ending_in(base, own) or _ending_in(base, names)  # the second includes twins
     if there:
         return NAMESPACE(
             f"The node `{base}` exists, but in another namespace: {', '.join(f'`{name}`' for name in there)}.",
@@ -163,7 +171,7 @@ def why_no_node(scene: Scene, wanted: str) -> Reason:
 
 
 def why_doubled(scene: Scene, name: str) -> Reason:
-    """Why several nodes have one name."""
+    """Return why several nodes have the same name."""
     count = scene.observer.nodes().count(name)
     for rule in map(remap_rules.parse, scene.rules_for(name)):
         if rule and rule.left in ("__node", "__name") and not rule.prefix and len(scene.programs) == 1:
@@ -178,7 +186,7 @@ def why_doubled(scene: Scene, name: str) -> Reason:
 
 
 def _made_as(scene: Scene, kind: str, name: str) -> list[Thing]:
-    """The ends of this kind and full name that the probes have seen being made."""
+    """Return the ends of this kind and full name whose creation the probes have seen."""
     return [
         thing
         for inside in scene.insides
@@ -188,7 +196,10 @@ def _made_as(scene: Scene, kind: str, name: str) -> list[Thing]:
 
 
 def absolute_name(scene: Scene, kind: str, name: str, wanted: str = "") -> Reason | None:
-    """Must have seen: the code make this end with a name that begins with a slash; `wanted` should be there instead."""
+    """Must have seen: the code create this end with a name that begins with a slash.
+
+    `wanted` is the name that the end should have instead.
+    """
     for thing in _made_as(scene, kind, name):
         if thing.given.startswith("/"):
             at = f" in {thing.made}" if thing.made else ""
@@ -201,14 +212,14 @@ def absolute_name(scene: Scene, kind: str, name: str, wanted: str = "") -> Reaso
 
 
 def _not_absolute(thing: Thing, wanted: str) -> str:
-    """What to write so that the name becomes the wanted one."""
+    """Say what to write so that the name becomes the wanted one."""
     if thing.node and wanted.startswith(f"{thing.node}/"):
         return f"Write `~{wanted.removeprefix(thing.node)}`: such a name is placed below the node's own name."
     return "Remove the slash."
 
 
 def why_topic_present(scene: Scene, topic: str) -> Reason:
-    """Who uses a topic that nobody should use."""
+    """Return a reason that says which nodes use a topic that no node should use."""
     ends = scene.observer.publishers(topic) + scene.observer.subscriptions(topic)
     owners = sorted({node_of(end) for end in ends})
     outside = any(end.node_namespace != "/" and not topic.startswith(end.node_namespace + "/") for end in ends)
@@ -219,7 +230,7 @@ def why_topic_present(scene: Scene, topic: str) -> Reason:
 
 
 def why_no_endpoint(scene: Scene, topic: str, msg_type: type | None, kind: str, node: str = "") -> Reason:
-    """Why no `kind` ("publisher" or "subscription") of this type (None: of any) is on the topic."""
+    """Return why there is no `kind` ("publisher" or "subscription") of this type on the topic; None means any type."""
     trouble = program_trouble(scene)
     if trouble:
         return trouble
@@ -238,7 +249,7 @@ def why_no_endpoint(scene: Scene, topic: str, msg_type: type | None, kind: str, 
     if node and node not in observer.nodes():
         return why_no_node(scene, node)
     used = [name for name in observer.topics() if name not in _EVERY_NODES and not name.endswith("/transition_event")]
-    # The nearest name is looked for among those of the node and type in question first.
+    # The nearest name is first looked for among the topics of the node and type in question.
     meant = {
         name
         for name in used
@@ -247,8 +258,8 @@ def why_no_endpoint(scene: Scene, topic: str, msg_type: type | None, kind: str, 
     }
     twins = _twins(scene, topic)
     near = [name for name in (meant or used) if not {node_of(end) for end in reach(name)} <= twins]
-    found = _idle_rule(scene, topic, node) or not_made_yet(scene, topic, kind, node)
-    found = found or _elsewhere(scene, topic, kind, near)
+    found = _idle_rule(scene, topic, node) or taken_away(scene, topic, kind, node)
+    found = found or not_made_yet(scene, topic, kind, node) or _elsewhere(scene, topic, kind, near)
     if found:
         return found
     opposite = observer.subscriptions(topic) if kind == "publisher" else observer.publishers(topic)
@@ -263,7 +274,7 @@ def why_no_endpoint(scene: Scene, topic: str, msg_type: type | None, kind: str, 
 
 
 def _idle_rule(scene: Scene, topic: str, node: str) -> Reason | None:
-    """A remap rule, of the program in question, that was meant to make the topic's name and did not."""
+    """Return why a rule of the program in question did not produce the topic's name, although it was meant to."""
     observer = scene.observer
     users = {
         name: {node_of(end) for end in ends}
@@ -283,9 +294,13 @@ def _idle_rule(scene: Scene, topic: str, node: str) -> Reason | None:
 
 
 def _elsewhere(scene: Scene, topic: str, kind: str, names: list[str]) -> Reason | None:
-    """The same end under another name: absolute in the code, or misspelt.
+    """Return the reason if the same end exists under another name, which is absolute in the code or misspelt.
 
-    A name that only the observer's own launch line or another node uses is not what the student meant.
+    Args:
+        scene: the launch.
+        topic: the expected name.
+        kind: "publisher" or "subscription".
+        names: the names that the student can have meant.
     """
     base = topic.rsplit("/", 1)[-1]
     for name in names:
@@ -301,7 +316,7 @@ def _elsewhere(scene: Scene, topic: str, kind: str, names: list[str]) -> Reason 
 
 
 def _misspelt(scene: Scene, kind: str, close: str, said: str, missing: Kind) -> Reason:
-    """There is only something of a similar name; `said` is the sentence that the name ends."""
+    """Return the reason if there is only a similar name, which ends the sentence `said`."""
     made = _made_as(scene, kind, close)
     given = made[0].given if made else ""
     in_code = f" (`{given}` in the code)" if given and given != close else ""
@@ -309,7 +324,7 @@ def _misspelt(scene: Scene, kind: str, close: str, said: str, missing: Kind) -> 
 
 
 def why_no_service(scene: Scene, name: str, srv_type: type) -> Reason:
-    """Why there is no server for a service."""
+    """Return why there is no server for a service."""
     trouble = program_trouble(scene)
     if trouble:
         return trouble
@@ -329,8 +344,22 @@ def why_no_service(scene: Scene, name: str, srv_type: type) -> Reason:
     return inside_reason(scene) or NO_SERVICE(f"No node offers the service `{name}`.")
 
 
+def taken_away(scene: Scene, topic: str, kind: str, node: str) -> Reason | None:
+    """Must have seen: such ends that the program made, and that it has destroyed all of them."""
+    for inside in scene.inside_of(node) if node else scene.insides:
+        things = inside.things.values() if inside.alive else ()
+        made = [thing for thing in things if (thing.kind, thing.name) == (kind, topic)]
+        if made and all(thing.destroyed for thing in made):
+            line = f" in {made[-1].made}" if made[-1].made else ""
+            return TAKEN_AWAY(
+                f"`{inside.name}` made the {kind} on `{topic}`{line} and has destroyed it since.",
+                f"Destroy the {kind} where it must no longer exist, and not before.",
+            )
+    return None
+
+
 def not_made_yet(scene: Scene, topic: str, kind: str, node: str) -> Reason | None:
-    """Must have seen: a line in a method of the source that makes such an end, and no end made there."""
+    """Must have seen: a line in a method of the source that creates such an end, and no end created there."""
     for inside in scene.inside_of(node) if node else scene.insides:
         for method, call in _makers(inside, topic, kind) if inside.alive else []:
             code = inside.source.line(call.lineno)
@@ -343,7 +372,10 @@ def not_made_yet(scene: Scene, topic: str, kind: str, node: str) -> Reason | Non
 
 
 def _makers(inside: Inside, topic: str, kind: str) -> list[tuple[str, ast.Call]]:
-    """The calls that would make this end and have made none, each with its method, other than `__init__`."""
+    """Return the calls that would create this end and have created none, each with its method.
+
+    Calls in `__init__` are left out.
+    """
     used = {int(thing.made.rpartition(":")[2] or 0) for thing in inside.things.values() if thing.kind == kind}
     found = []
     for method, call in inside.source.method_calls():

@@ -1,4 +1,4 @@
-"""The first links of every chain: is every program there and alive, and does it spin its nodes?"""
+"""The first links of every chain: whether every program exists and is running, and whether it spins its nodes."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ PROCESS_LIMIT = Kind(
 _WRONG_FIELD = re.compile(
     r"(\w{1,100}?)__(?:msg|srv|action)__\w{1,100}convert_from_py.{0,200}Assertion `Py(\w{1,9})_Check"
 )
-"""What the C code of an interface prints when a field does not hold what it should."""
+"""What the C code of an interface prints if a field has a value of a wrong type."""
 _NO_THREAD = re.compile(r"Resource temporarily unavailable|can't start new thread|std::system_error")
-"""What Python, or the middleware's C++, prints when the system starts no thread for it."""
+"""What Python, or the middleware's C++ code, prints if the system refuses to start a thread."""
 _LIMITS = {"memory limit": MEMORY_LIMIT, "process limit": PROCESS_LIMIT}
 _KINDS = {"Long": "int", "Float": "float", "Bool": "bool", "Unicode": "str"}
 
@@ -54,7 +54,7 @@ def program_trouble(scene: Scene) -> Reason | None:
 
 
 def _death(inside: Inside) -> Reason:
-    """Why a program has ended.
+    """Return why a program has ended.
 
     Raises:
         KitError: the machine is the reason.
@@ -107,7 +107,7 @@ def _death(inside: Inside) -> Reason:
 
 
 def _why_over(inside: Inside) -> str:
-    """What is to be said of how the program spins, if it does so in its own file."""
+    """Return advice about how the program spins, if its own file contains a call that spins; otherwise empty."""
     names = ("spin", "spin_once", "spin_until_future_complete")
     spins = {name: number for name in names if (number := inside.source.calls(name))}
     if not spins or "spin" in spins:
@@ -124,17 +124,19 @@ _AFTER_SHUTDOWN = re.compile(
     r"Context must be initialized|context is (invalid|not valid)|NotInitializedException|ExternalShutdownException"
     r"|InvalidHandle|already called|'NoneType' object does not support the context manager"
 )
-"""What rclpy says to code that goes on to use it after a shutdown."""
+"""The errors of rclpy in code that continues to use it after a shutdown."""
 
 
 def shut_down_inside(scene: Scene) -> Reason | None:
-    """Why a program that shut down inside a callback did not end well. Must have seen: that call, and an end that can
-    follow from it: by a signal, or by an error of rclpy's that says that something is shut down.
+    """Return why a program that called shutdown inside a callback did not end properly.
+
+    Must have seen: that call, and an end that it can have caused: by a signal, or by an error of rclpy that says that
+    something is shut down.
     """
     for inside in scene.insides:
         error = last_traceback(inside.program.output(), inside.name)
         if (inside.program.exit_status() or 0) >= 0 and not (error and _AFTER_SHUTDOWN.search(error.because)):
-            continue  # it ended for a reason of its own
+            continue  # it ended for another reason
         for call in inside.calls:
             if call.what == "shutdown" and call.in_callback:
                 return SHUTDOWN_IN_CALLBACK(
@@ -171,18 +173,18 @@ SPINNING_ENDED = Kind(
 SHUT_DOWN_IN_MAIN = "Set a future or a flag in the callback. Then let `main` stop spinning and shut down."
 
 ENDED_AFTER = 1.0
-"""Seconds without spinning after which it has ended: a program may spin once in a while."""
+"""The seconds without spinning after which the spinning counts as ended, because a program may spin at intervals."""
 
 
 def _unspun(inside: Inside) -> list[str]:
-    """Nodes that no executor has ever spun; none where one is in an executor that the probe does not watch."""
+    """Return the nodes that no executor has ever spun; none if the probe does not watch the executor of some node."""
     if any(node.foreign for node in inside.nodes.values()):
         return []
     return [node.name for node in inside.nodes.values() if not node.spun and not node.destroyed]
 
 
 def in_the_constructor(inside: Inside) -> Reason | None:
-    """Must have seen: no node spun yet, and the program in one place of an `__init__` each time it is looked at."""
+    """Must have seen: no node spun yet, and the program in the same place of an `__init__` at each look."""
     if not _unspun(inside) or any(executor.spins for executor in inside.executors):
         return None
     place = inside.main_place()
@@ -195,7 +197,7 @@ def in_the_constructor(inside: Inside) -> Reason | None:
 
 
 def not_added(inside: Inside) -> Reason | None:
-    """Must have seen: an executor that spins without any node, and a node that no executor has ever spun."""
+    """Must have seen: an executor that spins without nodes, and a node that no executor has ever spun."""
     unspun = _unspun(inside)
     empty = [executor for executor in inside.executors if executor.spinning and not executor.nodes]
     if unspun and empty and not any(executor.nodes for executor in inside.executors):
@@ -213,8 +215,9 @@ def never_spun(inside: Inside) -> Reason | None:
 
 
 def cannot_answer(inside: Inside) -> Reason | None:
-    """For a service of every node's, such as those of its parameters. Must have seen: what `never_spun` must, but
-    of any node.
+    """Return why a service that every node has, such as those of its parameters, does not answer.
+
+    Must have seen: the same as `never_spun`, but for any node, also one without callbacks.
     """
     return _never_spun(inside, _unspun(inside))
 
@@ -233,7 +236,7 @@ def _never_spun(inside: Inside, names: list[str]) -> Reason | None:
 
 
 def pulled_down(inside: Inside) -> Reason | None:
-    """Must have seen: a shutdown in a callback, and a program of which no node is spun, and which waits in rclpy."""
+    """Must have seen: a shutdown in a callback, and a program that spins none of its nodes and waits in rclpy."""
     spun = any(executor.spinning and executor.nodes for executor in inside.executors)
     for call in inside.calls:
         if call.what == "shutdown" and call.in_callback and not spun and inside.main_in_rclpy():
@@ -246,7 +249,7 @@ def pulled_down(inside: Inside) -> Reason | None:
 
 
 def thread_left(inside: Inside) -> Reason | None:
-    """Must have seen: the main thread wait for others at the end of Python, and one of them in the student's code."""
+    """Must have seen: the main thread wait for others when Python ends, and one of them in the student's code."""
     mains = [next(reversed(stacks.values()), []) for stacks in inside.stacks]
     if not mains or not all(any(frame[2] == "_shutdown" for frame in frames) for frames in mains):
         return None
@@ -262,7 +265,7 @@ def thread_left(inside: Inside) -> Reason | None:
 
 
 def no_longer_spun(inside: Inside) -> Reason | None:
-    """Must have seen: a node that was spun, and that no spinning executor holds now, while the program lives on."""
+    """Must have seen: a node that was spun and is in no spinning executor now, while the program continues to run."""
     for node in inside.nodes.values():
         left = node.spun and not inside.spinning(node.name) and inside.now - node.spun > ENDED_AFTER
         if left and not node.destroyed and not node.foreign:

@@ -1,4 +1,4 @@
-"""Why nothing, or too little, arrived on a topic; and why a service that is there did not answer."""
+"""Says why nothing, or too little, arrived on a topic, and why an existing service did not answer."""
 
 from __future__ import annotations
 
@@ -31,11 +31,14 @@ MISMATCH = {
     "liveliness": QOS_LIVELINESS,
     "lease": QOS_LEASE,
 }
-"""The kinds by the policies over which two ends do not match."""
+"""The kind of reason for each policy that can prevent two ends from matching."""
 
 
 def why_not_matched(scene: Scene, topic: str, profile: QoSProfile, kind: str) -> Reason | None:
-    """Must have seen: a `kind` of the student's on the topic whose QoS does not match an endpoint with `profile`."""
+    """Must have seen: a student's `kind` on the topic whose QoS does not match an endpoint with `profile`.
+
+    `kind` is "publisher" or "subscription".
+    """
     ends = scene.observer.publishers(topic) if kind == "publisher" else scene.observer.subscriptions(topic)
     for end in ends:
         offered, requested = (end.qos_profile, profile) if kind == "publisher" else (profile, end.qos_profile)
@@ -54,7 +57,7 @@ def why_not_matched(scene: Scene, topic: str, profile: QoSProfile, kind: str) ->
 
 NO_ANSWER = Kind("no-answer", "no reason was established: what was seen is said", Group.SILENCE)
 TIMER_PERIOD = Kind(
-    "timer-period", "nothing published, a timer of the node is not due yet, and the others have run", Group.SILENCE
+    "timer-period", "nothing published, and the node has only timers, none of which is due yet", Group.SILENCE
 )
 LIFECYCLE_INACTIVE = Kind(
     "lifecycle-inactive", "a lifecycle publisher dropped a message in another state", Group.SILENCE
@@ -69,12 +72,15 @@ LIFESPAN = Kind(
 )
 SILENT = Kind("silent", "no reason was established: what was seen is said", Group.SILENCE)
 
+_MILLISECONDS = 100
+"""Seconds from which on a timer's period may have been meant in milliseconds."""
+
 _EVERY_NODE = ("use_sim_time", "start_type_description_service")
-"""Parameters that a node has without declaring them."""
+"""The parameters that a node has without declaring them."""
 
 
 def why_silent(scene: Scene, topic: str, msg_type: type, profile: QoSProfile) -> Reason:
-    """Why nothing (more) arrived on a topic: the first link that is seen to be broken, or what was seen."""
+    """Return why nothing (more) arrived on a topic: the first link that was seen to be broken, or what was seen."""
     trouble = program_trouble(scene)
     if trouble:
         return trouble
@@ -97,7 +103,10 @@ def why_silent(scene: Scene, topic: str, msg_type: type, profile: QoSProfile) ->
 
 
 def lifecycle_silence(scene: Scene, topic: str = "") -> Reason | None:
-    """Must have seen: a lifecycle publisher (of this topic) that dropped a message because it was not activated."""
+    """Must have seen: a lifecycle publisher that dropped a message because it was not activated.
+
+    If `topic` is given, the publisher must be on this topic.
+    """
     for inside in scene.insides:
         for event in inside.all(LifecyclePublishOff):
             if topic and event.name != topic:
@@ -117,7 +126,7 @@ def lifecycle_silence(scene: Scene, topic: str = "") -> Reason | None:
 
 
 def too_old(scene: Scene, topic: str, profile: QoSProfile) -> Reason | None:
-    """Must have seen: a publisher that keeps messages for late joiners, all of them older than its lifespan by now."""
+    """Must have seen: a publisher that keeps messages for late joiners, all of which are older than its lifespan."""
     if profile.durability != DurabilityPolicy.TRANSIENT_LOCAL:
         return None
     for end in scene.observer.publishers(topic):
@@ -139,7 +148,7 @@ def too_old(scene: Scene, topic: str, profile: QoSProfile) -> Reason | None:
 
 
 def not_due(scene: Scene, topic: str) -> Reason | None:
-    """Must have seen: a node that has published nothing on a topic, and timers of it of which none is due yet."""
+    """Must have seen: a node that has published nothing on a topic, and has only timers, of which none is due yet."""
     for inside, publisher in _publishers(scene, topic):
         found = None if publisher.runs else _no_timer_due(inside, publisher.node)
         if found:
@@ -148,29 +157,26 @@ def not_due(scene: Scene, topic: str) -> Reason | None:
 
 
 def _no_timer_due(inside: Inside, node: str) -> Reason | None:
-    """Must have seen: a program that lives, and timers of its node of which none is due yet."""
-    timers = [t for t in inside.callbacks if t.kind == "timer" and t.node == node and not t.cancelled]
-    late = [t for t in timers if not t.runs and t.period > inside.age]
-    if inside.alive and late and len(late) == len(timers):
-        return TIMER_PERIOD(
-            f"`{inside.name}`: {called(late[0])} has not fired yet; the program has run for {inside.age:.0f} s.",
-            "`create_timer` takes its period in seconds.",
-        )
-    return None
+    """Must have seen: a running program, and a node of it that has only timers, of which none is due yet."""
+    callbacks = [thing for thing in inside.callbacks if thing.node == node and not thing.cancelled]
+    late = [thing for thing in callbacks if thing.kind == "timer" and not thing.runs and thing.period > inside.age]
+    if not inside.alive or not late or len(late) < len(callbacks):
+        return None
+    period = late[0].period
+    meant = f" For {period:g} milliseconds, write `{period / 1000:g}`." * (period >= _MILLISECONDS)
+    return TIMER_PERIOD(
+        f"`{inside.name}`: {called(late[0])} has not fired yet; the program has run for {inside.age:.0f} s.",
+        f"`create_timer` takes its period in seconds.{meant}",
+    )
 
 
 def nothing_due(scene: Scene, node: str) -> Reason | None:
-    """Must have seen: a node without a subscription that lives, and timers of it of which none is due yet."""
-    for inside in scene.insides:
-        if not any(thing.kind == "subscription" and thing.node == node for thing in inside.callbacks):
-            found = _no_timer_due(inside, node)
-            if found:
-                return found
-    return None
+    """Must have seen: a running node that has only timers, of which none is due yet."""
+    return first((lambda inside: _no_timer_due(inside, node),), scene.insides)
 
 
 def paces(scene: Scene, topic: str) -> str:
-    """What decides how often messages come on a topic, as seen: timers, and given parameters that nobody declared."""
+    """Describe what determines how often messages come on a topic: timers, and given but undeclared parameters."""
     said = []
     for number, inside in enumerate(scene.insides):
         nodes = {thing.node for thing in inside.things.values() if thing.kind == "publisher" and thing.name == topic}
@@ -204,11 +210,11 @@ def _publishers(scene: Scene, topic: str) -> list[tuple[Inside, Thing]]:
 
 
 def account(scene: Scene, topic: str) -> str:
-    """What was seen of a silent publisher, and so ruled out, where no reason is established."""
+    """Describe what was seen of a silent publisher, and thus ruled out, for when no reason is established."""
     found = _publishers(scene, topic)
     said = [f"The publisher on `{topic}` exists"]
     if not found or not all(inside.alive for inside, _ in found):
-        # That of /rosout is made by rcl, where the probe does not see it: what ran is said of every node.
+        # The probe does not see publishers that rcl creates, such as that of /rosout, so every node's runs are listed.
         said += [text for inside in scene.insides if inside.alive for text in _runs(inside)][:6]
         return f"{', '.join(said)}, but no (further) message arrived from it."
     inside, publisher = found[0]
@@ -222,7 +228,7 @@ def account(scene: Scene, topic: str) -> str:
 
 
 def _runs(inside: Inside, node: str = "") -> list[str]:
-    """How often each callback ran, of one node or of all of the program."""
+    """Describe how often each callback ran, of one node or of all nodes of the program."""
     stopped = " and is cancelled until `reset()` is called"
     return [
         f"{called(thing)} {_ran(thing.kind, thing.runs)}{stopped * thing.cancelled}"
@@ -232,7 +238,7 @@ def _runs(inside: Inside, node: str = "") -> list[str]:
 
 
 def _ran(kind: str, runs: int) -> str:
-    """How often a callback of this kind ran, as the end of a sentence."""
+    """Say how often a callback of this kind ran, as the end of a sentence."""
     if kind == "timer":
         return {0: "has not fired", 1: "fired once"}.get(runs, f"fired {runs} times")
     came = "message" if kind == "subscription" else "request"
@@ -240,7 +246,7 @@ def _ran(kind: str, runs: int) -> str:
 
 
 def why_no_answer(scene: Scene, name: str) -> Reason:
-    """Why a service that exists did not answer."""
+    """Return why an existing service did not answer."""
     found = program_trouble(scene) or inside_reason(scene, _owner(scene, name))
     if found:
         return found
@@ -261,7 +267,10 @@ def why_no_answer(scene: Scene, name: str) -> Reason:
 
 
 def _owner(scene: Scene, name: str) -> str:
-    """The node that offers a service, by its probe or by the name of a service that every node has."""
+    """Return the node that offers a service, according to a probe or else to the service's name.
+
+    The name shows the node for the services that every node has.
+    """
     for inside in scene.insides:
         for thing in inside.things.values():
             if thing.kind == "service" and thing.name == name:

@@ -1,4 +1,4 @@
-"""Where a program is: the stacks of its threads, and the student's lines that they stand in."""
+"""Finds where a program is: the stacks of its threads, and the student's lines that they are executing."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from pathlib import Path
 from autograder.sandbox.running_program import RunningProgram
 
 LOOKS = 4
-"""How often the stacks are looked at: a busy loop is in another of its lines each time."""
+"""How often the stacks are read. Several times are needed because a busy loop is in a different line each time."""
 
 Frame = tuple[str, int, str]
-"""File, line, function."""
+"""A stack frame: file, line and function."""
 
 Stacks = dict[int, list[Frame]]
-"""By thread: its frames, newest call first. The main thread comes last."""
+"""The frames of each thread, with the newest call first. The main thread is the last one."""
 
 _TAKING = ("acquire", "__enter__", "wait")
-"""Functions of `threading` in which a thread waits for its turn."""
+"""The functions of `threading` in which a thread waits for a lock or the like."""
 
 _THREAD = re.compile(r"Thread 0x([0-9a-f]+)")
 _WRITER = "Current thread"
@@ -29,18 +29,18 @@ _FRAME = re.compile(r'\s+File "(.*)", line (\d{1,9}) in (.*)')
 
 @dataclass(frozen=True)
 class Place:
-    """A line of the student's, or the loop that it is in."""
+    """A line of the student's code, or the loop that contains it."""
 
     first: int
     last: int
     code: str
     """The first of these lines."""
     loop: str
-    """The loop's own source, for questions about what it waits for; empty outside a loop."""
+    """The source of the loop, in which a diagnosis can see what the loop waits for; empty outside a loop."""
     function: str
 
     def __str__(self) -> str:
-        """As it stands in a sentence: `line 12 (...)` or `lines 12 to 14, the loop ...`."""
+        """Return the words for it in a sentence: `line 12 (...)` or `the loop in lines 12 to 14 (...)`."""
         if self.loop:
             lines = f"line {self.first}" if self.first == self.last else f"lines {self.first} to {self.last}"
             return f"the loop in {lines} (`{self.code}`)"
@@ -48,12 +48,12 @@ class Place:
 
 
 def look(program: RunningProgram, times: int = LOOKS) -> list[Stacks]:
-    """Look at the stacks of a program several times; each look takes about 50 ms."""
+    """Read the stacks of a program several times. Each reading takes about 50 ms."""
     return [found for found in (parse(program.stacks(1.0)) for _ in range(times)) if found]
 
 
 def parse(dump: str) -> Stacks:
-    """Read what faulthandler writes."""
+    """Parse the output of faulthandler."""
     stacks: Stacks = {}
     thread = None
     for line in dump.splitlines():
@@ -61,23 +61,23 @@ def parse(dump: str) -> Stacks:
             thread = int(head[1], 16)
             stacks[thread] = []
         elif line.startswith(_WRITER):
-            thread = None  # the one that writes this is not the program's
+            thread = None  # the thread that writes the stacks does not belong to the student's code
         elif thread is not None and (frame := _FRAME.match(line)):
             stacks[thread].append((frame[1], int(frame[2]), frame[3]))
     return stacks
 
 
 def inside_rclpy(name: str, frames: Sequence[Frame]) -> bool:
-    """Whether the innermost line of the program `name` on this stack is a call of rclpy's that has not returned."""
+    """Whether the innermost line of the program `name` on this stack is a call into rclpy that has not returned."""
     own = next((number for number, frame in enumerate(frames) if frame[0].endswith(f"/{name}.py")), 0)
     return any("/rclpy/" in frame[0] for frame in frames[:own])
 
 
 class Source:
-    """A student's program as text."""
+    """The source of a student's program."""
 
     def __init__(self, path: Path) -> None:
-        """Read it; what cannot be read or parsed is an empty program."""
+        """Read the file. If it cannot be read or parsed, it is treated as an empty program."""
         self._name = path.name
         try:
             text = path.read_text(encoding="utf-8", errors="replace")
@@ -87,21 +87,33 @@ class Source:
             self._tree, self._lines = ast.Module(body=[], type_ignores=[]), []
 
     def line(self, number: int) -> str:
-        """One line, without its indentation."""
+        """Return one line, without its indentation."""
         return self._lines[number - 1].strip() if 0 < number <= len(self._lines) else ""
 
     def calls(self, name: str) -> int:
-        """The line of the first call `something.NAME(…)`; 0 if there is none."""
+        """Return the line number of the first call `something.NAME(…)`; 0 if there is none."""
         calls = [node for node in ast.walk(self._tree) if isinstance(node, ast.Call)]
         return min((call.lineno for call in calls if getattr(call.func, "attr", "") == name), default=0)
 
+    def declares(self, parameter: str) -> int:
+        """Return the line of the only call that declares a parameter of this name, or 0."""
+        calls = [node for node in ast.walk(self._tree) if isinstance(node, ast.Call) and node.args]
+        found = [
+            call.lineno
+            for call in calls
+            if getattr(call.func, "attr", "") == "declare_parameter"
+            and isinstance(call.args[0], ast.Constant)
+            and call.args[0].value == parameter
+        ]
+        return found[0] if len(found) == 1 else 0
+
     def place(self, name: str, looks: Sequence[list[Frame]], innermost: bool = False) -> Place | None:
-        """Where the looks at one thread agree that the student's code is.
+        """Return the place in the student's code where a thread was each time; None if the readings do not agree.
 
         Args:
-            name: the program's.
-            looks: the thread's frames, each time it was looked at.
-            innermost: in the innermost function of the student's; otherwise in the callback that called that.
+            name: the name of the program.
+            looks: the thread's frames, once for each reading of the stacks.
+            innermost: take the innermost function of the student's; otherwise take the callback that called it.
         """
         found = [self._own(name, frames, innermost) for frames in looks]
         places = [frame for frame in found if frame]
@@ -119,7 +131,7 @@ class Source:
         return Place(number, number, self.line(number), "", places[0][2])
 
     def turn(self, name: str, looks: Sequence[list[Frame]]) -> Place | None:
-        """Where a thread waits, each time it was looked at, to take a lock, a semaphore or the like."""
+        """Return where a thread waited each time to take a lock, a semaphore or the like; None if it did not."""
         for frames in looks:
             own = next((number for number, frame in enumerate(frames) if frame[0].endswith(f"/{name}.py")), None)
             if own is None or frames[own][1] not in self._takes(self._tree):
@@ -133,8 +145,9 @@ class Source:
         return Place(number, number, self.line(number), "", "")
 
     def locks(self, line: int) -> dict[str, int]:
-        """What the function that begins in a line takes for itself (`with self.lock`), and in which line; what it
-        calls of the same file, too.
+        """Return the locks that the function beginning in a line takes (`with self.lock`), and in which line each.
+
+        Locks that are taken by the functions it calls in the same file are included.
         """
         functions = {node.name: node for node in ast.walk(self._tree) if isinstance(node, ast.FunctionDef)}
         begun = [f for f in functions.values() if min([f.lineno, *(d.lineno for d in f.decorator_list)]) == line]
@@ -150,7 +163,7 @@ class Source:
         return found
 
     def late_name(self, line: int) -> str:
-        """A loop's own name that a lambda in this line and loop reads when it runs; empty if there is none."""
+        """Return the variable of a loop that a lambda in this line of the loop reads when it runs; empty if none."""
         for loop in ast.walk(self._tree):
             if not isinstance(loop, (ast.For, ast.comprehension)):
                 continue
@@ -165,7 +178,7 @@ class Source:
         return ""
 
     def method_calls(self) -> list[tuple[str, ast.Call]]:
-        """Every call in a method of a class, with the method's name."""
+        """Return every call in a method of a class, with the method's name."""
         return [
             (method.name, call)
             for part in ast.walk(self._tree)
@@ -178,7 +191,7 @@ class Source:
 
     @staticmethod
     def _takes(tree: ast.AST) -> dict[int, str]:
-        """The lines where something is taken, and what."""
+        """Return the lines in which a lock or the like is taken, and what is taken there."""
         found: dict[int, str] = {}
         for node in ast.walk(tree):
             if isinstance(node, ast.With):
@@ -189,7 +202,10 @@ class Source:
         return found
 
     def _own(self, name: str, frames: list[Frame], innermost: bool) -> Frame | None:
-        """The frame of the student's callback: the outermost of the innermost row of the student's frames."""
+        """Return the frame of the student's callback, or that of the innermost function; None if there is none.
+
+        The callback is the outermost frame in the innermost unbroken run of the student's frames.
+        """
         found = None
         for frame in frames:
             if frame[0].endswith(f"/{name}.py"):
@@ -201,7 +217,7 @@ class Source:
         return found
 
     def _loop(self, lines: set[int]) -> ast.stmt | None:
-        """The innermost loop that all these lines are in."""
+        """Return the innermost loop that contains all these lines."""
         loops = [
             node
             for node in ast.walk(self._tree)

@@ -1,4 +1,7 @@
-"""Why callbacks did not run at the same time, or some hardly at all: the executor, its threads, the groups, a lock."""
+"""Says why callbacks did not run at the same time, or some hardly ran at all.
+
+The cause may be the executor, its number of threads, the callback groups or a lock.
+"""
 
 from __future__ import annotations
 
@@ -69,17 +72,17 @@ CANCELLED_MEANWHILE = Kind(
 )
 
 MOST_OF_THE_TIME = 0.6
-"""Share of the time that others must have taken for a callback to count as kept waiting by them."""
+"""The share of the time that other callbacks must have taken before a callback counts as kept waiting by them."""
 
 CANCELLED_BEFORE = 0.1
-"""Seconds before the time in question in which a timer may have been cancelled on its account."""
+"""A timer that was cancelled at most so many seconds before the time in question counts as cancelled because of it."""
 
 FAR_FEWER = 0.6
-"""Share of the due runs below which a timer counts as kept waiting."""
+"""A timer with less than this share of its due runs counts as kept waiting."""
 
 
 def _used(inside: Inside) -> list[ExecutorSeen]:
-    """The executors that have run a callback."""
+    """Return the executors that have run a callback."""
     return [executor for executor in inside.executors if executor.most]
 
 
@@ -88,12 +91,12 @@ def _active(inside: Inside) -> list[Thing]:
 
 
 def single_threaded(inside: Inside) -> Reason | None:
-    """Must have seen: callbacks run, one of which takes time, and every executor that ran one has one thread and is no
+    """Must have seen: callbacks run, one of which takes time, all of them in one executor that is not a
     MultiThreadedExecutor.
     """
     used = _used(inside)
     if not any(thing.takes_time for thing in _active(inside)):
-        return None  # nothing keeps the thread, so it is not the thread that is missing
+        return None  # no callback occupies the thread for long, so the single thread is not the cause
     if not used or len(used) > 1 or used[0].threads is not None:
         return None
     unused = [e for e in inside.executors if e.threads is not None and not e.most]
@@ -117,7 +120,7 @@ def single_threaded(inside: Inside) -> Reason | None:
 
 
 def few_threads(inside: Inside, at_once: int) -> Reason | None:
-    """Must have seen: an executor that ran callbacks on fewer threads than have to run at once."""
+    """Must have seen: an executor that ran callbacks and has fewer threads than callbacks that must run at once."""
     for executor in _used(inside):
         if executor.threads is None or executor.threads >= at_once:
             continue
@@ -137,7 +140,7 @@ def few_threads(inside: Inside, at_once: int) -> Reason | None:
 
 
 def one_group(inside: Inside) -> Reason | None:
-    """Must have seen: several callbacks, those that ran and all timers, in one and the same exclusive group."""
+    """Must have seen: several callbacks, and all timers and all callbacks that ran in the same exclusive group."""
     active = [thing for thing in inside.callbacks if thing.runs or thing.kind == "timer"]
     groups = {thing.group_id for thing in active}
     if len(active) < 2 or len(groups) != 1 or not all(thing.exclusive for thing in active):
@@ -157,9 +160,9 @@ def one_group(inside: Inside) -> Reason | None:
 
 
 def groups_allow_fewer(inside: Inside, at_once: int) -> Reason | None:
-    """Must have seen: the groups of all timers and of all callbacks that ran, which let fewer of them run at once.
+    """Must have seen: the groups of all timers and of all callbacks that ran, which allow fewer to run at once.
 
-    A reentrant callback that overlapped itself may stand for any number of them: nothing is said then.
+    There is no reason if a reentrant callback overlapped itself, because then it can run any number of times at once.
     """
     active = [thing for thing in inside.callbacks if thing.runs or thing.kind == "timer"]
     groups = _by_group(active)
@@ -182,14 +185,17 @@ def _by_group(things: Sequence[Thing]) -> list[list[Thing]]:
 
 
 def _kinds(groups: Sequence[Sequence[Thing]]) -> str:
-    """What is in these groups, in words."""
+    """Describe in words which callbacks are in these groups."""
     return "; ".join(
         f"{'an exclusive' if members[0].exclusive else 'a reentrant'} group has {listed(members)}" for members in groups
     )
 
 
 def exclusive_itself(inside: Inside) -> Reason | None:
-    """Must have seen: callbacks run, and none of them in a reentrant group. (For a callback that overlaps itself.)"""
+    """Must have seen: callbacks run, and none of them in a reentrant group.
+
+    This is a reason only if a callback should have overlapped itself.
+    """
     active = _active(inside)
     if not active or any(not thing.exclusive for thing in active):
         return None
@@ -201,7 +207,7 @@ def exclusive_itself(inside: Inside) -> Reason | None:
 
 
 def _publishing(scene: Scene, topic: str) -> list[Inside]:
-    """The programs that publish on a topic, by what their probes say; all of them where no probe knows one."""
+    """Return the programs that publish on a topic according to their probes; all programs if no probe knows one."""
     publishing = [
         inside
         for inside in scene.insides
@@ -211,15 +217,15 @@ def _publishing(scene: Scene, topic: str) -> list[Inside]:
 
 
 def why_not_together(scene: Scene, topic: str, at_once: int = 2, itself: bool = False) -> Reason | None:
-    """Why callbacks did not overlap; None where what was seen excludes none of the ways in which that happens.
+    """Return why callbacks did not overlap; None if nothing was seen that prevents them from overlapping.
 
-    Must have seen: callbacks whose runs take time, because no other callback waits for those that do not.
+    Must have seen: callbacks whose runs take time, because short runs keep no other callback waiting.
 
     Args:
         scene: the launch.
-        topic: where the callbacks publish their begins and ends.
-        at_once: how many should have run at the same time.
-        itself: they should have been runs of one callback.
+        topic: the topic on which the callbacks publish when they begin and end.
+        at_once: how many of them should have run at the same time.
+        itself: whether one callback should have overlapped itself.
     """
     for inside in _publishing(scene, topic):
         if not inside.attached or not _used(inside) or not any(thing.takes_time for thing in _active(inside)):
@@ -234,8 +240,10 @@ def why_not_together(scene: Scene, topic: str, at_once: int = 2, itself: bool = 
 
 
 def waits_for_its_group(scene: Scene) -> Reason | None:
-    """Why timers pause while a service is called. Must have seen: a callback that waits for an answer, and every timer
-    of its node in the mutually exclusive group of that callback.
+    """Return why timers do not run while a service is called.
+
+    Must have seen: a callback that waits for a response, and every timer of its node in the mutually exclusive group of
+    that callback.
     """
     for inside in scene.insides:
         if not inside.attached:
@@ -257,7 +265,7 @@ def waits_for_its_group(scene: Scene) -> Reason | None:
 
 
 def why_starved(scene: Scene) -> Reason | None:
-    """Why some timers ran far less often than they were due.
+    """Return why some timers ran far less often than they were due.
 
     Must have seen: such a timer, and others of its exclusive group, or of its executor, take most of the time.
     """
@@ -301,7 +309,7 @@ def _starved(inside: Inside, timer: Thing) -> Reason | None:
 
 
 def _taken(inside: Inside, things: Sequence[Thing]) -> float:
-    """Seconds that these ran, together."""
+    """Return for how many seconds in total these callbacks ran."""
     now = inside.now
     return sum(thing.spent + sum(now - began for began, _ in thing.running) for thing in things)
 
@@ -311,13 +319,13 @@ def _ran(number: int) -> str:
 
 
 def sent_nothing(scene: Scene, topic: str, spans: Sequence[tuple[float, float]]) -> Reason | None:
-    """Must have seen: a timer that has published on the topic, and that in one of these times either ran and published
+    """Must have seen: a timer that has published on the topic, but that in one of these spans either ran and published
     nothing, or was cancelled and did not run.
 
     Args:
         scene: the launch.
-        topic: on which no message came in these times.
-        spans: begins and ends, in seconds on the system clock.
+        topic: the topic on which no message came in these spans.
+        spans: the begin and end of each, in seconds on the system clock.
     """
     ahead = time.time() - time.monotonic()
     for inside in _publishing(scene, topic):
@@ -346,7 +354,7 @@ def sent_nothing(scene: Scene, topic: str, spans: Sequence[tuple[float, float]])
 
 
 def layout(scene: Scene, topic: str) -> str:
-    """What was seen of executors, groups and runs of those who publish on a topic, where no reason is established."""
+    """Describe the executors and groups of the programs that publish on a topic, for when no reason is established."""
     said = []
     for inside in _publishing(scene, topic):
         if not inside.attached or not _used(inside):
@@ -360,10 +368,11 @@ def layout(scene: Scene, topic: str) -> str:
 
 
 def why_kept_waiting(scene: Scene, service: str) -> Reason | None:
-    """Why a service answers only when another callback of its program has ended.
+    """Return why a service answers only after another callback of its program has ended.
 
-    Must have seen: another callback whose runs take time, and the service's in its exclusive group, or on its only
-    thread; or runs of the service's callback that take time themselves, and a lock that the source of both takes.
+    Must have seen: another callback whose runs take time, and the service's callback in the exclusive group of that
+    callback, or on the only thread of the same executor; or runs of the service's callback that take time themselves,
+    and in the source a lock that both callbacks take.
     """
     for inside in scene.insides:
         asked = [thing for thing in inside.callbacks if (thing.kind, thing.name) == ("service", service)]
@@ -415,10 +424,10 @@ def _lock(inside: Inside, answers: Thing, works: Thing) -> Reason | None:
 
 
 def one_lock(inside: Inside, at_once: int) -> Reason | None:
-    """Why callbacks that were on threads at once worked one after another.
+    """Return why callbacks that had threads at the same time still worked one after another.
 
-    Must have seen: so many callbacks on the threads of an executor at once, and a lock that the source of two takes;
-    runs of one of these take time.
+    Must have seen: at least `at_once` callbacks on the threads of an executor at once, and in the source a lock that
+    two callbacks take, of which at least one has runs that take time.
     """
     most = max((executor.most for executor in inside.executors), default=0)
     ran = [thing for thing in inside.callbacks if thing.runs] if most >= at_once else []

@@ -1,4 +1,4 @@
-"""The error that a program printed, with the student's own line."""
+"""Finds the error that a program printed, with the student's own line."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ KNOWN_ERRORS = (
         "expecting type 'BYTE_ARRAY'",
         PARAMETER_TYPE,
         "An empty list as the default is a list of bytes for rclpy. Give the type in its place, as in "
-        '`declare_parameter("names", rclpy.Parameter.Type.STRING_ARRAY)`, or a list that holds something.',
+        '`declare_parameter("names", rclpy.Parameter.Type.STRING_ARRAY)`, or a list that is not empty.',
     ),
     (
         "InvalidParameterTypeException",
@@ -151,17 +151,20 @@ KNOWN_ERRORS = (
 )
 
 _KIND = re.compile(r"[A-Za-z_][\w.]*(Error|Exception|Interrupt|Exit|Warning|Shutdown\w*)\b")
-"""What the line of an error begins with, by the names that errors usually have."""
+"""The beginning of a line that reports an error, according to the usual names of errors."""
 
 
 def quoted(code: str, error: str) -> str:
-    """The student's line in brackets, unless it says no more than the error does."""
+    """Return the student's line in brackets, or an empty text if the line contains the name of the error anyway."""
     kind = error.partition(":")[0].rpartition(".")[2]
     return f" (`{code}`)" if code and kind not in code else ""
 
 
 def last_traceback(output: str, program: str) -> Reason | None:
-    """The last error that a Python program printed. Must have seen: a line that is one by its name or its frames."""
+    """Return the last error that a Python program printed.
+
+    Must have seen: a line that is an error because of its name or because of the frames above it.
+    """
     lines = output.splitlines()
     error_at = None
     for number in range(len(lines) - 1, -1, -1):
@@ -171,7 +174,7 @@ def last_traceback(output: str, program: str) -> Reason | None:
     if error_at is None:
         return None
     error = lines[error_at].strip()
-    if error.endswith(":") and lines[error_at + 1 :]:  # rclpy gives the name that is invalid a line of its own
+    if error.endswith(":") and lines[error_at + 1 :]:  # rclpy prints an invalid name in a line of its own
         error += f" {lines[error_at + 1].strip()}"
     where, code = _own_line(lines[:error_at], program)
     said = f"{where}{quoted(code, error)}: {error}"
@@ -190,7 +193,7 @@ def last_traceback(output: str, program: str) -> Reason | None:
 
 
 def _own_line(lines: Sequence[str], program: str) -> tuple[str, str]:
-    """Where in the student's file the frames above an error end, and what stands there."""
+    """Return the last line of the student's file in the frames above an error: where it is, and its code."""
     for number in range(len(lines) - 1, -1, -1):
         match = re.match(rf'\s+File "[^"]*\b{re.escape(program)}\.py", line (\d+)', lines[number])
         if match:
@@ -202,7 +205,7 @@ def _own_line(lines: Sequence[str], program: str) -> tuple[str, str]:
 
 
 def _under_frames(lines: Sequence[str], number: int) -> bool:
-    """Whether this line is an error of any name: it stands under the frames of a traceback."""
+    """Whether this line is an error with any name, because it is below the frames of a traceback."""
     if not re.match(r"[A-Za-z_][\w.]*(: |$)", lines[number]):
         return False
     while number > 0 and lines[number - 1].startswith("    "):

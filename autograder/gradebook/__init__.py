@@ -1,1 +1,1 @@
-"""Recording results with nbgrader: gradebook, feedback, releases."""
+"""Work with nbgrader: record results in the gradebook, write feedback, and release labs."""

@@ -1,4 +1,4 @@
-"""nbgrader's API with the course's stages in it."""
+"""Open nbgrader's API with the course's own stages."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from autograder.gradebook.own_courses import prepare_nbgrader
 
 
 def open_api(root: Path, gradebook: bool = True, **directories: Any) -> Any:
-    """Return nbgrader's API with the course's stages.
+    """Return nbgrader's API with the course's own stages.
 
     Args:
-        root: of the course.
-        gradebook: False generates labs without noting them in it.
-        directories: settings of nbgrader's CourseDirectory to replace.
+        root: the course's folder.
+        gradebook: whether labs are registered in the gradebook when they are generated.
+        directories: settings that replace those of nbgrader's CourseDirectory.
     """
     prepare_nbgrader()
     from nbgrader.apps import NbGraderAPI
@@ -34,7 +34,7 @@ def open_api(root: Path, gradebook: bool = True, **directories: Any) -> Any:
     if not gradebook:
         leave_gradebook_alone(config)
     config.NbGraderAPI.log_level = logging.ERROR
-    # What nbgrader logs is read from its answers; it must not also go to the terminal.
+    # nbgrader's log is read from its answers, so it must not also be printed on the terminal.
     for logger in ("traitlets", "tornado.application"):
         logging.getLogger(logger).addHandler(logging.NullHandler())
     warnings.filterwarnings("ignore", module=r"nbgrader\.api")
@@ -44,7 +44,7 @@ def open_api(root: Path, gradebook: bool = True, **directories: Any) -> Any:
 
 
 def last_error(answer: dict[str, Any]) -> str:
-    """The last telling line of what nbgrader logged."""
+    """Return the last informative line of nbgrader's log."""
     text = str(answer.get("log", "")) + "\n" + str(answer.get("error", ""))
     lines: list[str] = [
         line.strip() for line in text.splitlines() if re.match(r"\s*[\w.]*(Error|Exception|Entry)\b: ", line)
@@ -54,7 +54,7 @@ def last_error(answer: dict[str, Any]) -> str:
 
 
 def answered(answer: dict[str, Any]) -> dict[str, Any]:
-    """Return nbgrader's answer. It catches even what Ctrl-C raises; that goes on here."""
+    """Return nbgrader's answer, or raise KeyboardInterrupt again if nbgrader has caught it."""
     if "KeyboardInterrupt" in str(answer.get("error", "")):
         raise KeyboardInterrupt
     return answer

@@ -1,9 +1,9 @@
 """The course's own stages of `nbgrader autograde`.
 
-nbgrader decides points by luck in too many ways: a cell without output earns them all, a warning on stderr costs them
-all, and tests run in the process that runs the student's code. So nothing is executed here. The submission is rebuilt
-from the released notebook and the text of the answers; the outputs of check cells come from the stored result; a check
-without a result gets no automatic score.
+nbgrader's own stages can give wrong points in several ways: a cell without output earns all of its points, a warning on
+stderr costs all of them, and tests run in the same process as the student's code. Therefore nothing is executed here.
+The submission is rebuilt from the released notebook and the text of the answers. The outputs of check cells come from
+the stored result, and a check without a result gets no automatic score.
 """
 
 from __future__ import annotations
@@ -40,59 +40,59 @@ from autograder.sandbox.isolation import choose
 from autograder.submission.reader import read_submission
 
 UNDECIDED = "The grader could not decide this check. No points are lost, because an instructor decides."
-"""What stands in the output of a check without a verdict."""
+"""The output of a check without a verdict."""
 
 
 class HarmlessAnswers(NbGraderPreprocessor):  # type: ignore[misc]
-    """Takes the life out of HTML in students' Markdown, which feedback and formgrader would put into their pages.
+    """Makes HTML in students' Markdown harmless, because feedback and formgrader would put it into their pages.
 
-    A word joiner, which is invisible, parts every `<` from what would make it a tag. Unlike escaping it reads the same
-    in text and in code.
+    An invisible word joiner separates every `<` from the character that would make it a tag. Unlike an escape sequence,
+    it looks the same in text and in code.
     """
 
     def preprocess_cell(self, cell: Any, resources: dict[str, Any], index: int) -> tuple[Any, dict[str, Any]]:
-        """Part the tags in an answer cell; the lab's own text stays as it is."""
+        """Make the tags in an answer cell harmless. The lab's own text is not changed."""
         if cell.cell_type != "code" and utils.is_solution(cell):
             cell.source = harmless(cell.source)
         return cell, resources
 
 
 _BLANKS = 200
-"""Longer rows of blanks in an answer are shortened to this many."""
+"""The number of spaces to which longer sequences of spaces in an answer are shortened."""
 _FORMULAS = 100
-"""Formulas of LaTeX's longer spellings that are shown as such in an answer."""
+"""The number of formulas in an answer, in the longer notations of LaTeX, that are shown as formulas."""
 _FORMULA = re.compile(r"(\\begin(?=\{)|\\\\(?=[\[(]))")
-_FENCE = re.compile(r"^([ \t>*+\d.)-]*+)(`{3,}+|~{3,}+)[^`\n]*+$", re.MULTILINE)  # what was taken is never given back
+_FENCE = re.compile(r"^([ \t>*+\d.)-]*+)(`{3,}+|~{3,}+)[^`\n]*+$", re.MULTILINE)  # possessive: no backtracking
 
 
 def harmless(markdown: str) -> str:
-    """Return Markdown in which nothing can become a tag, a script link or a picture from elsewhere."""
+    """Return the Markdown in a form in which nothing can become a tag, a script link or an external picture."""
     return harmless_text(re.sub(r"<(?=[A-Za-z/!?])", "<\u2060", markdown))
 
 
 def harmless_text(markdown: str) -> str:
-    """Return Markdown in which nothing but tags can become a script link, a drawing or a picture from elsewhere."""
-    # nbconvert hands such a block to a drawing program in the browser, as it stands: it fetches pictures, too.
+    """Return the Markdown in a form in which only tags can become a script link, a drawing or an external picture."""
+    # nbconvert passes a mermaid block unchanged to a drawing program in the browser, which also fetches pictures.
     markdown = markdown.replace("mermaid", "m\u2060ermaid")
-    # For each of many blanks the Markdown reader looks at all that follow: 60000 take it a quarter of a minute.
+    # For each space the Markdown parser reads all spaces that follow: 60000 spaces take it 15 seconds.
     markdown = re.sub(f" {{{_BLANKS},}}", " " * _BLANKS, markdown)
-    # So it does for the beginning of a formula that does not end: 20000 take it a quarter of a minute.
+    # The same is true for the beginnings of formulas that have no end: 20000 of them take 15 seconds.
     *first, rest = _FORMULA.split(markdown, _FORMULAS)
     markdown = "".join(first) + _FORMULA.sub("\\1\u2060", rest)
-    # Without the name of a language code is not coloured, which takes half a minute for 20000 lines of a blank.
+    # Code without the name of a language is not coloured. Colouring takes half a minute for 20000 lines of one space.
     markdown = _FENCE.sub(r"\1\2", markdown)
-    # What a browser fetches by itself would tell its owner who reads the page.
+    # If a browser fetches a picture by itself, the owner of the picture learns who reads the page.
     parted = markdown.replace("![", "!\u2060[")
-    # Only links that plainly begin with http stay links: there are too many ways to spell the other schemes.
+    # Only links that clearly begin with http stay links, because other schemes can be written in too many ways.
     return re.sub(r"\](?=(\(|:)(?!\s*https?://))", "]\u2060", parted)
 
 
 _POINTS = "autograder_points"
-"""Key under which a notebook's resources hold the points by grade_id."""
+"""The key in a notebook's resources that holds the points by grade_id."""
 
 
 def _submitted(converter: Autograde, resources: dict[str, Any]) -> tuple[Path, str, Lab, Path]:
-    """Find the notebook that was handed in, whichever of nbgrader's two passes is running."""
+    """Return the course's folder, the student, the lab, and the submitted notebook, in both of nbgrader's passes."""
     course = converter.coursedir
     student, name = resources["nbgrader"]["student"], resources["nbgrader"]["assignment"]
     lab = load_lab(Path(course.root), name)
@@ -103,12 +103,16 @@ def _submitted(converter: Autograde, resources: dict[str, Any]) -> tuple[Path, s
 class SubmissionExporter(NotebookExporter):  # type: ignore[misc]
     """Opens a submission for nbgrader as the released notebook with only the text of the answers in it.
 
-    It stands before the sanitizing stages because nbgrader would give up on a file that is no notebook, and so that
-    nothing else of a student's notebook, no tag, flag, output or extra cell, gets any further.
+    This happens before nbgrader's sanitizing stages for two reasons. nbgrader would stop at a file that is no notebook.
+    And nothing else from a student's notebook, such as a tag, flag, output or extra cell, may reach the later stages.
     """
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
-        """Refuse to take part in a pipeline with other stages than the course's."""
+        """Refuse to work in a pipeline with stages other than the course's.
+
+        Raises:
+            KitError: the pipeline of `nbgrader autograde` has other stages.
+        """
         super().__init__(*args, **kwargs)
         if not isinstance(self.parent, Autograde):
             return
@@ -121,7 +125,7 @@ class SubmissionExporter(NotebookExporter):  # type: ignore[misc]
         self.parent.coursedir = only_notebooks(self.parent.coursedir)
 
     def from_filename(self, filename: str, resources: dict[str, Any] | None = None, **kwargs: Any) -> Any:
-        """Rebuild the notebook in nbgrader's first pass; read what that pass wrote in the second."""
+        """Rebuild the notebook in nbgrader's first pass. In its second pass, read the file that the first one wrote."""
         if not in_first_pass(self.parent):
             return super().from_filename(filename, resources=resources, **kwargs)
         resources = dict(resources or {})
@@ -134,13 +138,13 @@ class SubmissionExporter(NotebookExporter):  # type: ignore[misc]
 
 
 class AttachResults(NbGraderPreprocessor):  # type: ignore[misc]
-    """Puts the stored result into the outputs of the check cells, in place of execution.
+    """Puts the stored result into the outputs of the check cells instead of executing them.
 
-    If there is none of these very answers, it runs the submission in the sandbox first.
+    If there is no stored result for exactly these answers, it first runs the submission in the sandbox.
     """
 
     def preprocess(self, nb: Any, resources: dict[str, Any]) -> tuple[Any, dict[str, Any]]:
-        """Attach outputs and note the points for `SaveCheckedGrades`."""
+        """Attach the outputs, and store the points for `SaveCheckedGrades`."""
         root, student, lab, path = _submitted(self.parent.parent, resources)
         store = ResultStore(root)
         result = store.fitting(lab, student, read_submission(path, lab).digest)
@@ -154,7 +158,7 @@ class AttachResults(NbGraderPreprocessor):  # type: ignore[misc]
                 points[grade_id] = _attach(cell, checks.get(grade_id))
         nb.cells = [shown for cell in nb.cells for shown in (cell, *_mark_scheme(cell, lab))]
         if result.problems:
-            # It quotes the student: no line of it may be the blank one that ends the HTML, and no word a link.
+            # The note quotes the student, so it must contain no blank line, which would end the HTML, and no link.
             note = harmless_text(" ".join(render("problems.html", problems=result.problems).split()))
             nb.cells.insert(0, nbformat.v4.new_markdown_cell(note, id="problems"))
         resources[_POINTS] = points
@@ -162,23 +166,26 @@ class AttachResults(NbGraderPreprocessor):  # type: ignore[misc]
 
 
 def _mark_scheme(cell: Any, lab: Lab) -> list[Any]:
-    """What formgrader shows below an answer that a person grades: the course's own answer, with its mark scheme."""
+    """Return a cell with the course's own answer and its mark scheme, for formgrader to show below a student's answer.
+
+    The result is empty if the cell is not graded by a person, or if the course has no solution for it.
+    """
     if not (utils.is_grade(cell) and utils.is_solution(cell)):
         return []
     answer = lab.answers[cell.metadata.nbgrader["grade_id"]]
-    if answer.solution == answer.blank:  # of a course without its solutions
+    if answer.solution == answer.blank:  # the course was copied without its solutions
         return []
     text = f"**For whoever grades: the course's answer, which students do not see**\n\n{answer.solution}"
     return [nbformat.v4.new_markdown_cell(text, id=f"{cell.id[:50]}-scheme")]
 
 
 def _attach(cell: Any, check: CheckResult | None) -> float | None:
-    """Write a check's outputs into its cell and return its points; None: there is no verdict."""
+    """Write a check's outputs into its cell and return its points; None if there is no verdict."""
     if check is not None and check.max_points != float(cell.metadata.nbgrader["points"]):
-        check = None  # the gradebook knows the check with other points
+        check = None  # the gradebook has other points for this check
     report = check_html(check, title=check.title) if check is not None else ""
     if check is None or check.points is None:
-        # An error output: whoever grades by outputs alone must not take silence for success.
+        # An error output is needed, because a tool that grades by outputs alone would treat an empty one as success.
         cell.outputs = [nbformat.v4.new_output("error", ename="CouldNotFindOut", evalue="", traceback=[UNDECIDED])]
         if report:
             cell.outputs.insert(0, nbformat.v4.new_output("display_data", {"text/html": report}))
@@ -189,13 +196,13 @@ def _attach(cell: Any, check: CheckResult | None) -> float | None:
 
 
 class SaveCheckedGrades(SaveScores):
-    """Records points of check cells from their results; without a verdict the cell waits for manual grading.
+    """Records the points of check cells from their results. A cell without a verdict waits for manual grading.
 
-    What a person gave stays. If what it was given for has changed since, the person is asked to look at it again.
+    Points that a person gave are kept. If the work has changed since then, the person is asked to look at it again.
     """
 
     def preprocess(self, nb: Any, resources: dict[str, Any]) -> tuple[Any, dict[str, Any]]:
-        """Record all grades of a submission, and that they are recorded."""
+        """Record all grades of a submission, and a digest of what was recorded."""
         root, student, lab, _ = _submitted(self.parent.parent, resources)
         self._programs = [cell.source for cell in nb.cells if cell.cell_type == "code" and utils.is_solution(cell)]
         digest = own_tables.recordable(root, lab, student)
@@ -208,11 +215,11 @@ class SaveCheckedGrades(SaveScores):
         return made
 
     def score_check(self, grade: Any, resources: dict[str, Any]) -> None:
-        """Set the points that checking found."""
+        """Set the points from the result of the check."""
         grade.auto_score = resources[_POINTS].get(grade.name)
 
     def needs_person(self, grade: Any, cell: Any, asked: bool) -> bool:
-        """Ask where there are no points yet, and where points were given by hand for something else."""
+        """Return True if there are no points yet, or if points were given by hand and the work has changed since."""
         programs = [] if utils.is_solution(cell) else self._programs
         about = own_tables.digest_of(cell.source, programs, grade.auto_score, grade.max_score)
         before = own_tables.judged(self.gradebook.db, grade.id)
@@ -223,6 +230,6 @@ class SaveCheckedGrades(SaveScores):
 
 
 SANITIZE = [ClearOutput, DeduplicateIds, OverwriteKernelspec, OverwriteCells, CheckCellMetadata]
-"""What nbgrader does to the rebuilt notebook; among others it puts the check cells' full source back."""
+"""nbgrader's stages for the rebuilt notebook. One of them restores the full source of the check cells."""
 AUTOGRADE = [AttachResults, SaveCheckedGrades, AssignLatePenalties, HarmlessAnswers]
-"""In place of nbgrader's execution."""
+"""The stages that replace nbgrader's execution."""

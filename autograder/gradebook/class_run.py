@@ -1,4 +1,4 @@
-"""The whole way of a class: take in, run, record, and tell what came of it."""
+"""Grade a class: take in the submissions, run them, record the results, and report what happened."""
 
 from __future__ import annotations
 
@@ -31,19 +31,19 @@ from autograder.intake.words import count
 from autograder.report.terminal import plain
 
 _NAMED = 3
-"""As many of those at work are named."""
+"""The number of running submissions that are shown by name."""
 
 
 class Steps:
-    """Progress on a terminal; a line for each step where nobody watches.
+    """Shows the progress as a bar on a terminal, and otherwise as a line for each step.
 
     Args:
-        total: how many submissions there are.
-        console: to show it on.
+        total: the number of submissions.
+        console: the console on which the progress is shown.
     """
 
     def __init__(self, total: int, console: Console) -> None:
-        """Show nothing yet."""
+        """Prepare the progress bar without showing it."""
         self._console, self.total, self.done, self._ran = console, total, 0, 0
         self._at_work: dict[str, None] = {}
         self._finished: set[str] = set()
@@ -59,16 +59,16 @@ class Steps:
         self._task = self._progress.add_task("grading", total=total, more="")
 
     def __enter__(self) -> Steps:
-        """Begin."""
+        """Show the progress bar."""
         self._progress.start()
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Take the bar away."""
+        """Remove the progress bar."""
         self._progress.stop()
 
     def started(self, student: str) -> None:
-        """A submission has begun to run; may be called in any thread, more than once, and after its end."""
+        """Note that a submission has started. This may be called in any thread, repeatedly, and even after its end."""
         with self._lock:
             self._began = self._began or time.monotonic()
             if student not in self._finished:
@@ -76,7 +76,7 @@ class Steps:
         self._progress.update(self._task, more=self._more())
 
     def finished(self, result: SubmissionResult) -> None:
-        """A result is there and kept."""
+        """Note that a result has been stored, and show it."""
         self.done += 1
         with self._lock:
             self._finished.add(result.student)
@@ -93,15 +93,15 @@ class Steps:
             self.say(line)
 
     def watching(self) -> None:
-        """The whole class has run; known answers among it may still run."""
+        """Show that the whole class has run, while known answers may still be running."""
         self._progress.update(self._task, description="canaries", more="")
 
     def recording(self, recorded: int) -> None:
-        """Everything has run; so many are in the gradebook."""
+        """Show that everything has run, and how many submissions are in the gradebook."""
         self._progress.update(self._task, description="recording", completed=recorded, more="")
 
     def say(self, sentence: str) -> None:
-        """Print a line above the bar."""
+        """Print a line above the progress bar."""
         self._console.print(plain(sentence), markup=False, soft_wrap=True)
 
     def _speed(self) -> str:
@@ -132,50 +132,52 @@ def _duration(seconds: float) -> str:
 
 @dataclass
 class ClassRun:
-    """What came of grading a class."""
+    """The results of grading a class."""
 
     results: list[SubmissionResult]
-    """Without pictures, which the stored ones have."""
+    """The results without their pictures, which only the stored results contain."""
     collected: Collected
-    """What was taken in and what was not."""
+    """What was taken in, and what was left out."""
     unrecorded: dict[str, str]
-    """Why nbgrader has no grade, by student."""
+    """The reason why nbgrader has no grade, by student."""
     grades: Path
+    """The table of grades."""
     by_student: dict[str, Grade]
-    """What the gradebook holds now, with what people gave."""
+    """The grades that the gradebook now holds, including points that people gave."""
     told: list[str]
-    """What was changed about the gradebook itself, as sentences."""
+    """Sentences about changes of the gradebook itself."""
     canaries: list[str] = field(default_factory=list)
-    """What came of the known answers among the class, as sentences."""
+    """Sentences about the known answers that ran with the class."""
     seconds: dict[str, float] = field(default_factory=dict)
-    """How long it took in all; until the last submission had run; and how long nbgrader worked, mostly meanwhile."""
+    """How long the whole grading took (`all`), the runs (`running`), and nbgrader, mostly meanwhile (`recording`)."""
 
 
 @dataclass
 class Tried:
-    """What grading a class now would change, of which nothing is recorded."""
+    """The results of a trial run, which show what grading a class would change. Nothing is recorded."""
 
     before: dict[str, SubmissionResult]
-    """The results that are recorded, by student; of who is new there is none."""
+    """The results that are recorded, by student. Students without a recorded result are not in it."""
     after: list[SubmissionResult]
+    """The results of the trial run."""
     grades: dict[str, Grade]
-    """What the gradebook holds, by student."""
+    """The grades that the gradebook holds, by student."""
     collected: Collected
 
 
 @dataclass(frozen=True)
 class Intake:
-    """What somebody has said of a class before it is taken in, and who is told what came of that."""
+    """Options for taking in a class."""
 
     format: str = ""
-    """As what to read it; empty: as what it is."""
+    """The format of the submissions; empty to detect it."""
     accepted: Collection[Accepted] = ()
-    """What need not stop it."""
+    """The objections that a person has accepted."""
     told: Callable[[Collected], None] = lambda _: None
-    """Called as soon as the class is taken in, before anything is run."""
+    """A function that is called as soon as the class is taken in, before anything is run."""
 
     def collect(self, source: Path, lab: str, root: Path, tried_in: Path | None = None) -> Collected:
-        """Take in a class; raises as the function of that name."""
+        """Take in a class. For the arguments and the errors see the function `collect`."""
         collected = collect(source, lab, root, self.format, self.accepted, tried_in)
         self.told(collected)
         return collected
@@ -188,16 +190,16 @@ def grade_class(root: Path, lab_name: str, source: Path, settings: Settings, int
     """Grade every submission in a folder or zip.
 
     Args:
-        root: of the course.
-        lab_name: the lab they answer.
-        source: folder or zip.
-        settings: how to run them.
-        intake: what somebody has said of the class.
+        root: the course's folder.
+        lab_name: the lab to which the submissions belong.
+        source: the folder or zip with the submissions.
+        settings: how the submissions are run.
+        intake: the options for taking in the class.
 
     Raises:
-        KitError: usage or set-up; another grading is at work; or a known answer among the class got other points than
-            it must, so that nothing is recorded.
-        KeyboardInterrupt: finished results are kept, and the next run goes on from them.
+        KitError: there is an error of usage or set-up, another grading is running, or a known answer got other points
+            than it must, so that nothing is recorded.
+        KeyboardInterrupt: the grading was interrupted. Finished results are kept, and the next run continues from them.
     """
     with only_one(CoursePaths(root).lock, "A grading"):
         remove_unfinished(CoursePaths(root).build)
@@ -205,14 +207,14 @@ def grade_class(root: Path, lab_name: str, source: Path, settings: Settings, int
 
 
 def try_class(root: Path, lab_name: str, source: Path, settings: Settings, intake: Intake = _AS_IT_IS) -> Tried:
-    """Run what `grade_class` would run, and record nothing; `grade_class` takes what was run here.
+    """Run what `grade_class` would run, but record nothing. A later `grade_class` uses the results of these runs.
 
     Raises:
-        KitError: as `grade_class`.
+        KitError: see `grade_class`.
     """
     lab = load_lab(root, lab_name)
     with only_one(CoursePaths(root).lock, "A grading"), TemporaryDirectory(prefix="class-") as folder:
-        grades = {grade.student: grade for grade in read_grades(root, lab.name)}  # first: it may be unusable
+        grades = {grade.student: grade for grade in read_grades(root, lab.name)}  # first, because it may be unusable
         canaries = _canaries(root, lab, settings)
         collected = intake.collect(source, lab.name, root, Path(folder))
         store = ResultStore(root)
@@ -236,7 +238,7 @@ def try_class(root: Path, lab_name: str, source: Path, settings: Settings, intak
 
 
 def _canaries(root: Path, lab: Lab, settings: Settings) -> Canaries | None:
-    """The known answers for a run; None if they are switched off, or the course cannot have any."""
+    """Return the known answers for a run; None if they are switched off or the course has none."""
     try:
         known = known_answers(root, lab) if settings.canaries else []
     except KitError as error:

@@ -1,4 +1,4 @@
-"""The configuration that puts the course's layout and stages into nbgrader, and what `nbgrader export` writes."""
+"""Configure nbgrader with the course's layout and stages, and with the table that `nbgrader export` writes."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from autograder.intake.record import left_class
 
 
 class ExportOfClass(CsvExportPlugin):  # type: ignore[misc]
-    """Writes for each assignment a row for every student, except for who has left its class.
+    """Writes a row for every student of each assignment, except for students who have left its class.
 
-    nbgrader takes every student of the gradebook, which also keeps the grades of those who have left.
+    nbgrader itself writes all students in the gradebook, which also keeps the grades of students who have left.
     """
 
     def export(self, gradebook: Any) -> None:
@@ -30,7 +30,7 @@ class ExportOfClass(CsvExportPlugin):  # type: ignore[misc]
 
 
 class _Classes:
-    """A gradebook that is read assignment by assignment, with the students of the one that is being read."""
+    """A gradebook that is read assignment by assignment, with only the students of the current assignment's class."""
 
     def __init__(self, gradebook: Any, root: Path) -> None:
         self._gradebook, self._root, self._left = gradebook, root, set[str]()
@@ -50,15 +50,15 @@ class _Classes:
 
 
 NOT_RELEASED = [".ipynb_checkpoints", "*.pyc", "__pycache__", ".*", "nodes"]
-"""Files beside a lab's source, and beside what a student hands in, that are not part of it."""
+"""The names of files that are not part of a lab or a submission, although they are in the same folder."""
 
 
 def configure(config: Any, root: Path) -> None:
     """Write the course's layout and stages into an nbgrader configuration.
 
     Args:
-        config: traitlets' Config, as `get_config()` gives it.
-        root: of the course.
+        config: the Config of traitlets that `get_config()` returns.
+        root: the course's folder.
     """
     paths = CoursePaths(root)
     course = config.CourseDirectory
@@ -84,6 +84,6 @@ def configure(config: Any, root: Path) -> None:
 
 
 def leave_gradebook_alone(config: Any) -> None:
-    """Let labs be generated without a gradebook."""
+    """Configure nbgrader to generate labs without a gradebook."""
     config.GenerateAssignment.no_database = True
     config.GenerateAssignment.preprocessors = WITHOUT_GRADEBOOK

@@ -1,4 +1,4 @@
-"""The gradebook's database: it can be written, and has the form of this nbgrader, whether it is new or an older one."""
+"""Make sure that the gradebook's database can be written and has the tables of the installed nbgrader."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from autograder.gradebook.settings import gradebook_address, gradebook_file, gra
 
 
 def make_folder(root: Path) -> None:
-    """Make the folder of a course's gradebook; one from where earlier versions kept it moves there.
+    """Create the folder of a course's gradebook, and move a gradebook there from the folder that earlier versions used.
 
     Raises:
-        OSError: nothing may be written there.
+        OSError: the folder cannot be written.
     """
     file = CoursePaths(root).gradebook
     file.parent.mkdir(exist_ok=True)
@@ -29,11 +29,11 @@ def make_folder(root: Path) -> None:
 
 
 def make_usable(root: Path) -> None:
-    """Have a gradebook of a course that can be written and has the form of this nbgrader's.
+    """Make sure that a course has a gradebook that can be written and has the tables of the installed nbgrader.
 
     Raises:
-        KitError: it is damaged, or cannot be brought to that form.
-        OSError, sqlite3.OperationalError: it cannot be written.
+        KitError: the gradebook is damaged or cannot be upgraded.
+        OSError, sqlite3.OperationalError: the gradebook cannot be written.
     """
     make_folder(root)
     with damage_told(root):
@@ -45,14 +45,14 @@ def make_usable(root: Path) -> None:
 
 @contextlib.contextmanager
 def damage_told(root: Path) -> Iterator[None]:
-    """Say of a gradebook that is no database any more what is to be done.
+    """Turn the error of a damaged gradebook into a sentence that says what to do.
 
     Raises:
-        KitError: it is none.
+        KitError: the gradebook is damaged.
     """
     try:
         yield
-    except Exception as error:  # SQLAlchemy's error is around that of the database
+    except Exception as error:  # SQLAlchemy wraps the error of the database
         inner = getattr(error, "orig", error)
         if type(inner) is not sqlite3.DatabaseError:
             raise
@@ -74,7 +74,7 @@ def _refuse_unwritable(root: Path) -> None:
 
 
 def _create(root: Path) -> None:
-    """Make a gradebook that is not there yet, whole or not at all: the disk may fill meanwhile."""
+    """Create the gradebook if there is none, completely or not at all, because the disk may become full meanwhile."""
     file = gradebook_file(root)
     if file is None or (file.is_file() and file.stat().st_size):
         return
@@ -96,9 +96,10 @@ def _create(root: Path) -> None:
 
 
 def name_course(root: Path) -> None:
-    """Note a course without a name in a gradebook on a server, which takes no lab of a course that is not noted.
+    """Add the course with an empty name to a gradebook on a server.
 
-    nbgrader notes only those with a name, and gets by with that in a file, where nobody looks after such things.
+    A server refuses a lab whose course is not in its table of courses. nbgrader adds only courses that have a name,
+    which is enough for a gradebook in a file, because SQLite does not check such references.
     """
     if gradebook_file(root) is not None:
         return
@@ -112,10 +113,10 @@ def name_course(root: Path) -> None:
 
 
 def bring_up_to_date(root: Path) -> None:
-    """Give a gradebook that an older nbgrader made the form of this one, after a copy of it was made.
+    """Make a copy of a gradebook that an older nbgrader created, and upgrade its tables to the installed version.
 
     Raises:
-        KitError: it cannot be changed, and the copy is there; or nothing says who made it, or a newer nbgrader did.
+        KitError: the upgrade failed, the gradebook does not say its version, or a newer nbgrader created it.
     """
     from sqlalchemy import create_engine, inspect, text
 
@@ -139,7 +140,7 @@ def bring_up_to_date(root: Path) -> None:
     copies = f" If it held grades, replace it with a copy from {file.parent / BACKUPS}." if file is not None else ""
     if version is None:
         raise KitError(
-            f"The gradebook {place} does not say which version it has: it was left unfinished when it was made.",
+            f"The gradebook {place} does not say which version it has, because its creation was interrupted.",
             f"Move it away, and run again.{copies}",
         )
     if version not in {one.revision for one in scripts.walk_revisions()}:
@@ -151,9 +152,9 @@ def bring_up_to_date(root: Path) -> None:
     copy = back_up(address, "before nbgrader upgrade")
     try:
         upgrade(address)
-    except Exception as error:  # it runs a program, which has said what is wrong
-        kept = f" A copy of it as it was is {copy}." if copy else ""
+    except Exception as error:  # it runs a program, which has printed the reason
+        kept = f" A copy from before the upgrade is {copy}." if copy else ""
         raise KitError(
             f"The gradebook was made by an older nbgrader, and it could not be upgraded to this version.{kept}",
-            "Read what is said above; nbgrader's own command for it is: nbgrader db upgrade",
+            "Read the messages above. nbgrader's own command for this is: nbgrader db upgrade",
         ) from error

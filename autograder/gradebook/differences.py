@@ -1,4 +1,4 @@
-"""What grading a class now would change: check by check, before any of it is recorded."""
+"""Show check by check what grading a class would change, before anything is recorded."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from autograder.report.terminal import plain
 
 
 def difference_view(tried: Tried) -> RenderableType:
-    """Return a table with a row for each check of a student's that gives other points, and what that comes to."""
+    """Return a table with a row for each student's check whose points would change, and a summary."""
     table = Table(box=None, header_style="bold", padding=(0, 1), pad_edge=False, expand=True)
     for title in ("student", "check"):
         table.add_column(title, no_wrap=True, max_width=40, overflow="ellipsis")

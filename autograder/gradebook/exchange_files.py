@@ -1,4 +1,4 @@
-"""What nbgrader's exchange puts beside a notebook, and wants to find beside its feedback to bring it back."""
+"""The files that nbgrader's exchange puts beside a notebook, and needs beside the feedback in order to return it."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from autograder.submission import exchange_secret, timestamp
 
 
 class CollectNotebooks(ExchangeCollect):  # type: ignore[misc]
-    """Takes of what was submitted to nbgrader's exchange the notebooks, and what the exchange added to them."""
+    """Collects from nbgrader's exchange only the notebooks, and the files that the exchange itself added to them."""
 
     coursedir: Any
 
@@ -28,10 +28,10 @@ class CollectNotebooks(ExchangeCollect):  # type: ignore[misc]
 
 
 def only_notebooks(course: Any) -> Any:
-    """Return nbgrader's description of a course by which nothing but notebooks is copied on.
+    """Return a copy of nbgrader's description of a course with which only notebooks are copied.
 
-    A file such as ipykernel_launcher.py, lying beside a notebook that an instructor opens from formgrader, would be
-    imported by that kernel. The exchange, however, has to take along what belongs to a lab.
+    If an instructor opens a notebook from formgrader, its kernel would import a file such as ipykernel_launcher.py in
+    the same folder. The exchange uses the original description, because it has to copy all files that belong to a lab.
     """
     described = copy.copy(course)
     described.ignore = ["*"]
@@ -39,18 +39,19 @@ def only_notebooks(course: Any) -> Any:
 
 
 def carry(submitted: Path, into: Path) -> None:
-    """Put what the exchange needs into a folder of nbgrader's, if it lies beside a submission and is as it must be."""
+    """Copy the exchange's files from a submission into a folder of nbgrader, if they exist and have the right form."""
     into.mkdir(parents=True, exist_ok=True)
     for name, text in (_moment(submitted), _secret(submitted)):
         if text:
-            (into / name).unlink(missing_ok=True)  # nbgrader makes its files unwritable
+            (into / name).unlink(missing_ok=True)  # nbgrader makes its files read-only
             write_beside(into / name, text)
 
 
 def complete(submitted: Path, feedback: Path) -> None:
-    """Put what `nbgrader release_feedback` needs beside a feedback page, also where no exchange was used.
+    """Put the files that `nbgrader release_feedback` needs beside a feedback page, even if no exchange was used.
 
-    It ends in the middle of a class otherwise. A page whose secret nobody knows is fetched by nobody.
+    Without them, that command would stop in the middle of a class. If a submission has no secret, a random one is
+    written; nobody knows it, so nobody can fetch that page.
     """
     carry(submitted, feedback)
     if not (feedback / timestamp.FILE_NAME).exists():

@@ -1,6 +1,6 @@
-"""The course's own way through `nbgrader generate_feedback`: the page that a student gets to read.
+"""The course's own stage of `nbgrader generate_feedback`, which makes the feedback page for a student.
 
-It is made of the stored result, the gradebook and the text of the answers; nothing of a notebook's own HTML is in it.
+The page is made from the stored result, the gradebook and the text of the answers. It contains no HTML from a notebook.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ class FeedbackExporter(Exporter):  # type: ignore[misc]
     """Makes the page of one submission."""
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
-        """It is a page of HTML, whatever it is made of."""
+        """Set the file ending to `.html`, and keep nbgrader from copying anything but notebooks."""
         super().__init__(*args, **kwargs)
         self.file_extension = ".html"
         if isinstance(self.parent, GenerateFeedback):
@@ -44,7 +44,7 @@ class FeedbackExporter(Exporter):  # type: ignore[misc]
     def from_notebook_node(
         self, nb: Any, resources: dict[str, Any] | None = None, **kwargs: Any
     ) -> tuple[str, dict[str, Any]]:
-        """Return the page; the notebook is nbgrader's copy of the submission."""
+        """Return the page for `nb`, which is nbgrader's copy of the submission."""
         copied, resources = super().from_notebook_node(nb, resources, **kwargs)
         course, told = self.parent.coursedir, resources["nbgrader"]
         student, name = told["student"], told["assignment"]
@@ -69,7 +69,10 @@ def _title(lab: Lab) -> str:
 
 
 def _name(root: Path, student: str) -> str:
-    """What the roster calls a student; empty if it says nothing, or cannot be read, which grading says."""
+    """Return a student's name from the roster; empty if there is none or the roster cannot be read.
+
+    An unreadable roster is reported when the class is graded.
+    """
     with contextlib.suppress(KitError):
         return read_roster(root / FILE_NAME).students.get(student, {}).get("name", "")
     return ""
@@ -86,7 +89,10 @@ def _result(root: Path, lab: Lab, student: str, path: Path) -> SubmissionResult 
 
 
 def _tasks(nb: Any) -> list[Task]:
-    """What stands between two headings, where it has points; answers without points belong to the next that has."""
+    """Return a task for each heading that is followed by cells with points.
+
+    Answers without points belong to the next task with points.
+    """
     tasks: list[Task] = []
     title, part, answers = "", "", {}
     for cell in nb.cells:

@@ -1,4 +1,4 @@
-"""The grades of a class, as the gradebook has them: to be asked for, as a table, and with all that goes out."""
+"""Read the grades of a class from the gradebook, write them as a table, and combine them with data for exports."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ Answer = TypeVar("Answer")
 
 
 def ask(root: Path, question: Callable[[Connection], Answer], nothing: Answer) -> Answer:
-    """Return what a question finds in the gradebook; `nothing` where nbgrader has written none yet."""
+    """Return the answer to a question about the gradebook; `nothing` if nbgrader has not written a gradebook yet."""
     file = gradebook_file(root)
     if file is not None and not file.is_file():
         return nothing
@@ -41,11 +41,11 @@ def ask(root: Path, question: Callable[[Connection], Answer], nothing: Answer) -
 
 
 def read_grades(root: Path, lab: str = "") -> list[Grade]:
-    """Return the grade of each student of the class, sorted by student and lab; who has left the class is not in it.
+    """Return the grades of all students, sorted by student and lab, without students who have left the class.
 
     Args:
-        root: of the course.
-        lab: whose grades; empty: of all labs.
+        root: the course's folder.
+        lab: the lab; empty for all labs.
     """
     nobody: list[Grade] = []
     grades = ask(root, lambda connection: grades_in(connection, lab), nobody)
@@ -56,10 +56,10 @@ def read_grades(root: Path, lab: str = "") -> list[Grade]:
 def write_grades(root: Path) -> Path:
     """Write `build/grades.csv` from the gradebook and return its path.
 
-    A row for each student and lab. The score is what is left after nbgrader's penalty for who was late; it stays empty
-    as long as a check waits for an instructor's verdict. `waiting` counts the cells that a person has yet to grade:
-    those checks, and explanations, which count 0 until then; and those to be looked at again, since what was graded by
-    hand has changed.
+    The table has a row for each student and lab. `score` is the score after nbgrader's penalty for late submissions. It
+    is empty as long as a check waits for an instructor's verdict. `waiting` is the number of cells that a person has
+    yet to grade or should look at again: checks without a verdict, explanations, which count 0 until they are graded,
+    and cells whose work has changed since they were graded by hand.
     """
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
@@ -77,11 +77,11 @@ def class_entries(root: Path, lab: str | None = None) -> list[Entry]:
     """Return the submissions of a class, sorted by lab and student.
 
     Args:
-        root: of the course.
-        lab: whose; None: of all labs.
+        root: the course's folder.
+        lab: the lab; None for all labs.
 
     Raises:
-        KitError: the roster cannot be used.
+        KitError: the roster, the record of the class or the gradebook cannot be read.
     """
     paths = CoursePaths(root)
     roster = read_roster(root / FILE_NAME).students if (root / FILE_NAME).is_file() else {}

@@ -1,4 +1,4 @@
-"""Where nbgrader's own commands enter: in a course they go the course's way, outside of any they execute nothing."""
+"""Entry points for nbgrader's own commands, which use the course's stages in a course and execute nothing elsewhere."""
 
 from __future__ import annotations
 
@@ -15,29 +15,29 @@ from autograder.grading.nbgrader_validate import not_checked, verdicts
 
 
 def take_over(config: Any, root: Path) -> None:
-    """Let nbgrader's commands go the course's way, in this process.
+    """Make nbgrader's commands in this process use the course's layout and stages.
 
     Args:
-        config: traitlets' Config, as `get_config()` gives it.
-        root: of the course.
+        config: the Config of traitlets that `get_config()` returns.
+        root: the course's folder.
     """
     configure(config, root)
     config.Autograde.pre_convert_hook = partial(before_autograde, root)
     install(root)
-    if Path.cwd().is_relative_to(root):  # the environment's configuration leads here from other folders, too
+    if Path.cwd().is_relative_to(root):  # this may also be called in other folders, by the environment's configuration
         make_folder(root)
 
 
 def before_autograde(root: Path, assignment: str, student: str, notebooks: list[str]) -> None:
-    """nbgrader's hook: note the lab's cells when `nbgrader autograde` meets a gradebook without them."""
+    """Register the lab's cells in a gradebook that does not have them. `nbgrader autograde` calls this first."""
     register(root, assignment)
 
 
 def install(root: Path) -> None:
-    """Put the course's way in place of nbgrader's, for this process, so that no setting and no other door leads there.
+    """Replace nbgrader's execution in this process, so that no setting and no other command can use it.
 
     Args:
-        root: of the course whose checks are run.
+        root: the folder of the course whose checks are run.
     """
     replace_execution(
         lambda notebook, invert: verdicts(root, notebook, invert),
@@ -49,6 +49,6 @@ def install(root: Path) -> None:
 
 
 def close() -> None:
-    """Close nbgrader's execution for this process, outside of any course."""
+    """Disable nbgrader's execution in this process, which is not in a course."""
     what, do = "nbgrader executes nothing outside of a course.", "Start it in the folder of your course."
     replace_execution(lambda notebook, _: not_checked(notebook, what, do), lambda: KitError(what, do))

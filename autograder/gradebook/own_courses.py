@@ -1,8 +1,9 @@
-"""Makes nbgrader ready in this process: it runs the `nbgrader_config.py` of courses of yours, and no other.
+"""Prepare nbgrader in this process so that it runs the `nbgrader_config.py` only of the user's own courses.
 
-nbgrader reads the configuration of the folder that it is started in, and that is a program. A folder cannot say of
-itself that it is a course, because a student could have written that, too. So a list outside of it does, in the user's
-own configuration: `autograder new course` and `autograder trust` put folders into it.
+nbgrader runs the configuration in the folder in which it is started, and this configuration is a program. A file in the
+folder cannot show that the folder is the user's own course, because a student could have written that file as well.
+Therefore the user's own configuration has a list of courses. `autograder new course` and `autograder trust` add folders
+to it.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from autograder.intake.collect import CLOSED
 from autograder.setup.places import ROOT
 
 TEMPLATE = Path(__file__).with_name("nbgrader_config.template")
-"""A course's `nbgrader_config.py` as it begins, without settings of its own."""
+"""The `nbgrader_config.py` of a new course, which contains no settings of the course's own."""
 
 
 def _list() -> Path:
@@ -26,7 +27,7 @@ def _list() -> Path:
 
 
 def trust(folder: Path) -> None:
-    """Note that a folder is a course of this user's, whose nbgrader configuration is run.
+    """Add a folder to the list of the user's own courses, whose nbgrader configuration may be run.
 
     Raises:
         OSError: the list cannot be written.
@@ -44,9 +45,9 @@ def _known() -> list[str]:
 
 
 def may_run(file: Path) -> bool:
-    """Whether a configuration is the user's own: the kit's, or that of a course of the user's.
+    """Return whether a configuration may be run: it belongs to the kit, to Jupyter, or to one of the user's courses.
 
-    One that a new course gets is no exception, because it makes modules of its folder those of the whole process.
+    An unchanged configuration of a new course is no exception, because it adds its folder to the process's import path.
     """
     from jupyter_core.paths import jupyter_config_path
 
@@ -55,29 +56,29 @@ def may_run(file: Path) -> bool:
     if folder in places or file.parent.resolve() in places or str(file.parent.resolve()) in _known():
         return True
     try:
-        return file.suffix == ".py" and file.read_text(encoding="utf-8") == CLOSED  # which only stops
+        return file.suffix == ".py" and file.read_text(encoding="utf-8") == CLOSED  # this program only stops nbgrader
     except (OSError, UnicodeError):
         return False
 
 
 def guard_configuration() -> None:
-    """Let the Jupyter programs of this process pass over nbgrader configurations that are not the user's own."""
+    """Make the Jupyter programs of this process ignore nbgrader configurations that are not the user's own."""
     from traitlets.config import Application
     from traitlets.config.loader import ConfigFileNotFound, JSONFileConfigLoader, PyFileConfigLoader
 
     class OwnPython(PyFileConfigLoader):  # type: ignore[misc]
-        """Reads a configuration that is a program."""
+        """Loads a configuration that is a program."""
 
         def load_config(self) -> Any:
-            """Read it, if it is the user's own."""
+            """Load the configuration if it is the user's own."""
             _refuse(self, ConfigFileNotFound)
             return super().load_config()
 
     class OwnJson(JSONFileConfigLoader):  # type: ignore[misc]
-        """Reads a configuration that is a table: it can name programs, too."""
+        """Loads a configuration in JSON, which can also name programs."""
 
         def load_config(self) -> Any:
-            """Read it, if it is the user's own."""
+            """Load the configuration if it is the user's own."""
             _refuse(self, ConfigFileNotFound)
             return super().load_config()
 
@@ -89,7 +90,7 @@ _told: set[Path] = set()
 
 
 def _refuse(loader: Any, refusal: type[Exception]) -> None:
-    file = Path(loader.path or os.getcwd(), loader.filename)  # noqa: PTH109  as traitlets looks for it
+    file = Path(loader.path or os.getcwd(), loader.filename)  # noqa: PTH109  traitlets finds it in this way
     if not file.is_file() or may_run(file):
         return
     if file not in _told:
@@ -100,8 +101,8 @@ def _refuse(loader: Any, refusal: type[Exception]) -> None:
 
 
 def prepare_nbgrader() -> None:
-    """Make nbgrader importable at a bearable price, and able to find its database tool."""
-    # Without this module jsonschema does not check one format of strings; with it, building its grammar takes 3 s.
+    """Prepare nbgrader: make its import faster, guard its configuration, and let it find its database tool."""
+    # If this module can be imported, jsonschema builds a grammar for one format of strings, which takes 3 s.
     sys.modules.setdefault("rfc3987_syntax", None)  # type: ignore[arg-type]
     os.environ["TRAITLETS_APPLICATION_RAISE_CONFIG_FILE_ERROR"] = "1"
     from autograder.gradebook.own_courses import guard_configuration

@@ -1,8 +1,8 @@
-"""What the kit notes in the gradebook beside nbgrader's own tables: there it is copied, moved and put back with them.
+"""The kit's own tables in the gradebook. They are copied, moved and restored together with nbgrader's tables.
 
-`recorded` is what of a submission was recorded last; where that differs from what there is now, it is recorded again.
-`judged` is what of a submission stood in front of a person who graded a cell; where that differs from what stands there
-now, the grade stays, and a person is asked to look at it again.
+`recorded` holds a digest of what was recorded last for a submission. If the submission now has another digest, it is
+recorded again. `judged` holds a digest of the work that a person saw when grading a cell. If the work has changed since
+then, the grade is kept, and a person is asked to look at it again.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     Talks = Connection | Session | scoped_session[Session]
 
 THE_LAB = ""
-"""In place of a student: what the gradebook knows of the lab itself."""
+"""The value that takes the place of a student's name in the row for the lab itself."""
 
 _TABLES = MetaData()
 _RECORDED = Table(
@@ -46,17 +46,17 @@ _JUDGED = Table(
 
 
 def make_tables(engine: Any) -> None:
-    """Make the tables in a gradebook that has none of them yet."""
+    """Create the tables that a gradebook does not have yet."""
     _TABLES.create_all(engine)
 
 
 def digest_of(*parts: object) -> str:
-    """Return what tells these values from others; they are what JSON can hold."""
+    """Return a digest of some values, which must be values that JSON can represent."""
     return hashlib.sha256(json.dumps(parts).encode()).hexdigest()
 
 
 def recordable(root: Path, lab: Lab, student: str) -> str:
-    """Return what tells all that is recorded of a submission from what was recorded before."""
+    """Return a digest of everything that is recorded for a submission."""
     handed_in = CoursePaths(root).submitted_notebook(student, lab.name).with_name(timestamp.FILE_NAME)
     contents = (ResultStore(root).path(lab.name, student), handed_in)
     return digest_of(lab.source_digest, *(hashlib.sha256(_content(path)).hexdigest() for path in contents))
@@ -70,7 +70,7 @@ def _content(path: Path) -> bytes:
 
 
 def recorded(connection: Connection, lab: str) -> dict[str, str]:
-    """Return the digests of what was recorded of a lab, by student."""
+    """Return the digests of what was recorded for a lab, by student."""
     from sqlalchemy import inspect
 
     if not inspect(connection).has_table(_RECORDED.name):
@@ -80,18 +80,18 @@ def recorded(connection: Connection, lab: str) -> dict[str, str]:
 
 
 def note_recorded(talks: Talks, lab: str, student: str, digest: str) -> None:
-    """Note what was recorded."""
+    """Store the digest of what was recorded for a submission."""
     _put(talks, _RECORDED, [("lab", lab), ("student", student)], digest)
 
 
 def judged(talks: Talks, grade: str) -> str | None:
-    """Return what a cell's grade was about when it was recorded last; None if nobody noted it."""
+    """Return the digest of the work that a cell's grade was last recorded for; None if there is none."""
     digest: str | None = talks.execute(select(_JUDGED.c.digest).where(_JUDGED.c.grade == grade)).scalar()
     return digest
 
 
 def note_judged(talks: Talks, grade: str, digest: str) -> None:
-    """Note what a cell's grade is about."""
+    """Store the digest of the work that a cell's grade is for."""
     _put(talks, _JUDGED, [("grade", grade)], digest)
 
 

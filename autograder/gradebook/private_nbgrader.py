@@ -1,7 +1,7 @@
-"""What the kit uses of nbgrader that nbgrader has not promised to keep; `grading/nbgrader_validate.py` has the rest.
+"""The private names of nbgrader that the kit uses, except for those in `grading/nbgrader_validate.py`.
 
-`tests/gradebook/test_private_names.py` says which of these an update has moved; pyproject.toml keeps untested ones
-away.
+`tests/gradebook/test_private_names.py` shows which of them an update of nbgrader has changed. pyproject.toml excludes
+versions of nbgrader that have not been tested.
 """
 
 from __future__ import annotations
@@ -23,12 +23,15 @@ from autograder.grading.nbgrader_validate import Verdicts, replace_validator
 
 
 def in_first_pass(autograde: Autograde) -> bool:
-    """Whether `nbgrader autograde` reads what was handed in; in its second pass it reads what the first one wrote."""
+    """Return whether `nbgrader autograde` is in its first pass, which reads the submission.
+
+    Its second pass reads the file that the first pass wrote.
+    """
     return bool(autograde._sanitizing)
 
 
 class SaveScores(SaveAutoGrades):  # type: ignore[misc]
-    """nbgrader's stage that records points, without its ways of finding them and of asking for a person."""
+    """nbgrader's stage that records points. Subclasses decide on the points and on whether a person has to grade."""
 
     @abstractmethod
     def score_check(self, grade: Any, resources: dict[str, Any]) -> None:
@@ -36,7 +39,13 @@ class SaveScores(SaveAutoGrades):  # type: ignore[misc]
 
     @abstractmethod
     def needs_person(self, grade: Any, cell: Any, asked: bool) -> bool:
-        """Whether a person has to look at a cell, whose grade has its points; `asked`: whether one had to before."""
+        """Return whether a person has to look at a cell.
+
+        Args:
+            grade: the cell's grade, which already has its points.
+            cell: the cell.
+            asked: whether a person already had to look at the cell before.
+        """
 
     def _add_score(self, cell: Any, resources: dict[str, Any]) -> None:
         grade_id = cell.metadata["nbgrader"]["grade_id"]
@@ -51,15 +60,18 @@ class SaveScores(SaveAutoGrades):  # type: ignore[misc]
 
 
 class SaveLabCells(SaveCells):  # type: ignore[misc]
-    """nbgrader's stage that notes a lab's cells, which by itself refuses a lab that has grades and other cells now."""
+    """nbgrader's stage that stores a lab's cells in the gradebook.
+
+    nbgrader's own stage refuses to change the cells of a lab that has grades. This one lets a subclass change them.
+    """
 
     @abstractmethod
     def fit(self, notebook: Any, new: dict[str, dict[str, Any]]) -> None:
-        """Give the notebook in the gradebook, which has grades, the cells that the lab has now.
+        """Change the cells of a notebook that already has grades in the gradebook to those that the lab has now.
 
         Args:
-            notebook: as the gradebook has it.
-            new: what nbgrader notes of each cell, by kind (`grade`, `solution`, `task`, `source`) and name.
+            notebook: the notebook in the gradebook.
+            new: what nbgrader stores for each cell, by kind (`grade`, `solution`, `task`, `source`) and name.
         """
 
     def _create_notebook(self, nb: Any) -> None:
@@ -75,10 +87,10 @@ class SaveLabCells(SaveCells):  # type: ignore[misc]
 
 
 def version_of_tables() -> str:
-    """The version of the gradebook's tables that nbgrader makes; it asks a program of alembic's, which takes a second.
+    """Return the version of the tables that nbgrader creates. nbgrader itself runs alembic, which takes a second.
 
     Raises:
-        RuntimeError: nbgrader's folder of versions has more than one newest one.
+        RuntimeError: nbgrader does not have exactly one newest version.
     """
     newest = ScriptDirectory(ALEMBIC_DIR).get_heads()
     if len(newest) != 1:
@@ -87,18 +99,18 @@ def version_of_tables() -> str:
 
 
 def know_version_of_tables() -> None:
-    """Let nbgrader find the version of the tables in this process when it makes a gradebook."""
+    """Make nbgrader find the version of the tables in this process when it creates a gradebook."""
     api.get_alembic_version = version_of_tables
 
 
 def replace_execution(validate: Callable[[Path, bool], Verdicts], refuse: Callable[[], Exception]) -> None:
-    """Put other ways in place of nbgrader's validator and of its stage that executes, for this process.
+    """Replace nbgrader's validator and its stage that executes notebooks, in this process.
 
-    nbgrader has no setting for either. Solutions, which are the instructor's own, may still be executed.
+    nbgrader has no setting for either of them. Solutions may still be executed, because the instructor wrote them.
 
     Args:
-        validate: gets a notebook, and whether what passed is asked for.
-        refuse: makes the error that ends every other execution.
+        validate: a function that gets a notebook, and whether to return the cells that passed.
+        refuse: a function that returns the error for every other execution.
     """
     execute = Execute.preprocess
 
@@ -108,5 +120,5 @@ def replace_execution(validate: Callable[[Path, bool], Verdicts], refuse: Callab
         raise refuse()
 
     replace_validator(validate)
-    if execute.__qualname__ != preprocess.__qualname__:  # else it is replaced already
+    if execute.__qualname__ != preprocess.__qualname__:  # otherwise it has been replaced already
         Execute.preprocess = preprocess

@@ -1,4 +1,4 @@
-"""Reads grades from an open gradebook: in SQL, for nbgrader takes a second to load and asks for each by itself."""
+"""Read grades from an open gradebook in SQL, because nbgrader takes a second to load and queries each grade alone."""
 
 from __future__ import annotations
 
@@ -35,12 +35,12 @@ WHERE :lab IN ('', a.name) AND :student IN ('', sa.student_id)
 
 
 def read_grade(address: str, lab: str, student: str) -> Grade:
-    """Return the grade of one submission, which the gradebook has.
+    """Return the grade of one submission, which must be in the gradebook.
 
     Args:
-        address: of the gradebook.
-        lab: that was handed in.
-        student: who handed it in.
+        address: the gradebook's address in the form that SQLAlchemy expects.
+        lab: the lab.
+        student: the student.
     """
     from sqlalchemy import create_engine
 
@@ -53,7 +53,7 @@ def read_grade(address: str, lab: str, student: str) -> Grade:
 
 
 def digests(connection: Connection, lab: str, student: str = "") -> dict[str, str]:
-    """Return by student what tells all that feedback shows of the gradebook from what it showed before."""
+    """Return for each student a digest of everything in the gradebook that the feedback page shows."""
     comments: dict[str, list[tuple[str, str]]] = {}
     for (who, _, cell), comment in sorted(_comments(connection, lab, student).items()):
         comments.setdefault(who, []).append((cell, comment))
@@ -66,7 +66,7 @@ def digests(connection: Connection, lab: str, student: str = "") -> dict[str, st
 
 
 def grades_in(connection: Connection, lab: str, student: str = "") -> list[Grade]:
-    """Return the grades in a gradebook, sorted by student and lab; empty for `lab` or `student`: of all."""
+    """Return the grades in a gradebook, sorted by student and lab. An empty `lab` or `student` means all of them."""
     cells: dict[tuple[str, str, float], list[CellGrade]] = {}
     comments = _comments(connection, lab, student)
     for row in _rows(connection, _GRADES, lab, student):

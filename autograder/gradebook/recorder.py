@@ -1,6 +1,6 @@
-"""Records results in nbgrader's gradebook and writes feedback, one student after another.
+"""Record results in nbgrader's gradebook and write feedback, one student after another.
 
-nbgrader is slow, so `Recording` does it in a thread of its own while the rest of the class is running.
+Because nbgrader is slow, `Recording` does this in its own thread while the rest of the class is running.
 """
 
 from __future__ import annotations
@@ -27,40 +27,40 @@ from autograder.gradebook.settings import gradebook_place
 from autograder.submission import exchange_secret
 
 MARK = ".grades"
-"""The file beside a feedback page that says which grades it shows."""
+"""The file beside a feedback page with a digest of the grades that the page shows."""
 _NO_ROOM = re.compile(
     r"(No space left on device|database or disk is full|database is locked|disk I/O error|Disk quota exceeded"
     r"|readonly database|file is not a database|disk image is malformed|Read-only file system"
     r"|unable to open database file)"
 )
-"""What the machine says, through nbgrader, that will not be otherwise for the next student."""
+"""Errors of the system in nbgrader's log that would occur for every other student as well."""
 
 
 class Recorder:
-    """Records results in the gradebook and writes feedback, one student at a time, for those that changed."""
+    """Records results in the gradebook and writes feedback, one student at a time, if something has changed."""
 
     def __init__(self, root: Path, lab: Lab, force: bool) -> None:
-        """Nothing is loaded or written before something is to be recorded.
+        """Store the arguments. Nothing is loaded or written before the first method is called.
 
         Args:
-            root: of the course.
-            lab: whose results are recorded.
-            force: record also what did not change.
+            root: the course's folder.
+            lab: the lab whose results are recorded.
+            force: whether to record also results that have not changed.
         """
         self._root, self._lab, self._force = root, lab, force
         self._paths = CoursePaths(root)
         self._api: Any = None
         self._known: tuple[dict[str, str], dict[str, str]] | None = None
         self.failures: dict[str, str] = {}
-        """Why it failed, by student; the others are recorded."""
+        """The reason why a student could not be recorded, by student. All others are recorded."""
         self.told: list[str] = []
-        """What was changed about the gradebook itself, as sentences."""
+        """Sentences about changes of the gradebook itself."""
 
     def begin(self) -> None:
-        """Have a gradebook that can be written, with the lab's cells in it, before anything is run for it.
+        """Make sure that the gradebook can be written and has the lab's cells, before any submission is run.
 
         Raises:
-            KitError: there can be none.
+            KitError: the gradebook cannot be used.
         """
         self.told += register(self._root, self._lab.name)
 
@@ -68,8 +68,8 @@ class Recorder:
         """Record one student's result.
 
         Raises:
-            KitError: nothing can be recorded at all.
-            KeyboardInterrupt: the student counts as not recorded.
+            KitError: nothing can be recorded, for this or any other student.
+            KeyboardInterrupt: recording was interrupted. The student counts as not recorded.
         """
         page = self._paths.feedback_page(student, self._lab.name)
         steps = self._due(student)
@@ -90,16 +90,17 @@ class Recorder:
         refused = _NO_ROOM.search(why)
         if refused:
             raise KitError(
-                f"Recording {student} failed, since the machine said: {refused[0]}. The gradebook is"
+                f"Recording {student} failed, because the system reported: {refused[0]}. The gradebook is"
                 f" {gradebook_place(self._root)}.",
                 GRADEBOOK_REFUSED,
             )
         self.failures[student] = why
 
     def _due(self, student: str) -> list[str]:
-        """The steps of nbgrader's that a student needs; none if neither the result nor a grade changed.
+        """Return the steps of nbgrader that a student needs; empty if neither the result nor a grade has changed.
 
-        The gradebook itself says what was recorded in it, so that one that was put back gets what it lacks.
+        The gradebook itself stores what was recorded in it. If an older copy is restored, what it lacks is recorded
+        again.
         """
         if self._known is None:
             make_folder(self._root)
@@ -111,7 +112,7 @@ class Recorder:
         page = self._paths.feedback_page(student, self._lab.name)
         mark = page.with_name(MARK)
         fresh = page.is_file() and mark.is_file() and mark.read_text(encoding="utf-8") == shown.get(student)
-        # Who hands in once more through the exchange, and the same, fetches feedback by another secret.
+        # If a student submits the same work again through the exchange, the secret for the feedback is a new one.
         wanted = _secret_in(self._paths.submitted_notebook(student, self._lab.name).parent)
         return [] if fresh and wanted in ("", _secret_in(page.parent)) else ["generate_feedback"]
 
@@ -130,15 +131,15 @@ def _secret_in(folder: Path) -> str:
 
 
 class Recording:
-    """Records students in the order in which they are given.
+    """Records students in a thread, in the order in which they are given.
 
     Args:
-        recorder: that does it.
-        on_recorded: called in this thread after each student.
+        recorder: the recorder that records each student.
+        on_recorded: a function that is called in the recording thread after each student.
     """
 
     def __init__(self, recorder: Recorder, on_recorded: Callable[[str], None]) -> None:
-        """Begin to wait for students."""
+        """Start the thread, which waits for students."""
         self._recorder, self._on_recorded = recorder, on_recorded
         self._students: queue.SimpleQueue[str | None] = queue.SimpleQueue()
         self._given_up = threading.Event()
@@ -146,23 +147,23 @@ class Recording:
         self._thread = threading.Thread(target=self._work, name="recording", daemon=True)
         self._thread.start()
         self.seconds = 0.0
-        """How long it worked."""
+        """How many seconds the recorder has worked."""
 
     def put(self, student: str) -> None:
-        """Have a student recorded.
+        """Add a student to those that are recorded.
 
         Raises:
-            KitError: nothing can be recorded at all, which an earlier student has shown.
+            KitError: recording an earlier student failed in a way that concerns every student.
         """
         if self._error is not None:
             raise self._error
         self._students.put(student)
 
     def finish(self) -> None:
-        """Wait until everyone is recorded.
+        """Wait until all students are recorded.
 
         Raises:
-            KitError: nothing can be recorded at all.
+            KitError: nothing can be recorded, for any student.
         """
         self._students.put(None)
         self._thread.join()
@@ -170,7 +171,7 @@ class Recording:
             raise self._error
 
     def give_up(self) -> None:
-        """Wait until the student is recorded who is being recorded, and leave out the others."""
+        """Wait until the current student is recorded, and do not record the others."""
         self._given_up.set()
         self._students.put(None)
         self._thread.join()
@@ -182,5 +183,5 @@ class Recording:
                 self._recorder.record(student)
                 self.seconds += time.monotonic() - began
                 self._on_recorded(student)
-        except BaseException as error:  # it is raised again where somebody waits
+        except BaseException as error:  # raised again by `put` or `finish`
             self._error = error

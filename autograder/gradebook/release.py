@@ -1,4 +1,4 @@
-"""Generates what students receive, and notes a lab's cells in the gradebook."""
+"""Generate the version of a lab that students receive, and register a lab's cells in the gradebook."""
 
 from __future__ import annotations
 
@@ -13,13 +13,19 @@ from autograder.gradebook.settings import gradebook_address
 
 
 def generate(root: Path, lab: str, into: Path, gradebook: bool) -> Path:
-    """Generate what students receive of a lab, and note its cells in the course's gradebook if asked to.
+    """Generate the version of a lab that students receive.
+
+    Args:
+        root: the course's folder.
+        lab: the lab.
+        into: the folder in which the lab's folder is created.
+        gradebook: whether to register the lab's cells in the course's gradebook.
 
     Returns:
         The folder of the generated lab.
 
     Raises:
-        KitError: nbgrader refuses.
+        KitError: nbgrader could not generate the lab.
     """
     api = open_api(root, gradebook, release_directory=str(into))
     answer = answered(api.generate_assignment(lab, force=True, create=True))
@@ -30,10 +36,10 @@ def generate(root: Path, lab: str, into: Path, gradebook: bool) -> Path:
 
 
 def released_files(root: Path, lab: str) -> dict[Path, bytes]:
-    """Return what students receive of a lab, by path below `labs/<lab>`; equal sources give equal files.
+    """Return the files of a lab that students receive, by path below `labs/<lab>`. Equal sources give equal files.
 
     Raises:
-        KitError: there is no such lab under `solutions`, or nbgrader refuses.
+        KitError: there is no such lab under `solutions`, or nbgrader could not generate it.
     """
     if not (root / "solutions" / lab / f"{lab}.ipynb").is_file():
         raise KitError(f"There is no solutions/{lab}/{lab}.ipynb.", "Name a folder under `solutions`.")
@@ -46,7 +52,7 @@ def released_files(root: Path, lab: str) -> dict[Path, bytes]:
 
 
 def knows(root: Path, lab: str) -> bool:
-    """Whether the gradebook has the cells of a lab as they are now."""
+    """Return whether the gradebook has the current cells of a lab."""
     from sqlalchemy import create_engine
 
     from autograder.gradebook.own_tables import THE_LAB, recorded
@@ -60,13 +66,13 @@ def knows(root: Path, lab: str) -> bool:
 
 
 def register(root: Path, lab: str) -> list[str]:
-    """Note a lab's cells in the course's gradebook; nbgrader needs them there before it grades.
+    """Register a lab's cells in the course's gradebook, where nbgrader needs them before it grades.
 
     Returns:
-        What was changed about a gradebook that has grades for other cells, as sentences.
+        Sentences about changes, if the gradebook has grades for other cells.
 
     Raises:
-        KitError: nbgrader refuses.
+        KitError: the gradebook cannot be used, or nbgrader could not generate the lab.
     """
     make_usable(root)
     if knows(root, lab):

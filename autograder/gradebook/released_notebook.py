@@ -1,8 +1,8 @@
 """The course's own stages of `nbgrader generate_assignment`: what students receive, and a lab's cells in the gradebook.
 
-nbgrader refuses to give other cells to a gradebook with grades. Here it gets the cells that the lab has now: one that
-only got another name is known by its text, and a renamed check keeps its grades. What is no longer in the lab stays in
-a copy of the gradebook, which is made first.
+nbgrader refuses to change the cells of a lab that has grades. The stages here change them to the lab's current cells. A
+cell that was only renamed is recognised by its text and keeps its grades. Before a change, the gradebook is copied, so
+that the copy still holds what is no longer in the lab.
 """
 
 from __future__ import annotations
@@ -35,12 +35,12 @@ from autograder.gradebook.private_nbgrader import SaveLabCells
 from autograder.submission.copies import named_file
 
 _ALIKE = 0.6
-"""Two cells are one, renamed, if this part of their texts is the same."""
+"""The share of two cells' texts that must be equal for one to count as the other after renaming."""
 
 
 @dataclass(frozen=True)
 class _Cell:
-    """A cell of a lab, as a gradebook knows it."""
+    """A cell of a lab with the properties that a gradebook stores."""
 
     kinds: frozenset[str]
     cell_type: str
@@ -48,13 +48,13 @@ class _Cell:
 
 
 class FitCells(SaveLabCells):
-    """Notes a lab's cells in the gradebook, also where it has grades for other cells."""
+    """Stores a lab's cells in the gradebook, even if the gradebook has grades for other cells."""
 
     told: ClassVar[list[str]] = []
-    """What was done to gradebooks with grades in them, as sentences."""
+    """Sentences about changes of gradebooks that have grades."""
 
     def preprocess(self, nb: Any, resources: dict[str, Any]) -> tuple[Any, dict[str, Any]]:
-        """Note the cells, and which state of the lab they are from."""
+        """Store the cells, and a digest of the lab that they come from."""
         made: tuple[Any, dict[str, Any]] = super().preprocess(nb, resources)
         course = self.parent.parent.coursedir
         lab = load_lab(Path(course.root), resources["nbgrader"]["assignment"])
@@ -75,7 +75,7 @@ class FitCells(SaveLabCells):
             return
         copy = back_up(self.db_url, f"before the cells of {self.assignment_id} change")
         sentences = [*self._rename(notebook, renamed), *self._remove(notebook, gone), *self._add(notebook, fresh, new)]
-        where = f"; the gradebook as it was is {copy}" if copy else ""
+        where = f"; a copy of the gradebook before this change is {copy}" if copy else ""
         for sentence in sentences:
             self.log.warning(sentence)
         FitCells.told.append(f"{self.assignment_id} has other cells than the gradebook: {'; '.join(sentences)}{where}.")
@@ -126,7 +126,7 @@ def _graded(notebook: Any) -> list[Any]:
 
 
 def _known(notebook: Any) -> dict[str, _Cell]:
-    """The cells that the gradebook has, by name."""
+    """Return the cells that the gradebook has, by name."""
     kinds: dict[str, set[str]] = {cell.name: {"source"} for cell in notebook.source_cells}
     for kind in ("grade", "solution", "task"):
         for cell in getattr(notebook, f"{kind}_cells"):
@@ -136,7 +136,7 @@ def _known(notebook: Any) -> dict[str, _Cell]:
 
 
 def _wanted(new: dict[str, dict[str, Any]]) -> dict[str, _Cell]:
-    """The cells that the lab has now, by name."""
+    """Return the cells that the lab has now, by name."""
     made = {}
     for name, info in new["source"].items():
         kinds = frozenset(kind for kind, cells in new.items() if name in cells)
@@ -145,7 +145,7 @@ def _wanted(new: dict[str, dict[str, Any]]) -> dict[str, _Cell]:
 
 
 def _renamed(before: Mapping[str, _Cell], after: Mapping[str, _Cell]) -> dict[str, str]:
-    """The new names of cells that are the same but for their name, by their old names; the most alike come first."""
+    """Return the new names of renamed cells by their old names. The most similar cells are matched first."""
     pairs = []
     for name, old in before.items():
         for other, new in after.items():
@@ -160,20 +160,20 @@ def _renamed(before: Mapping[str, _Cell], after: Mapping[str, _Cell]) -> dict[st
 
 
 class HideTests(NbGraderPreprocessor):  # type: ignore[misc]
-    """Keeps hidden tests out of what students receive, and says where they were."""
+    """Removes hidden tests from what students receive, and leaves a line where they were."""
 
     def preprocess_cell(self, cell: Any, resources: dict[str, Any], index: int) -> tuple[Any, dict[str, Any]]:
-        """Cut in the lab's own cells; a student who types a marker only types a word."""
+        """Remove hidden tests from the lab's own cells. In an answer cell a marker has no meaning."""
         if not utils.is_solution(cell):
             cell.source = without_hidden_tests(cell.source)
         return cell, resources
 
 
 class StableNotebook(NbGraderPreprocessor):  # type: ignore[misc]
-    """Leaves in a released notebook only what the lab's source decides, so that generating twice gives equal files."""
+    """Keeps only what the lab's source determines, so that generating a notebook twice gives equal files."""
 
     def preprocess(self, nb: Any, resources: dict[str, Any]) -> tuple[Any, dict[str, Any]]:
-        """Name the cells by grade_id or number and drop what editors leave behind."""
+        """Name the cells by grade_id or number, and remove metadata that editors add."""
         ids: set[str] = set()
         answers: dict[str, str] = {}
         for number, cell in enumerate(nb.cells, start=1):
@@ -186,12 +186,12 @@ class StableNotebook(NbGraderPreprocessor):  # type: ignore[misc]
             if cell.cell_type == "code":
                 cell.outputs, cell.execution_count = [], None
                 if (utils.is_grade(cell) and not utils.is_solution(cell)) or for_checks(cell):
-                    # It is there to be run; whoever wants to read it opens the cell.
+                    # Students only run this cell. Those who want to read it can expand it.
                     cell.metadata["jupyter"] = {"source_hidden": True}
                 if utils.is_solution(cell):
                     cell.metadata["autograder"] = blank_mark(cell.source)
                     file = named_file(cell)
-                    if file is not None:  # whoever deletes the cell is told so in the notebook
+                    if file is not None:  # with this, the notebook can warn a student who deletes the cell
                         answers[grade_id] = file.file_name
         kernel = {"display_name": "Python 3 (ipykernel)", "language": "python", "name": "python3"}
         mark = {"autograder": {"answers": answers}} if answers else {}
@@ -216,4 +216,4 @@ RELEASE = [
 
 
 WITHOUT_GRADEBOOK = [stage for stage in RELEASE if stage is not FitCells]
-"""Where labs are generated without a gradebook: making one takes longer than all the rest."""
+"""The stages for labs that are generated without a gradebook; creating one takes longer than all other stages."""

@@ -1,4 +1,4 @@
-"""nbgrader's settings of a course: the kit's, and over them what the course's own `nbgrader_config.py` says."""
+"""Read nbgrader's settings for a course: the kit's settings, and those in the course's own `nbgrader_config.py`."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _KIT = str(Path(__file__).resolve().parents[2])
 
 @cache
 def settings_of(root: Path) -> Any:
-    """Return nbgrader's whole configuration of a course, read once per process.
+    """Return nbgrader's complete configuration for a course. It is read once per process.
 
     Raises:
         KitError: the course's `nbgrader_config.py` cannot be used.
@@ -41,18 +41,18 @@ def settings_of(root: Path) -> Any:
             raise KitError(
                 f"{root / CONFIG_FILE} cannot be used: {error}", "Correct the line that the error names."
             ) from error
-        finally:  # it takes the working folder out, which may be the one that the kit is imported from
+        finally:  # the configuration removes the working folder, from which the kit may have been imported
             sys.path += [folder for folder in before if folder == _KIT and folder not in sys.path]
     return config
 
 
 def gradebook_address(root: Path) -> str:
-    """Return the address of a course's gradebook, as SQLAlchemy wants it.
+    """Return the address of a course's gradebook in the form that SQLAlchemy expects.
 
     Raises:
-        KitError: the course names none, or one that this environment cannot reach.
+        KitError: the course's configuration cannot be used, or its address is not valid or needs a missing driver.
     """
-    # Loading nbgrader takes a second; where the course says nothing of its own, the address is known without.
+    # Loading nbgrader takes a second. If the course has no settings of its own, the address is known without it.
     if not _says_more(root):
         return CoursePaths(root).gradebook_url
     return _usable(str(settings_of(root).CourseDirectory.db_url), root / CONFIG_FILE)
@@ -60,7 +60,11 @@ def gradebook_address(root: Path) -> str:
 
 @cache
 def _usable(address: str, config: Path) -> str:
-    """Return an address for which there is a driver."""
+    """Return an address after checking that it is valid and that its driver is installed.
+
+    Raises:
+        KitError: the address is not valid, or its driver is not installed.
+    """
     from sqlalchemy.engine import make_url
     from sqlalchemy.exc import SQLAlchemyError
 
@@ -68,24 +72,24 @@ def _usable(address: str, config: Path) -> str:
         make_url(address).get_dialect().import_dbapi()
     except SQLAlchemyError as error:
         raise KitError(
-            f"{config} sets `CourseDirectory.db_url` to what is no address of a gradebook: {error}",
+            f"{config} sets `CourseDirectory.db_url` to a text that is not the address of a gradebook: {error}",
             "Such addresses are sqlite:////home/me/gradebook.db and postgresql+psycopg://grader@dbhost/gradebook.",
         ) from error
     except ImportError as error:
         raise KitError(
             f"{config} sets `CourseDirectory.db_url` to a database whose driver is not installed: {error}.",
-            'Install it; for postgresql+psycopg://… that is: pip install "psycopg[binary]"',
+            'Install it. For postgresql+psycopg://… the command is: pip install "psycopg[binary]"',
         ) from error
     return address
 
 
 def gradebook_file(root: Path) -> Path | None:
-    """Return the file that is a course's gradebook; None where it lies on a server."""
+    """Return the file of a course's gradebook; None if the gradebook is on a server."""
     return file_of(gradebook_address(root))
 
 
 def gradebook_place(root: Path) -> str:
-    """Return where a course's gradebook lies, for a person to read: without a password."""
+    """Return the place of a course's gradebook for a message, without the password of a server."""
     file = gradebook_file(root)
     if file is not None:
         return str(file)
@@ -95,10 +99,10 @@ def gradebook_place(root: Path) -> str:
 
 
 def _says_more(root: Path) -> bool:
-    """Whether a course has settings of its own.
+    """Return whether a course has nbgrader settings of its own.
 
     Raises:
-        KitError: it has, and they may be a program of somebody else's.
+        KitError: the course has such settings, but they may be a program from somebody else.
     """
     own = root / CONFIG_FILE
     if not own.is_file() or own.read_text(encoding="utf-8", errors="replace") == TEMPLATE.read_text(encoding="utf-8"):

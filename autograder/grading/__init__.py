@@ -1,1 +1,1 @@
-"""Runs submissions: each alone in the sandbox, many at once, and keeps what came of them."""
+"""Run submissions in the sandbox, many at the same time but each in its own sandbox, and store the results."""

@@ -1,4 +1,4 @@
-"""Builds one package of a student's, inside the grading sandbox: reads `Sources`, writes a `BuildRun`, both as JSON."""
+"""Build one package of a student inside the grading sandbox. Read `Sources` and write a `BuildRun`, both as JSON."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from autograder.sandbox.scratch import Scratch
 
 
 def main() -> int:
-    """Serve one build."""
+    """Read one package from standard input, build it, and write the result to standard output."""
     given = Sources.model_validate_json(sys.stdin.buffer.read())
     with Scratch() as scratch:
-        scratch.chmod(0o755)  # the sandbox inside runs as somebody else
+        scratch.chmod(0o755)  # the inner sandbox runs as another user
         folder = scratch / SOURCES / given.package
         for path, text in given.files.items():
             (folder / path).parent.mkdir(parents=True, exist_ok=True)
             (folder / path).write_text(text, encoding="utf-8")
         try:
             run = build(scratch / SOURCES, given.package, given.isolation)
-        except KitError as error:  # the worker tries again, and says it
+        except KitError as error:  # the worker tries again and reports the error
             print(error, file=sys.stderr)
             return 1
     sys.stdout.write(run.model_dump_json())

@@ -1,8 +1,8 @@
-"""Builds packages of interfaces, each once for everybody who hands in the same files.
+"""Build packages of interfaces, each only once for all students who hand in the same files.
 
-A build takes ten seconds of CPU, and many students hand in the same interfaces. What a build comes to depends on
-nothing but the files: it runs in a sandbox that is given them alone, in which no program of a student's runs before or
-beside it, and it is known by a digest of them. So it may be used again for the same files, and for no others.
+A build takes ten seconds of CPU time, and many students hand in the same interfaces. The result of a build depends only
+on the files, because it runs in a sandbox that contains nothing else, and no student's program runs in that sandbox
+before or during the build. A result is stored under a digest of the files and is used again only for the same files.
 """
 
 from __future__ import annotations
@@ -20,25 +20,25 @@ from autograder.sandbox.build import BUILD_SECONDS, BuildRun
 from autograder.sandbox.grading_sandbox import run_in_sandbox
 
 KEPT = 32
-"""Builds that are kept; one of four interfaces has about 2 MiB."""
+"""The number of builds that are kept. A build of four interfaces has about 2 MiB."""
 _BUILDS = 3
-"""As often something is built where a build fails and it is not known why; see `autograder.packages.fair_build`."""
+"""The number of attempts if a build fails for an unknown reason; see `autograder.packages.fair_build`."""
 _STARTING = 30.0
-"""Seconds that the sandbox around a build may take besides."""
+"""Seconds that the sandbox itself may take in addition to the builds."""
 
 
 class Sources(BaseModel):
-    """One package, as the process that builds it is given it."""
+    """The input of the process that builds a package."""
 
     model_config = ConfigDict(extra="forbid")
     package: str
     files: dict[str, str]
-    """Text by path in the package."""
+    """The text of each file, by its path in the package."""
     isolation: Isolation
 
     @property
     def digest(self) -> str:
-        """By which its build is known."""
+        """The digest of the package, which identifies its build."""
         return digest_of(self.package, {path: text.encode() for path, text in self.files.items()})
 
 
@@ -48,15 +48,17 @@ _lock = threading.Lock()
 
 
 def with_interfaces(job: Job, at_once: int, stop: threading.Event | None = None) -> Job:
-    """Return the job with its packages of interfaces built, unless this machine cannot: then its checks say so.
+    """Return the job with its packages of interfaces built.
+
+    If this machine lacks the tools to build packages, return the job unchanged; its checks then report that.
 
     Args:
         job: the submission.
-        at_once: builds that run at the same time.
-        stop: when it is set, they are ended.
+        at_once: the number of builds that run at the same time.
+        stop: an event that ends the builds when it is set.
 
     Raises:
-        Stopped: by `stop`.
+        Stopped: `stop` was set.
     """
     packages = job.interfaces
     if not packages or missing_tools():
@@ -64,16 +66,16 @@ def with_interfaces(job: Job, at_once: int, stop: threading.Event | None = None)
     all_sources = [Sources(package=name, files=files, isolation=job.isolation) for name, files in packages.items()]
     with ThreadPoolExecutor(at_once, thread_name_prefix="build") as pool:
         runs = pool.map(lambda sources: (sources.digest, _build(sources, stop)), all_sources)
-        # Without a result, the worker tries again, and says what it comes to.
+        # If there is no result, the worker builds the package again and reports what happens.
         return job.model_copy(update={"built": {digest: run for digest, run in runs if run is not None}})
 
 
 def _build(sources: Sources, stop: threading.Event | None) -> BuildRun | None:
-    """What building comes to; None if the process that builds gave no result."""
+    """Return the result of a build; None if the process that builds gave no result."""
     key = f"{sources.digest} {sources.isolation}"
     with _lock:
         alone = _building.setdefault(key, threading.Lock())
-    with alone:  # who hands in the same waits for the one build
+    with alone:  # another submission with the same files waits for this build
         known = _kept.get(key)
         if known is not None:
             return known
@@ -84,7 +86,7 @@ def _build(sources: Sources, stop: threading.Event | None) -> BuildRun | None:
         except ValidationError:
             return None
         with _lock:
-            if found.status >= 0 and not found.over:  # what was ended might do better on another day
+            if found.status >= 0 and not found.over:  # a build that was killed or stopped might succeed later
                 _kept[key] = found
                 while len(_kept) > KEPT:
                     _building.pop(_kept.popitem(last=False)[0], None)

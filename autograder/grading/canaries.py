@@ -1,11 +1,12 @@
-"""Known answers that run unseen among a class, to notice where a verdict depends on the machine or the executor.
+"""Canaries: known answers that run among a class, in order to notice verdicts that depend on the machine or executor.
 
-They are jobs like all others, at the beginning, in the middle and at the end of the class. Where one gets other points
-than it must, it flips: what ran at about that time is doubtful. They are recorded nowhere.
+Canaries are jobs like all others, at the beginning, in the middle and at the end of the class. If a canary gets other
+points than it must, it has flipped, and the results of submissions that ran at about the same time are doubtful. The
+results of canaries are not recorded.
 
-They are two notebooks of which it is known how many points each check must give them. They hold the course's own
-solution but for the changes in `canaries.yaml`, which go to them by turns: for each check that the file names, one
-notebook has the right answer, and the other one a wrong answer.
+Canaries are two notebooks for which it is known how many points each check must give. They contain the course's own
+solution, with changes from `canaries.yaml` that are distributed to them in turn. For each check that the file names,
+one notebook has the right answer, and the other one has a wrong answer.
 """
 
 from __future__ import annotations
@@ -30,35 +31,35 @@ from autograder.submission.reader import read_submission
 
 
 class WrongAnswer(BaseModel):
-    """One mistake in the solution, and the points that the checks must give in spite of it."""
+    """One mistake in the solution, and the points that the checks must give for the solution with this mistake."""
 
     model_config = ConfigDict(extra="forbid")
 
     answer: str
-    """grade_id of the answer cell."""
+    """The grade_id of the answer cell."""
     instead_of: str = Field(min_length=1)
-    """A text that stands once in its solution."""
+    """A text that occurs once in the cell's solution."""
     write: str
-    """What stands there in its place."""
+    """The text that replaces it."""
     points: dict[str, float] = Field(min_length=1)
-    """By grade_id, of every check that the mistake reaches: fewer than it can give."""
+    """The points of every check that the mistake affects, by grade_id. They are fewer than the check can give."""
 
 
 @dataclass(frozen=True)
 class KnownAnswers:
-    """A notebook of which the points are known."""
+    """A notebook whose points are known."""
 
     sources: dict[str, str]
     """The source of each answer cell, by grade_id."""
     points: dict[str, float | None]
-    """What each check must give, by grade_id; None: fewer points than it can give."""
+    """The points that each check must give, by grade_id; None if it must give fewer points than it can."""
 
 
 def wrong_answers(root: Path, lab: Lab) -> list[WrongAnswer]:
-    """Read `canaries.yaml`; without that file there are none.
+    """Read `canaries.yaml`; the result is empty if there is no such file.
 
     Raises:
-        KitError: it cannot be used; says what to repair.
+        KitError: the file cannot be used. The message says what to repair.
     """
     path = CoursePaths(root).canaries(lab.name)
     try:
@@ -67,7 +68,7 @@ def wrong_answers(root: Path, lab: Lab) -> list[WrongAnswer]:
     except FileNotFoundError:
         return []
     except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise KitError(f"{path} is no YAML: {error}.", "Repair that line.") from error
+        raise KitError(f"{path} is not valid YAML: {error}.", "Repair that line.") from error
     except ValidationError as error:
         first = error.errors()[0]
         place = ", ".join(str(part + 1) if isinstance(part, int) else f"`{part}`" for part in first["loc"])
@@ -82,27 +83,28 @@ def wrong_answers(root: Path, lab: Lab) -> list[WrongAnswer]:
 
 
 def _mistake(one: WrongAnswer, lab: Lab, earlier: Collection[str]) -> str:
-    """Say what is wrong with an entry of the file; empty if nothing is."""
+    """Return the mistake in an entry of the file as a sentence; empty if the entry is valid."""
     full = {check.grade_id: check.points or 0.0 for check in lab.checks}
     if one.answer not in lab.answers:
         return f"the lab has no answer `{one.answer}`; it has {', '.join(lab.answers)}."
     times = lab.answers[one.answer].solution.count(one.instead_of)
     if times != 1:
-        return f"`instead_of` stands {times} times in the solution of `{one.answer}`, and has to stand there once."
+        return f"`instead_of` occurs {times} times in the solution of `{one.answer}`, but it must occur once."
     for name, points in one.points.items():
         if name not in full:
             return f"the lab has no check `{name}`; it has {', '.join(full)}."
         if name in earlier:
-            return f"an earlier entry names `{name}`, too; there can be one wrong answer for each check."
+            return f"an earlier entry also names `{name}`, but there can be only one wrong answer for each check."
         if not 0 <= points < full[name]:
-            return f"`{name}` gives {full[name]:g} points at most, and a wrong answer has to get fewer, not {points:g}."
+            return f"`{name}` gives {full[name]:g} points at most, so a wrong answer must get fewer, not {points:g}."
     return ""
 
 
 def known_answers(root: Path, lab: Lab) -> list[KnownAnswers]:
-    """Return the two notebooks of a lab whose points are known; none if the course does not have its solutions.
+    """Return the two notebooks of a lab whose points are known; empty if the course does not have the lab's solutions.
 
-    Where the course names no wrong answers, they are the solution and the notebook as students receive it.
+    If the course has no file of wrong answers, the two notebooks are the solution and the notebook as students receive
+    it.
 
     Raises:
         KitError: the course's file of wrong answers cannot be used.
@@ -122,7 +124,8 @@ def known_answers(root: Path, lab: Lab) -> list[KnownAnswers]:
             if one.instead_of not in sources[one.answer]:
                 raise KitError(
                     f"{CoursePaths(root).canaries(lab.name)}: two entries change the same place in `{one.answer}`.",
-                    "Change other places, or put one of them between the two: by turns they go to two notebooks.",
+                    "Change different places, or put another entry between the two, because entries go to the two"
+                    " notebooks in turn.",
                 )
             sources[one.answer] = sources[one.answer].replace(one.instead_of, one.write)
             points |= one.points
@@ -131,41 +134,41 @@ def known_answers(root: Path, lab: Lab) -> list[KnownAnswers]:
 
 
 JOBS_PER_PAIR = 20
-"""A class has a pair of canaries for each so many jobs, which is a tenth of them: at least one pair, at most three."""
+"""The number of jobs for each pair of canaries. A class has at least one pair and at most three."""
 _SAME = 0.01
-"""Points that differ by less are the same, for a part of a table may give a third of a point."""
+"""Points that differ by less than this are equal, because a part of a table may give a third of a point."""
 _LISTED = 12
-"""As many flips are listed."""
+"""The number of flips that are listed."""
 _MOMENTS = {2: ("at the beginning", "at the end"), 3: ("at the beginning", "in the middle", "at the end")}
 
 
 @dataclass(frozen=True)
 class Flip:
-    """A known answer that got other points than it must."""
+    """A known answer that got other points than it must get."""
 
     moment: str
     check: str
     right: bool
-    """Whether the answer is the right one."""
+    """Whether the answer is right."""
     expected: str
     """The points that it must get, in words."""
     seen: CheckResult
 
     @property
     def why(self) -> str:
-        """The reason that the check gave for taking points; empty if it took none."""
+        """The reason that the check gave for taking points off; empty if it took none off."""
         failure = self.seen.first_failure
         return f"Its reason: {failure.title}: {failure.because or failure.observed}" if failure is not None else ""
 
     def __str__(self) -> str:
-        """Return it as a sentence."""
+        """Describe the flip as a sentence."""
         answer = "right" if self.right else "wrong"
         got = f"{self.seen.points:g} of {self.seen.max_points:g}. {self.why}".rstrip()
         return f"`{self.check}` {self.moment}: a {answer} answer must get {self.expected}, and got {got}"
 
 
 def known_jobs(known: Sequence[KnownAnswers], lab: Lab, settings: Settings, names: Sequence[str]) -> list[Job]:
-    """Return the notebooks as jobs, read as if somebody had handed them in under these names."""
+    """Return the notebooks as jobs, as if students with these names had handed them in."""
     jobs = []
     with tempfile.TemporaryDirectory(prefix="class-") as folder:
         for number, (one, name) in enumerate(zip(known, names, strict=True)):
@@ -177,7 +180,10 @@ def known_jobs(known: Sequence[KnownAnswers], lab: Lab, settings: Settings, name
 
 
 def otherwise(known: KnownAnswers, lab: Lab, result: SubmissionResult, moment: str = "") -> list[Flip]:
-    """Return the checks that gave a notebook other points than it must get; what nobody could find out is none."""
+    """Return a flip for each check that gave a notebook other points than it must get.
+
+    A check that the grader could not decide is not a flip.
+    """
     full = {check.grade_id: check.points or 0.0 for check in lab.checks}
     flips = []
     for check in result.checks:
@@ -194,32 +200,36 @@ class _Placed:
     known: KnownAnswers
     moment: str
     beside: frozenset[str]
-    """The students who run at about the same time."""
+    """The students whose submissions run at about the same time."""
 
 
 @dataclass
 class Canaries:
-    """The known answers of one run of a class, and what came of them."""
+    """The known answers in one run of a class, and their results."""
 
     lab: Lab
     known: list[KnownAnswers]
-    """A pair that complements each other, or none."""
+    """A pair of notebooks that complement each other, or an empty list."""
     settings: Settings
     flips: list[Flip] = field(default_factory=list)
     undecided: int = 0
-    """Checks of known answers of which nobody could find out what they come to."""
+    """The number of checks of canaries that the grader could not decide."""
     doubtful: set[str] = field(default_factory=set)
-    """The students who ran beside one that flipped."""
+    """The students whose submissions ran at about the same time as a canary that flipped."""
     ran: int = 0
-    """Canaries whose result is there."""
+    """The number of canaries that have a result."""
     seconds: float = 0.0
-    """How long they ran in all, as if one had run after the other."""
+    """The sum of the running times of the canaries, in seconds."""
     class_seconds: float = 0.0
-    """The same of the submissions that they ran among."""
+    """The sum of the running times of the submissions, in seconds."""
     _placed: dict[str, _Placed] = field(default_factory=dict)
 
     def among(self, jobs: Mapping[str, Job]) -> list[Job]:
-        """Return the jobs of a class, by student, in their order and with the known answers among them."""
+        """Return the jobs of a class in their order, with the known answers inserted.
+
+        Args:
+            jobs: the jobs, by student.
+        """
         students, class_ = list(jobs), list(jobs.values())
         if not self.known:
             return class_
@@ -238,12 +248,12 @@ class Canaries:
         return mixed
 
     def _new_name(self, taken: Collection[str]) -> str:
-        """A name like no student's of the class; what a name looks like is nobody's business."""
+        """Return a random name that no student of the class has."""
         name = uuid.uuid4().hex[:12]
         return self._new_name(taken) if name in taken else name
 
     def take(self, result: SubmissionResult) -> None:
-        """Compare the result of a known answer with what it must be."""
+        """Compare the result of a known answer with the points that it must get."""
         placed = self._placed[result.student]
         self.ran += 1
         self.seconds += result.seconds.get("total", 0.0)
@@ -254,7 +264,7 @@ class Canaries:
             self.doubtful |= placed.beside
 
     def told(self, root: Path) -> list[str]:
-        """Say what came of them and what they cost, as sentences for the end of a run; none if none ran."""
+        """Return sentences about the results of the canaries and their running time; empty if no canary ran."""
         if not self.ran:
             return []
         name = CoursePaths(root).canaries(self.lab.name)
@@ -284,27 +294,28 @@ class Canaries:
         return " ".join(sentences) or "Each check gave them the points that it must."
 
     def flipped(self) -> str:
-        """Return the flips as the rest of a sentence."""
+        """Return a clause that lists the flips, for the end of a sentence."""
         lines = [f"\n  {flip}" for flip in self.flips[:_LISTED]]
         lines += [f"\n  and {len(self.flips) - _LISTED} more"] if len(self.flips) > _LISTED else []
         return f"answers with known points got other points in this run:{''.join(lines)}"
 
     def refusal(self, root: Path, believed: int) -> KitError:
-        """Return why nothing is recorded after a flip, and what a person should do.
+        """Return an error that says why nothing is recorded after a flip, and what a person should do.
 
         Args:
-            root: of the course.
-            believed: as many results of the class are kept.
+            root: the course's folder.
+            believed: the number of results of the class that are kept.
         """
         name = self.lab.name
         return KitError(
             f"No grade was written, because {self.flipped()}",
-            "Points must not depend on the machine, so the results of whoever ran beside such an answer are doubtful.\n"
+            "Points must not depend on the machine, so the results of students who ran beside such an answer are"
+            " doubtful.\n"
             "  1. See what else runs on this machine (`top`), and what it lacks (`autograder doctor`).\n"
             "  2. Grade again with fewer runs at once, such as --jobs"
             f" {max(1, self.settings.at_once // 2)}. Of this class {believed} can be believed and"
             f" will not be run again; {len(self.doubtful)} will be.\n"
-            "  3. If the same check does it on a quiet machine, too, then the check or its entry in\n"
+            "  3. If the same check flips on a quiet machine as well, then the check or its entry in\n"
             f"     {CoursePaths(root).canaries(name)} is wrong: autograder lint {name}\n"
             "  With --despite-canaries all results count as they are, and nothing is run again.",
         )

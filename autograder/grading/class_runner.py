@@ -1,4 +1,4 @@
-"""Runs a class: takes what is known already, and gives the rest to an executor."""
+"""Run a class: take the results that are known already, and give the other submissions to an executor."""
 
 from __future__ import annotations
 
@@ -32,24 +32,25 @@ def run_class(
 ) -> dict[str, SubmissionResult]:
     """Run a class, several submissions at once, and return the results by student, without their pictures.
 
-    Each result is kept as soon as it is there, so that an interrupted run loses only what was running. A run that fails
-    or hangs fails alone. At the end checks are run again, alone, whose programs others kept from the CPUs.
+    Each result is stored as soon as it is known, so that an interrupted run loses only the submissions that were
+    running. If a run fails or hangs, the others are not affected. At the end, checks whose programs were kept from the
+    CPUs by other processes are run again, alone.
 
     Args:
-        submissions: notebook by student.
-        root: of the course; results go to its `build/results`.
-        lab: that they answer.
-        settings: how to run them.
-        on_result: called in this thread for each result as it arrives.
-        on_start: called, in any thread, with each student whose submission begins to run.
-        tried: keep what is run apart from the results, for nothing of it is to count yet; a later run takes it from
-            there.
-        canaries: known answers to run among the class. What runs is kept apart until all of them have run; what ran
-            beside one that flipped is doubtful, and a later run does not take it, unless the settings say so.
+        submissions: the notebooks, by student.
+        root: the course's folder. The results are stored in its `build/results`.
+        lab: the lab to which the submissions belong.
+        settings: how the submissions are run.
+        on_result: a function that is called in this thread with each result as it arrives.
+        on_start: a function that is called in any thread with each student whose submission starts to run.
+        tried: whether the results do not count yet. They are then stored separately, and a later run uses them.
+        canaries: known answers that run among the class. All results are stored separately until all canaries have run.
+            Results of submissions that ran beside a canary that flipped are doubtful, and a later run does not use them
+            unless the settings say so.
 
     Raises:
         KitError: the course's executor cannot be used.
-        KeyboardInterrupt: after every run has been stopped; finished results are kept.
+        KeyboardInterrupt: the run was interrupted. All runs have been stopped, and finished results are kept.
     """
     executor = executors.chosen(settings.executor or read_settings(root).executor, settings.at_once)
     stores = _Stores(root, lab, settings, tried, canaries)
@@ -83,7 +84,7 @@ def run_class(
 
 
 def _without_running(student: str, path: Path, lab: Lab, settings: Settings, stores: _Stores) -> SubmissionResult | Job:
-    """What is known of a submission already, or can be told of it unrun; or else what is to run."""
+    """Return the result of a submission if it is known or can be given without a run; otherwise the job to run."""
     submission = read_submission(path, lab)
     known = stores.known(student, submission)
     if known is not None:
@@ -103,10 +104,10 @@ def _believed(
     stores: _Stores,
     on_start: Callable[[str], None],
 ) -> Generator[SubmissionResult]:
-    """Run jobs, and yield what may be believed of each result: it may come from another machine.
+    """Run jobs, and yield the part of each result that can be trusted, because a result may come from another machine.
 
-    Checks whose programs others kept from the CPUs are run again when all have run, alone, before they are believed.
-    What they came to first is kept until then, so that an interrupted run does not lose it.
+    Checks whose programs were kept from the CPUs by other processes are run again, alone, after all jobs have run.
+    Their first results are stored until then, so that an interrupted run does not lose them.
     """
 
     def started(name: str) -> None:
@@ -134,14 +135,14 @@ def _believed(
 
 
 class _Stores:
-    """The places of results that count, that do not count yet, and that are doubtful.
+    """The stores of results that count, of results that do not count yet, and of doubtful results.
 
     Args:
-        root: of the course.
-        lab: whose results they are.
-        settings: how submissions are run.
-        tried: nothing of this run is to count yet.
-        canaries: known answers that run in it.
+        root: the course's folder.
+        lab: the lab whose results are stored.
+        settings: how the submissions are run.
+        tried: whether the results of this run do not count yet.
+        canaries: the known answers in this run.
     """
 
     def __init__(self, root: Path, lab: Lab, settings: Settings, tried: bool, canaries: Canaries | None) -> None:
@@ -152,13 +153,13 @@ class _Stores:
         self._waits = tried or canaries is not None
         self._waiting: list[str] = []
         self.told = self._apart if tried else self._counting
-        """Of what can be told without running anything."""
+        """The store of results that are known without a run."""
         self._run = self._apart if self._waits else self._counting
         self.first = ResultStore(root, paths.to_run_again)
-        """Of what has run once, and has checks to be run again."""
+        """The store of first results with checks that must be run again."""
 
     def known(self, student: str, submission: Submission) -> SubmissionResult | None:
-        """Return the result of a submission if running it again could say nothing new."""
+        """Return the stored result of a submission; None if the submission has to be run."""
         lab, settings = self._lab, self._settings
         result = stored(student, submission, lab, settings, self._counting)
         if result is not None:
@@ -173,7 +174,7 @@ class _Stores:
         return result
 
     def first_result(self, job: Job) -> SubmissionResult | None:
-        """Return what a job came to when it was run first, if an interrupted run was to run checks of it again."""
+        """Return the first result of a job if a run was interrupted before it ran the job's open checks again."""
         settings = self._settings
         result = self.first.fitting(self._lab, job.student, job.digest, settings.isolation, settings.seed)
         if (
@@ -186,16 +187,16 @@ class _Stores:
         return result
 
     def save(self, result: SubmissionResult) -> None:
-        """Keep a result of this run."""
+        """Store a result of this run."""
         self._run.save(result)
         self.first.remove(result.lab, result.student)
 
     def watched(self, jobs: Collection[str]) -> bool:
-        """Whether anything runs, or has run in an earlier run that did not come to its end."""
+        """Return whether canaries are needed: submissions run now, or have run in an earlier, interrupted run."""
         return bool(jobs) or (bool(self._waiting) and not self._settings.despite_canaries)
 
     def settle(self, ran: Collection[str], canaries: Canaries) -> None:
-        """Let the results of a run count if its canaries allow it, and put away those that are doubtful."""
+        """Make the results of a run count unless a canary flipped beside them, and put away doubtful results."""
         self.put_away(ran, canaries)
         flipped = self._flipped(canaries)
         for student in (*self._waiting, *ran):
@@ -203,7 +204,7 @@ class _Stores:
                 self._apart.move(self._lab.name, student, self._counting)
 
     def put_away(self, ran: Collection[str], canaries: Canaries) -> None:
-        """Move the results that are doubtful to where no later run takes them from."""
+        """Move doubtful results to a store that later runs do not use."""
         for student in (*self._waiting, *ran) if self._flipped(canaries) else ():
             if student in canaries.doubtful:
                 self._apart.move(self._lab.name, student, self._doubtful)

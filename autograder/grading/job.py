@@ -1,4 +1,4 @@
-"""What the worker in the sandbox is given: one submission as text, and the trusted cells to run on it."""
+"""A job is the input of the worker in the sandbox: one submission as text, and the trusted cells to run on it."""
 
 from __future__ import annotations
 
@@ -10,22 +10,22 @@ from autograder.packages.workspace import SOURCES
 from autograder.sandbox.build import BUILD_SECONDS, BuildRun
 
 CELL_SECONDS = 240.0
-"""Seconds after which a check cell is ended: twice as long as any takes with all its patience on a busy machine.
+"""Seconds after which a check cell is ended. This is twice as long as any cell takes on a busy machine.
 
-All of them together have a limit too (`supervisor.SECONDS_PER_CHECK`).
+There is also a limit for all cells together (`supervisor.SECONDS_PER_CHECK`).
 """
 CELL_CPU_SECONDS = 30.0
-"""Seconds of the grader's own CPU after which a check cell is ended: there was far too much to look at. Right answers
-take less than 1 s; the programs' own CPU is not counted here."""
+"""Seconds of the grader's own CPU time after which a check cell is ended, because it had far too much to process. For
+right answers it takes less than 1 s. The CPU time of the student's programs does not count."""
 STUCK_SECONDS = 30.0
-"""Seconds more after which a cell that did not end is stuck in a call that no exception reaches: the worker ends."""
+"""Further seconds after which the worker ends because the cell is stuck in a call that no exception can interrupt."""
 
 MOST_PACKAGES = 3
-"""As many packages of a submission are waited for."""
+"""The number of packages of a submission for which the time limit is extended."""
 
 
 class Job(BaseModel):
-    """Everything that the worker may know of a submission; it has no other input."""
+    """Everything that the worker may know about a submission. It has no other input."""
 
     model_config = ConfigDict(extra="forbid")
 
@@ -34,29 +34,29 @@ class Job(BaseModel):
     digest: str
     isolation: Isolation
     seed: int
-    """Seed of the values that differ from run to run."""
+    """Seed of the random values that differ from run to run."""
     files: dict[str, str]
-    """File name to text, such as `talker.py`: what the `%%node` and `%%file` cells hold."""
+    """The text of the files that the `%%node` and `%%file` cells hold, by file name, such as `talker.py`."""
     answers: dict[str, bool] = Field(default_factory=dict)
-    """Of the files that are answers: whether the cell is still as students receive it."""
+    """For each file that is an answer, whether its cell is still as students receive it."""
     cells: list[Cell]
     built: dict[str, BuildRun] = Field(default_factory=dict)
-    """What builds of its packages came to before the worker began, by the digest of what was built."""
+    """Results of builds of the packages from before the worker started, by the digest of the package."""
     problems: list[Outcome] = Field(default_factory=list)
     alone: bool = False
-    """These checks are run again, with nothing else of this kit beside them: their waits have more time."""
+    """Whether these checks are run again, alone. Then nothing else of this kit runs, and waits may take longer."""
     messages: bool = False
-    """The messages are wanted, too, that the checks received."""
+    """Whether the worker also returns the messages that the checks received."""
 
     @property
     def build_seconds(self) -> float:
-        """Seconds that its packages may take to be built, besides what the checks may take."""
+        """Seconds that building the packages may take in addition to the time for the checks."""
         packages = {name.split("/")[1] for name in self.files if name.startswith(f"{SOURCES}/")}
         return BUILD_SECONDS * min(len(packages), MOST_PACKAGES)
 
     @property
     def interfaces(self) -> dict[str, dict[str, str]]:
-        """The packages of interfaces that a cell names: of each its files, by their path in the package."""
+        """The files of each package of interfaces that a trusted cell mentions, by package and path in the package."""
         found: dict[str, dict[str, str]] = {}
         for name, text in self.files.items():
             folder, _, path = name.removeprefix(f"{SOURCES}/").partition("/")

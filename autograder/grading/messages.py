@@ -1,6 +1,6 @@
-"""Runs checks of a submission once more for the messages that they receive, and writes those as an MCAP file.
+"""Run checks of a submission again to record the messages that they receive, and write them as an MCAP file.
 
-That is the format in which ROS 2 records: `ros2 bag`, Foxglove, PlotJuggler and Lichtblick read it.
+MCAP is the format in which ROS 2 records messages. `ros2 bag`, Foxglove, PlotJuggler and Lichtblick can read it.
 """
 
 from __future__ import annotations
@@ -27,14 +27,14 @@ from autograder.submission.reader import read_submission
 def received(
     notebook: Path, student: str, lab: Lab, settings: Settings, wanted: Sequence[str]
 ) -> tuple[list[CheckResult], list[BagMessage]]:
-    """Run some checks of a submission in the sandbox, and return what they came to, and what they received.
+    """Run some checks of a submission in the sandbox, and return their results and the messages that they received.
 
     Args:
-        notebook: that was handed in.
-        student: who handed it in.
-        lab: that it answers.
-        settings: how to run it; with the seed of a result, the same values are drawn.
-        wanted: the checks, by grade_id.
+        notebook: the submitted notebook.
+        student: the student who handed it in.
+        lab: the lab to which it belongs.
+        settings: how it is run. With the seed of an earlier result, the same random values are used.
+        wanted: the grade_ids of the checks.
     """
     job = job_of(read_submission(notebook, lab), student, lab, settings)
     cells = [cell for cell in job.cells if cell.points is None or cell.grade_id in wanted]
@@ -49,18 +49,18 @@ def received(
             else:
                 checks.append(CheckResult.model_validate_json(line))
         except ValidationError:
-            break  # the last line of a worker that died may be half of one
+            break  # if the worker died, its last line may be incomplete
     return checks, messages
 
 
 def write_mcap(messages: Sequence[BagMessage], folder: Path) -> list[str]:
-    """Write messages as a bag of ROS 2: a folder with an MCAP file in it. An earlier one there is replaced.
+    """Write messages as a ROS 2 bag, which is a folder with an MCAP file. An existing folder is replaced.
 
     Returns:
-        The types that are left out, since nobody knows how they are defined.
+        The types whose messages are left out, because their definitions are not known.
 
     Raises:
-        KitError: the library that writes it is not installed.
+        KitError: the library that writes MCAP files is not installed.
     """
     try:
         from rosbags.rosbag2 import StoragePlugin, Writer
@@ -84,7 +84,7 @@ def write_mcap(messages: Sequence[BagMessage], folder: Path) -> list[str]:
 
 
 def _defined(types: Any, name: str) -> bool:
-    """Whether the library knows a type, or can be told by the file that defines it, with all that it is made of."""
+    """Return whether the library knows a type with all of its parts; if it does not, read the file that defines it."""
     from rosbags.typesys import get_types_from_msg
 
     if name in types.fielddefs:
@@ -108,7 +108,7 @@ def _defined(types: Any, name: str) -> bool:
 
 
 def _names(described: Any) -> list[str]:
-    """The types that a field is made of, as the library describes fields."""
+    """Return the message types in the library's description of a field."""
     if isinstance(described, str):
         return [described] if "/" in described else []
     return [name for part in described for name in _names(part)] if isinstance(described, tuple) else []

@@ -1,8 +1,8 @@
-"""The Validate of nbgrader, as a command and in JupyterLab: what `autograder check` says, in its words.
+"""Replace nbgrader's Validate, as a command and in JupyterLab, so that it shows what `autograder check` shows.
 
-nbgrader's own validation runs the notebook in the session of whoever asks, an instructor's too, judges by outputs, and
-shows the source of the checks. Instructors' environments come here by their course's configuration, students' by
-`environment/nbgrader_config.py`.
+nbgrader's own validation runs the notebook in the session of the person who asks, even of an instructor. It also judges
+by outputs and shows the source of the checks. The configuration of a course installs this replacement in instructors'
+environments, and `environment/nbgrader_config.py` installs it in students' environments.
 """
 
 from __future__ import annotations
@@ -25,18 +25,18 @@ from autograder.setup.refusals import SetUpError, refuse_foreign_ros
 from autograder.submission.reader import lab_of
 
 Verdicts = dict[str, list[dict[str, str]]]
-"""What did not pass, or what did, in the form that nbgrader's validator shows."""
+"""The checks that did not pass, or those that did, in the form that nbgrader's validator shows."""
 HEADING = "{num_failed} part(s) did not pass, or could not be checked:"
-"""What nbgrader says above them."""
+"""The heading that nbgrader shows above them."""
 _WIDTH = 80
-"""Columns; nbgrader cuts what is longer."""
+"""The number of columns in a line. nbgrader cuts off longer lines."""
 
 
 def replace_validator(validate: Callable[[Path, bool], Verdicts]) -> None:
-    """Put another way in place of nbgrader's validation, for this process; it has no setting for that.
+    """Replace nbgrader's validation in this process. nbgrader has no setting for that.
 
     Args:
-        validate: gets a notebook, and whether what passed is asked for.
+        validate: a function that gets a notebook, and whether to return the cells that passed.
     """
     from nbgrader.validator import Validator
 
@@ -47,10 +47,10 @@ def replace_validator(validate: Callable[[Path, bool], Verdicts]) -> None:
 
 
 def use_own_course(config: Any) -> None:
-    """Let Validate check with the course that this environment belongs to, as a student's kit does.
+    """Make Validate use the checks of the course that belongs to this environment, as in a student's kit.
 
     Args:
-        config: traitlets' Config, as `get_config()` gives it.
+        config: the Config of traitlets that `get_config()` returns.
     """
     config.Validator.failed_warning = HEADING
 
@@ -65,12 +65,12 @@ def use_own_course(config: Any) -> None:
 
 
 def verdicts(root: Path, notebook: Path, invert: bool) -> Verdicts:
-    """Check a notebook in the sandbox, and return what did not pass in the form that nbgrader shows.
+    """Check a notebook in the sandbox, and return the checks that did not pass in the form that nbgrader shows.
 
     Args:
-        root: of the course.
-        notebook: to check.
-        invert: return what passed instead.
+        root: the course's folder.
+        notebook: the notebook to check.
+        invert: whether to return the checks that passed instead.
     """
     try:
         refuse_foreign_ros(os.environ)
@@ -95,7 +95,7 @@ def verdicts(root: Path, notebook: Path, invert: bool) -> Verdicts:
 
 
 def not_checked(notebook: Path, *why: str) -> Verdicts:
-    """Say that a notebook was not checked, and why."""
+    """Return an entry that says that a notebook was not checked, and why."""
     return {"failed": [_entry(f"{notebook.name} was not checked", list(why))]}
 
 

@@ -1,7 +1,7 @@
-"""Runs one submission: reads it, has its checks run in the sandbox, and says what came of it.
+"""Run one submission: read it, run its checks in the sandbox, and return the result.
 
-The instructor's process only reads text here. What a student wrote runs in the sandbox, and comes back as a result that
-is checked against the lab before anyone believes it.
+The instructor's process only reads text. The student's programs run in the sandbox, and the result from there is
+checked against the lab before it is trusted.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from autograder.submission.answers import Submission
 from autograder.submission.reader import read_submission
 
 WORKERS_FOR_ONE = 3
-"""Workers that share the checks of a submission for which somebody waits: two cores carry them."""
+"""The number of workers that share the checks of a single submission while somebody waits. Two cores are enough."""
 
 
 @dataclass(frozen=True)
@@ -30,28 +30,28 @@ class Settings:
 
     isolation: Isolation = Isolation.FULL
     seed: int | None = None
-    """Seed of the values that vary; None draws one for each run."""
+    """Seed of the random values; None if each run gets its own seed."""
     force: bool = False
-    """Run again even what did not change."""
+    """Whether to run a submission again even if nothing has changed."""
     jobs: int = 0
-    """How many run at once; 0 lets the machine decide."""
+    """How many submissions run at the same time; 0 if the number of CPUs decides."""
     executor: str = ""
-    """Who runs them, as the course's setting of that name; empty: what that says."""
+    """The executor, in the form of the course's setting `executor`; empty if that setting decides."""
     canaries: bool = True
-    """Run known answers among a class (`grading.canaries`)."""
+    """Whether known answers run among a class (`grading.canaries`)."""
     despite_canaries: bool = False
-    """Believe results although a known answer got other points than it must."""
+    """Whether results count even if a known answer got other points than it must."""
 
     @property
     def at_once(self) -> int:
-        """How many run at once. A run mostly waits for messages, so a core carries several."""
+        """How many submissions run at the same time. A run mostly waits for messages, so a core can handle several."""
         return self.jobs or max(1, min(20, round(5 * cpus())))
 
 
 def stored(
     student: str, submission: Submission, lab: Lab, settings: Settings, store: ResultStore
 ) -> SubmissionResult | None:
-    """Return the stored result of a submission if running it again could say nothing new."""
+    """Return the stored result of a submission; None if running it again could give a new result."""
     if settings.force:
         return None
     result = store.fitting(lab, student, submission.digest, settings.isolation, settings.seed)
@@ -67,19 +67,19 @@ def run_submission(
     workers: int = 1,
     follower: Follower | None = None,
 ) -> SubmissionResult:
-    """Read one submission, run its checks in the sandbox, and return what came of it.
+    """Read one submission, run its checks in the sandbox, and return the result.
 
     Args:
-        path: of the submitted notebook.
-        student: who handed it in.
-        lab: that it answers.
-        settings: how to run it.
-        store: to keep the result in, and to take it from if nothing changed; None keeps nothing.
-        workers: that share its checks and run at once.
-        follower: is told what each check came to while others still run.
+        path: the submitted notebook.
+        student: the student who handed it in.
+        lab: the lab to which it belongs.
+        settings: how it is run.
+        store: the store for the result, which is also used if nothing has changed; None if nothing is stored.
+        workers: the number of workers that share the checks and run at the same time.
+        follower: is told the result of each check while others still run.
 
     Raises:
-        KitError: this machine cannot isolate programs as asked.
+        KitError: this machine cannot isolate programs as the settings require.
     """
     submission = read_submission(path, lab)
     known = stored(student, submission, lab, settings, store) if store is not None else None
@@ -100,7 +100,7 @@ _A_NOTEBOOK = "there is a notebook to check"
 def without_running(submission: Submission, job: Job) -> SubmissionResult:
     """Return the result of a submission that cannot be read.
 
-    Who handed in nothing has no points. What was handed in and not understood is no failure: a person decides.
+    A student who handed in nothing gets no points. If something was handed in but cannot be read, a person decides.
     """
     problem = submission.problems[-1].model_copy(update={"title": _A_NOTEBOOK})
     if problem.code == "no-notebook":
@@ -110,14 +110,14 @@ def without_running(submission: Submission, job: Job) -> SubmissionResult:
 
 
 def not_understood(result: SubmissionResult) -> str:
-    """Return why nobody could read what was handed in, as a sentence; empty if it could be read."""
+    """Return a sentence that says why the submission could not be read; empty if it could be read."""
     outcomes = [outcome for check in result.checks for outcome in check.outcomes]
     unread = (one.because for one in outcomes if one.title == _A_NOTEBOOK and one.status is Status.UNKNOWN)
     return next(unread, "")
 
 
 def job_of(submission: Submission, student: str, lab: Lab, settings: Settings) -> Job:
-    """Return what a worker needs to run a submission."""
+    """Return the job that a worker needs to run a submission."""
     return Job(
         student=student,
         lab=lab.name,

@@ -1,4 +1,4 @@
-"""The stored results of a course: a JSON file for each submission, written whole or not at all."""
+"""The stored results of a course: a JSON file for each submission, which is written completely or not at all."""
 
 from __future__ import annotations
 
@@ -16,29 +16,30 @@ class ResultStore:
     """The results of the course at `root`.
 
     Args:
-        root: of the course.
-        folder: where they are, if they do not count: `tried`, `to_run_again` or `doubtful` of `CoursePaths`.
+        root: the course's folder.
+        folder: the folder of results that do not count: `tried`, `to_run_again` or `doubtful` of `CoursePaths`; None
+            for the results that count.
     """
 
     def __init__(self, root: Path, folder: Path | None = None) -> None:
-        """Nothing is read or written before it is asked for."""
+        """Store the paths without reading or writing anything."""
         self._root = root
         self._folder = folder or CoursePaths(root).results
 
     def path(self, lab: str, student: str) -> Path:
-        """Where the result of a submission is kept."""
+        """Return the file in which the result of a submission is stored."""
         return self._folder / lab / f"{student}.json"
 
     def save(self, result: SubmissionResult) -> None:
-        """Keep a result in place of an earlier one of the same student and lab.
+        """Store a result, and replace an earlier result of the same student and lab.
 
         Raises:
-            OSError: it cannot be written; the earlier one is still there.
+            OSError: the result cannot be written. The earlier one is still there.
         """
         result.save(self.path(result.lab, result.student))
 
     def move(self, lab: str, student: str, to: ResultStore) -> None:
-        """Move a result, if there is one, to another store of the course, in place of an earlier one there."""
+        """Move a result, if there is one, to another store of the course, and replace an earlier result there."""
         there = to.path(lab, student)
         there.parent.mkdir(parents=True, exist_ok=True)
         with contextlib.suppress(FileNotFoundError):
@@ -51,14 +52,14 @@ class ResultStore:
     def fitting(
         self, lab: Lab, student: str, digest: str, isolation: Isolation | None = None, seed: int | None = None
     ) -> SubmissionResult | None:
-        """Return the stored result if it is of these very answers and this very kit; otherwise None.
+        """Return the stored result if it belongs to exactly these answers and this kit; otherwise None.
 
         Args:
-            lab: that was graded.
-            student: who handed it in.
-            digest: of the submission as it is now.
-            isolation: that it must have been run with; None accepts any.
-            seed: that it must have been run with; None accepts any.
+            lab: the lab that was graded.
+            student: the student who handed it in.
+            digest: the digest of the current submission.
+            isolation: the isolation with which the submission must have been run; None accepts any.
+            seed: the seed with which the submission must have been run; None accepts any.
         """
         result = self.last(lab.name, student)
         if result is None:
@@ -68,7 +69,7 @@ class ResultStore:
         return validated(result, lab.checks) if fits else None
 
     def last(self, lab: str, student: str) -> SubmissionResult | None:
-        """Return the stored result, whatever it is of; None if there is none that can be read."""
+        """Return the stored result, whichever answers it belongs to; None if there is none or it cannot be read."""
         try:
             return SubmissionResult.load(self.path(lab, student))
         except (OSError, ValueError):
@@ -77,7 +78,7 @@ class ResultStore:
     def all(self, lab: str | None = None) -> list[SubmissionResult]:
         """Return every stored result, or those of one lab, sorted by lab and student.
 
-        Unreadable ones are left out, and those of students who have left the class.
+        Results that cannot be read and results of students who have left the class are left out.
         """
         results = []
         for folder in sorted(self._folder.glob(lab or "*")):

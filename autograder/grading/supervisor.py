@@ -1,4 +1,4 @@
-"""Runs the grading worker on one job. What becomes of the worker costs at most the check that it was at."""
+"""Run the grading worker on one job. If the worker dies or gets stuck, usually only the current check is affected."""
 
 from __future__ import annotations
 
@@ -26,44 +26,44 @@ DIED = Kind("died", "the grader died at this check, twice; an instructor decides
 
 
 class Follower(Protocol):
-    """Shows what becomes known. It is told in the thread that has asked for the run, and may take its time."""
+    """Shows the progress of a run. It is called in the thread that has asked for the run, so it may take time."""
 
     def begun(self, problems: Sequence[Outcome]) -> None:
-        """The submission has been read: this is wrong with it as a whole."""
+        """Show that the submission has been read, and the problems of the submission as a whole."""
 
     def at(self, worker: int, what: str) -> None:
-        """A worker is at this check now; empty: it has nothing more to do."""
+        """Show which check a worker is running; an empty text means that it has nothing more to do."""
 
     def decided(self, check: CheckResult) -> None:
-        """A check came to this; nothing will change that."""
+        """Show the final result of a check."""
 
 
 Told = CheckResult | tuple[int, str]
-"""A check's result, or which worker is at what."""
+"""The result of a check, or the number of a worker and the check that it is running."""
 
 
 class ResultListener:
-    """Hears one worker's results while it still runs, line by line.
+    """Reads the results of a worker line by line while it still runs.
 
     Args:
-        worker: its number.
-        tell: is called with what is heard, in the thread that reads; it must not wait for anybody.
+        worker: the worker's number.
+        tell: a function that is called with each piece of news, in the thread that reads. It must not block.
     """
 
     def __init__(self, worker: int, tell: Callable[[Told], None]) -> None:
-        """Nothing has been heard yet."""
+        """Store the arguments and begin without any results."""
         self._worker, self._tell = worker, tell
         self._left: list[Cell] = []
         self._line = bytearray()
         self._killed: set[str] = set()
 
     def begin(self, cells: Sequence[Cell]) -> None:
-        """A process begins with these checks."""
+        """Note that a worker process starts with these checks."""
         self._left, self._line = list(cells), bytearray()
         self._now()
 
     def hear(self, data: bytes) -> None:
-        """It has written more."""
+        """Take further output of the worker."""
         *ends, rest = data.split(b"\n")
         for end in ends:
             self._line += end
@@ -75,14 +75,14 @@ class ResultListener:
         try:
             check = CheckResult.model_validate_json(line)
         except ValidationError:
-            self._left = []  # no result comes after what is none
+            self._left = []  # after a line that is no result there are no more results
             return
         cell = next((one for one in self._left if one.grade_id == check.grade_id), None)
         if cell is not None:
             self._left.remove(cell)
             if was_killed(check) and check.grade_id not in self._killed:
-                self._killed.add(check.grade_id)  # it is tried once more
-            elif not is_open(check):  # else it is run again, alone, when the others have ended
+                self._killed.add(check.grade_id)  # the check is tried again
+            elif not is_open(check):  # otherwise it is run again, alone, when the others have ended
                 self._tell(believed(cell, check))
             self._now()
 
@@ -91,39 +91,40 @@ class ResultListener:
 
 
 SECONDS_PER_CHECK = 120.0
-"""Seconds that each check may take on average; besides, one of them may get stuck. It takes 10 on a quiet machine."""
+"""Seconds that each check may take on average, in addition to the time for one check that gets stuck. On a quiet
+machine a check takes 10 s."""
 LOST = 2
-"""Checks that a submission may lose to a worker; then the rest of them is given up, too."""
+"""The number of checks at which the worker may die or get stuck. After that, the other checks are not run."""
 _LINES = 6
-"""Lines that are kept of the stack of a worker that got stuck."""
+"""The number of lines that are kept from the stack of a worker that got stuck."""
 _STACKS = b"\nTimeout ("
-"""How the stacks begin that the worker writes when it is stuck; no text in a line of JSON holds the end of a line."""
+"""The beginning of the stacks that a stuck worker writes. It begins with a newline, so no line of JSON contains it."""
 
 
 def run_in_worker(job: Job, stop: threading.Event | None = None) -> SubmissionResult:
-    """Run a job's checks in the sandbox. What each one comes to is kept as soon as it is known.
+    """Run a job's checks in the sandbox. The result of each check is kept even if the worker then dies.
 
     Args:
         job: the submission and its checks.
-        stop: when it is set, the run is ended.
+        stop: an event that ends the run when it is set.
 
     Raises:
-        Stopped: by `stop`.
+        Stopped: `stop` was set.
     """
     began = time.monotonic()
     return _result(job, _run_share(with_interfaces(job, 1, stop), job.checks, stop), began)
 
 
 def run_in_workers(job: Job, workers: int, follower: Follower | None = None) -> SubmissionResult:
-    """As `run_in_worker`, with the checks shared by several workers that run at once.
+    """Run a job's checks like `run_in_worker`, but with several workers that share the checks and run at the same time.
 
-    Checks know nothing of each other: who waits for one submission waits less with several workers; a class, of which
-    many run at once anyway, is cheaper with one each.
+    This is possible because checks do not depend on each other. With several workers, a person waits less for a single
+    submission. In a class, many submissions run at the same time anyway, so one worker for each is cheaper.
 
     Args:
         job: the submission and its checks.
-        workers: how many.
-        follower: is told what each check came to while others still run.
+        workers: the number of workers.
+        follower: is told the result of each check while others still run.
     """
     began = time.monotonic()
     if follower is not None and job.interfaces:
@@ -133,12 +134,12 @@ def run_in_workers(job: Job, workers: int, follower: Follower | None = None) -> 
     given_up = threading.Event()
     told: SimpleQueue[Told | Future[list[CheckResult]]] = SimpleQueue()
     with ThreadPoolExecutor(max(1, len(shares)), thread_name_prefix="share") as pool:
-        try:  # from the first share on: Ctrl-C may come before the last of them is begun
+        try:  # the first share is already inside, because Ctrl-C may come before the last share has started
             for number, share in enumerate(shares):
                 listener = ResultListener(number, told.put) if follower is not None else None
                 pool.submit(_run_share, job, share, given_up, listener).add_done_callback(told.put)
             checks = _follow(told, len(shares), follower)
-        except BaseException:  # nobody waits for the shares any more
+        except BaseException:  # the results of the shares are no longer needed
             given_up.set()
             raise
     result = _result(job, checks, began)
@@ -147,9 +148,9 @@ def run_in_workers(job: Job, workers: int, follower: Follower | None = None) -> 
 
 
 def _again(job: Job, first: SubmissionResult, follower: Follower | None) -> SubmissionResult:
-    """Run the open checks of a result once more, now that nothing else runs."""
+    """Run the open checks of a result again, now that nothing else runs."""
     if follower is not None:
-        follower.at(0, "once more, alone: " + ", ".join(cell.title or cell.grade_id for cell in job.checks))
+        follower.at(0, "again, alone: " + ", ".join(cell.title or cell.grade_id for cell in job.checks))
     result = trusted_result.settled(job, first, run_in_worker(job))
     for check in result.checks:
         if follower is not None and check.run_again:
@@ -160,9 +161,10 @@ def _again(job: Job, first: SubmissionResult, follower: Follower | None) -> Subm
 def _follow(
     told: SimpleQueue[Told | Future[list[CheckResult]]], shares: int, follower: Follower | None
 ) -> list[CheckResult]:
-    """Pass on what is heard of the shares until all have ended, and return what they came to.
+    """Pass the news about the shares on to the follower until all shares have ended, and return their results.
 
-    This thread does it: one that reads what a worker writes must not wait until somebody scrolls on.
+    The follower is called in this thread, because a thread that reads a worker's output must not wait for a person who
+    scrolls on.
     """
     checks: list[CheckResult] = []
     while shares:
@@ -189,8 +191,8 @@ def _run_share(
 ) -> list[CheckResult]:
     """Run some of a job's checks, one after the other.
 
-    At a check at which the worker gets stuck, nobody could find out. One at which it dies is tried once more, and so is
-    one that fails because a program was killed. Then another worker goes on with the checks that are left.
+    A check at which the worker gets stuck stays undecided. A check at which the worker dies is tried again, and so is a
+    check that fails because a program was killed. A new worker then continues with the remaining checks.
     """
     decided: list[CheckResult] = []
     left = list(share)
@@ -233,12 +235,12 @@ def _run_share(
 
 
 def limit(checks: int) -> float:
-    """Return the seconds after which a worker with so many checks is ended from outside."""
+    """Return the seconds after which a worker with this number of checks is ended from outside."""
     return CELL_SECONDS + 2 * STUCK_SECONDS + SECONDS_PER_CHECK * checks
 
 
 def _said(output: bytes) -> list[CheckResult]:
-    """The results that a worker gave; its last line may be half of one."""
+    """Return the results in a worker's output, whose last line may be incomplete."""
     checks = []
     for line in output.splitlines():
         try:
@@ -257,9 +259,9 @@ def _died(cell: Cell, run: SandboxRun) -> CheckResult:
     because = f"The grader ended twice at this check, at last with status {run.status}, without a result."
     check = undecided(cell, because, run.stderr, DIED)
     check.flags.append(
-        "The grader itself died while the programs of a check ran, and again when the check was tried once more. "
-        "Packets that a program makes up itself, past ROS, can bring that about, and so can a machine without free "
-        "memory. Read the programs, and run them once more with --force, before you decide about the points."
+        "The grader itself died while the programs of a check ran, and again when the check was tried a second time. "
+        "A program that sends its own packets past ROS can cause this, and so can a machine without free memory. "
+        "Read the programs, and run them again with --force, before you decide about the points."
     )
     return check
 
@@ -269,10 +271,10 @@ def _stuck(cell: Cell, run: SandboxRun, seconds: float) -> CheckResult:
     if not stacks:
         return undecided(cell, f"The grader took longer than {seconds:.0f} s.", run.stderr, STUCK)
     because = f"The grader got stuck in this check and was ended after {CELL_SECONDS + STUCK_SECONDS:.0f} s."
-    main_thread = stacks.strip().split("\n\n")[-1].splitlines()  # its newest call comes first
+    main_thread = stacks.strip().split("\n\n")[-1].splitlines()  # the newest call comes first
     check = undecided(cell, because, "\n".join(main_thread[: 1 + _LINES]), STUCK)
     check.flags.append(
-        "The grader stopped answering while the programs of a check ran, which honest programs do not bring about; "
-        "packets that a program makes up itself, past ROS, can. Read the programs before you decide about the points."
+        "The grader stopped answering while the programs of a check ran. Honest programs do not cause this, but a "
+        "program that sends its own packets past ROS can. Read the programs before you decide about the points."
     )
     return check

@@ -1,12 +1,12 @@
-"""What is believed of a result: only what belongs to the job, check by check. The rest is undecided.
+"""Decide which parts of a result can be trusted: those that fit the job's checks. All other checks are undecided.
 
-A result comes from a worker that was close to a student's programs, or from a file: neither decides how many points a
-check has.
+A result comes from a worker that ran close to a student's programs, or from a file. Neither of them decides how many
+points a check can give.
 
-Checks are run again, alone, where others kept their programs from the CPUs when something was decided against them.
-Whose CPU it was is known (`autograder.core.cpu_use`), so a program cannot bring this about by computing on and on. What
-others do costs time and no points: with nothing else of this kit beside it a check either comes to a verdict, whatever
-that is, or nobody could find out.
+A check is run again, alone, if it lost points while other processes kept its programs from the CPUs. It is known which
+processes used the CPUs (`autograder.core.cpu_use`), so a program cannot cause this by computing all the time. Other
+processes therefore cost only time and no points. In the second run, nothing else of this kit runs at the same time, and
+the check either gets a verdict or stays undecided.
 """
 
 from __future__ import annotations
@@ -25,17 +25,17 @@ TOO_BUSY = Kind(
 )
 
 _LINES, _CHARACTERS = 7, 1000
-"""As much of what the worker printed last is kept."""
+"""The number of lines and characters that are kept from the end of the worker's output."""
 
 
 def validated(result: SubmissionResult, checks: Sequence[Cell]) -> SubmissionResult:
-    """Return the result with exactly the lab's checks; one that is missing or impossible is undecided."""
+    """Return the result with exactly the lab's checks. A check that is missing or impossible is undecided."""
     by_id = {check.grade_id: check for check in result.checks}
     return result.model_copy(update={"checks": [believed(cell, by_id.get(cell.grade_id)) for cell in checks]})
 
 
 def believed(cell: Cell, check: CheckResult | None) -> CheckResult:
-    """Return what is believed of one check's result: it is undecided if there is none, or an impossible one."""
+    """Return the result of one check if it is possible; if it is missing or impossible, return an undecided result."""
     possible = check is not None and (check.points is None or 0.0 <= check.points <= check.max_points)
     if check is None or not possible or check.max_points != cell.points:
         check = undecided(cell, "The grader returned no usable result for this check.")
@@ -43,27 +43,27 @@ def believed(cell: Cell, check: CheckResult | None) -> CheckResult:
 
 
 def undecided(cell: Cell, because: str, printed: str = "", kind: Kind = NO_RESULT) -> CheckResult:
-    """Return the result of a check that nobody could decide.
+    """Return an undecided result for a check.
 
     Args:
         cell: the check.
-        because: why, as a sentence.
-        printed: what the worker printed.
-        kind: of the reason.
+        because: the reason, as a sentence.
+        printed: the worker's output.
+        kind: the kind of the reason.
     """
     outcome = Outcome(
         status=Status.UNKNOWN,
         title="the grader finished this check",
         because=because,
         observed="\n".join(printed.strip().splitlines()[-_LINES:])[-_CHARACTERS:],
-        hint="No points are taken. Your instructor decides.",
+        hint="No points are taken off. Your instructor decides.",
         code=kind.code,
     )
     return all_for_one_reason(cell, outcome, points=None)
 
 
 def too_busy(cell: Cell, seconds: float) -> CheckResult:
-    """Return the result of a check whose programs others kept from the CPUs for so many seconds, alone as well."""
+    """Return the result of a check whose programs were kept from the CPUs for some seconds even in the second run."""
     because = (
         f"Even when the check was run again alone, other processes kept its programs from the CPU for {seconds:.1f} s"
         " of the time in which it was decided. Run it again when the machine has less to do."
@@ -79,19 +79,19 @@ def all_for_one_reason(cell: Cell, outcome: Outcome, points: float | None) -> Ch
 
 
 def lacks_a_result(result: SubmissionResult) -> bool:
-    """Whether the grading process, or the machine, kept back a result, which says nothing about the submission.
+    """Return whether a check has no result because of the grading process or the machine, so that it should run again.
 
-    What was decided stands, and so does a check at which the worker got stuck or died twice: the same programs would
-    bring it about again, and a person has to look.
+    A check that was decided is not run again, and neither is a check at which the worker got stuck or died twice. The
+    same programs would cause this again, so a person has to look at them.
     """
     return any(outcome.code in (NO_RESULT.code, TOO_BUSY.code) for check in result.checks for outcome in check.outcomes)
 
 
 def was_killed(check: CheckResult) -> bool:
-    """Whether it failed because a program got a signal that no program can help, and that the kit did not send.
+    """Return whether a check failed because a program was ended by SIGKILL, which the kit did not send.
 
-    The system sends it when memory runs out, and then takes any process; a program that sends it to itself will do so
-    when it is tried once more.
+    The system sends this signal to any process when memory runs out. A program that sends it to itself will do so again
+    when the check is tried a second time.
     """
     failure = check.first_failure
     ends = [log.exit_status for log in check.logs if not log.stopped_by]
@@ -99,24 +99,24 @@ def was_killed(check: CheckResult) -> bool:
 
 
 def is_open(check: CheckResult) -> bool:
-    """Whether a check lost points, or a verdict, in a time in which its programs had no chance to run."""
+    """Return whether a check lost points or has no verdict because its programs had no chance to run for some time."""
     return check.starved > 0 and (check.points is None or check.points < check.max_points)
 
 
 def open_checks(job: Job, result: SubmissionResult) -> Job | None:
-    """Return the job that runs the open checks of a result again, alone; None if it has none."""
+    """Return the job that runs the open checks of a result again, alone; None if there are no open checks."""
     wanted = {check.grade_id for check in result.checks if is_open(check)}
     cells = [cell for cell in job.cells if cell.points is None or cell.grade_id in wanted]
     return job.model_copy(update={"cells": cells, "alone": True, "seed": result.seed}) if wanted else None
 
 
 def settled(job: Job, first: SubmissionResult, again: SubmissionResult) -> SubmissionResult:
-    """Return a result with what its open checks came to when they were run again, alone.
+    """Return a result with the results that its open checks had in the second run.
 
     Args:
-        job: of the second run.
+        job: the job of the second run.
         first: the result of the first run.
-        again: the result of the second.
+        again: the result of the second run.
     """
     cells = {cell.grade_id: cell for cell in job.checks}
     before = {check.grade_id: check for check in first.checks}
@@ -127,7 +127,7 @@ def settled(job: Job, first: SubmissionResult, again: SubmissionResult) -> Submi
 
 
 def _settled(cell: Cell, first: CheckResult, again: CheckResult) -> CheckResult:
-    """What a check came to, with all that a person may want to see of both runs."""
+    """Return the result of a check that was run twice, with everything that a person may want to see from both runs."""
     check = again
     if is_open(again):
         busy = too_busy(cell, again.starved)

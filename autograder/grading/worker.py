@@ -1,8 +1,9 @@
-"""Runs the trusted check cells of one submission, inside the grading sandbox.
+"""Run the trusted check cells of one submission inside the grading sandbox.
 
-Reads a `Job` as JSON from standard input. Writes to standard output a line of JSON for each check once it is decided,
-the `CheckResult`, and, where the messages are wanted, a line for each of them. When it is stuck, its stacks come last.
-The student's programs are text until the node sandbox starts them; nothing of theirs is imported here.
+The worker reads a `Job` as JSON from standard input. For each check that is decided, it writes the `CheckResult` to
+standard output as a line of JSON and, if the messages are wanted, a line for each message. If the worker is stuck, it
+finally writes the stacks of its threads. The student's programs are only text until the node sandbox starts them, and
+nothing from them is imported here.
 """
 
 from __future__ import annotations
@@ -31,21 +32,21 @@ from autograder.sandbox.limits import MIB
 from autograder.sandbox.scratch import Scratch
 
 MEMORY = 2048 * MIB
-"""Bytes that the worker may take for itself: what a student wrote may unfold in it, and then fails its own check."""
+"""The bytes of memory that the worker may use. If a student's data becomes too large, only its own check fails."""
 PICTURE_KEPT = 150_000
-"""Characters of a picture: what is longer is left out."""
+"""The number of characters of a picture. Larger pictures are left out."""
 OUTCOMES_KEPT = 400
 LOGS_KEPT = 8 * MIB
-"""Characters of all programs' output together."""
+"""The number of characters that are kept from the output of all programs together."""
 
 
 def run_job(job: Job, folder: Path, stacks: TextIO = sys.stderr) -> Iterator[CheckResult]:
-    """Run every cell of the job, in order, and give the result of each check once it is decided.
+    """Run every cell of the job in order, and yield the result of each check once it is decided.
 
     Args:
         job: the submission and the cells.
-        folder: an empty folder for the programs and files; it becomes the working directory of the programs.
-        stacks: where the stacks of all threads are written before a process that is stuck ends itself.
+        folder: an empty folder for the programs and files, which becomes the working directory of the programs.
+        stacks: the stream to which the stacks of all threads are written before a stuck process ends itself.
     """
     for name, text in job.files.items():
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
@@ -53,7 +54,7 @@ def run_job(job: Job, folder: Path, stacks: TextIO = sys.stderr) -> Iterator[Che
     current.check.findings.alone = job.alone
     current.check.configure(folder, job.isolation, job.seed, job.answers, job.built)
     if job.files:
-        _ = current.check.sandbox  # it warms up while the set-up cells import their messages
+        _ = current.check.sandbox  # the sandbox starts while the set-up cells import their messages
     namespace: dict[str, Any] = {"__name__": "check_cells"}
     logs_kept = LOGS_KEPT // max(1, len(job.checks))
     broken_set_up = ""
@@ -78,7 +79,7 @@ def run_job(job: Job, folder: Path, stacks: TextIO = sys.stderr) -> Iterator[Che
 
 
 def _check_result(cell: Cell, value: object, error: str) -> CheckResult:
-    """The cell's result; whatever is not a score says nothing about the student, so nobody's points depend on it."""
+    """Return the result of a cell. If its value is not a score, the check is undecided and costs no points."""
     if isinstance(value, Score) and not error and value.result.max_points == cell.points:
         found = value.result
     else:
@@ -99,7 +100,7 @@ def _check_result(cell: Cell, value: object, error: str) -> CheckResult:
 
 
 def _shortened(check: CheckResult) -> CheckResult:
-    """The result with a bounded number of outcomes, and without pictures that are too large."""
+    """Return the result with a limited number of outcomes, and without pictures that are too large."""
     kept = [
         one.model_copy(update={"picture": None})
         if one.picture is not None and len(one.picture.svg) + len(one.picture.alt) > PICTURE_KEPT
@@ -110,7 +111,7 @@ def _shortened(check: CheckResult) -> CheckResult:
 
 
 def _within(logs: list[NodeLog], characters: int) -> list[NodeLog]:
-    """The logs, the longest ones cut so that all together keep to a number of characters, each to a fair part of it."""
+    """Return the logs with the longest ones cut, so that together they have at most so many characters."""
     share, left = characters, characters
     for place, length in enumerate(sorted(len(log.text) for log in logs)):
         share = left // (len(logs) - place)
@@ -137,22 +138,22 @@ def _out_of_cpu(*_: object) -> None:
 def _run_cell(
     cell: Cell, number: int, namespace: dict[str, Any], limit: float, cpu: float = CELL_CPU_SECONDS
 ) -> tuple[str, object]:
-    """Run a cell; gives an error text, or none, and the value of its last expression.
+    """Run a cell, and return the text of its error, which may be empty, and the value of its last expression.
 
     Args:
         cell: the cell.
-        number: tells it from the others.
-        namespace: of all cells.
-        limit: seconds that it may take.
-        cpu: seconds of CPU that this process may take for it, which the student's programs are no part of.
+        number: the number of the cell, which makes its file name unique.
+        namespace: the global variables of all cells.
+        limit: the seconds that the cell may take.
+        cpu: the seconds of CPU time that this process may use for the cell, without the student's programs.
     """
-    # Lines that begin with % are for the notebook only; an empty line keeps the numbers right.
+    # Lines that begin with % are for the notebook only. They are replaced by empty lines to keep the line numbers.
     source = "\n".join("" if line.startswith("%") else line for line in cell.source.splitlines()) + "\n"
     filename = f"<check {number} {cell.grade_id}>"
     linecache.cache[filename] = (len(source), None, source.splitlines(keepends=True), filename)
     signal.signal(signal.SIGALRM, _out_of_time)
     signal.signal(signal.SIGPROF, _out_of_cpu)
-    signal.setitimer(signal.ITIMER_REAL, limit, 5.0)  # again and again: something may swallow the first
+    signal.setitimer(signal.ITIMER_REAL, limit, 5.0)  # repeatedly, because some code may swallow the first one
     signal.setitimer(signal.ITIMER_PROF, cpu, 5.0)
     try:
         tree = ast.parse(source, filename)
@@ -172,13 +173,13 @@ def _run_cell(
 
 
 def prepare() -> None:
-    """Load what every job needs; a process that did so once can be forked for each of them."""
+    """Load what every job needs. A process that has done this once can be forked for each job."""
     load_ros()
 
 
 def main() -> int:
-    """Serve one job."""
-    # What ROS prints on standard output must not get between the lines of the result.
+    """Read one job from standard input, run it, and write the results to standard output."""
+    # Output that ROS prints on standard output must not be mixed with the lines of the results.
     out = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(2, 1)
     job = Job.model_validate_json(sys.stdin.buffer.read())

@@ -1,1 +1,1 @@
-"""Watches the ROS graph from outside the student's process."""
+"""Observes the ROS graph from outside the student's process."""

@@ -1,4 +1,4 @@
-"""Goals sent to a student's action server: accepted or not, feedback, status, result, cancelling."""
+"""Sends goals to a student's action server, and records acceptance, feedback, status, result and cancelling."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ STATUS_WORDS = {
     GoalStatus.STATUS_CANCELED: "canceled",
     GoalStatus.STATUS_ABORTED: "aborted",
 }
-"""The words of action_msgs/GoalStatus."""
+"""The name of each status in action_msgs/GoalStatus."""
 
 UNDER_WAY = (GoalStatus.STATUS_EXECUTING, GoalStatus.STATUS_CANCELING)
-"""Statuses of a goal that is being executed."""
+"""The statuses of a goal that is being executed."""
 
 
 def _never() -> bool:
@@ -36,25 +36,25 @@ def _never() -> bool:
 
 
 class ActionSeen:
-    """One action of the student's: a client of it, and what its server publishes, in the server's own order.
+    """One of the student's actions: a client for it, and what its server publishes, in the server's own order.
 
-    Feedback and statuses are recorded as any topic is. So each has the server's own stamp, and what the observer was
-    too busy to take at once is in order all the same.
+    Feedback and statuses are recorded like any topic. So each message has the server's own stamp, and messages that the
+    observer was too busy to take immediately are still in order.
     """
 
     def __init__(self, observer: Observer, name: str, action_type: type) -> None:
-        """Begin to listen."""
+        """Create the client and begin to record."""
         self.name, self.action_type = name, action_type
         self.client = ActionClient(observer.node, action_type, name)
         self.feedback = observer.record(f"{name}/_action/feedback", action_type.Impl.FeedbackMessage)  # type: ignore[attr-defined]
         self.statuses = observer.record(f"{name}/_action/status", GoalStatusArray)
 
     def ready(self) -> bool:
-        """Whether the server is there, and everything it publishes will be heard."""
+        """Whether the server is available, and everything that it publishes will be received."""
         return bool(self.client.server_is_ready() and self.feedback.matched and self.statuses.matched)
 
     def most_at_once(self) -> int:
-        """How many goals the server has executed at the same time, at the most, by its own status messages."""
+        """Return the largest number of goals that the server executed at once, according to its status messages."""
         return max(
             (sum(each.status in UNDER_WAY for each in heard.msg.status_list) for heard in self.statuses.messages),
             default=0,
@@ -63,27 +63,27 @@ class ActionSeen:
 
 @dataclass(frozen=True)
 class Change:
-    """A goal's status, as its server published it."""
+    """A change of a goal's status, as its server published it."""
 
     status: str
     """A word of `STATUS_WORDS`."""
     stamp: float
-    """When, on the system clock, as the stamps of feedback are."""
+    """When it was published, in seconds on the system clock, like the stamps of feedback."""
 
 
 @dataclass(eq=False)
 class Goal:
-    """One goal and what the server has said about it so far; `send_goal` makes it."""
+    """One goal and what the server has said about it so far; `send_goal` creates it."""
 
     action: ActionSeen
     accepted: bool | None = None
     """None until the server has answered."""
     status: str = "unknown"
-    """A word of `STATUS_WORDS`: how the goal ended, or what came of the request."""
+    """A word of `STATUS_WORDS`: `unknown` until the goal is accepted, then `accepted`, and at the end how it ended."""
     result: Any | None = None
     """The result message; None until the goal has ended (an aborted goal has one too)."""
     agreed: bool | None = None
-    """Whether the server agreed to cancel it; None until it has answered such a request."""
+    """Whether the server agreed to cancel the goal; None until it has answered such a request."""
     id: list[int] = field(default_factory=lambda: list(uuid.uuid4().bytes))
 
     _observer: Observer = field(kw_only=True)
@@ -97,7 +97,7 @@ class Goal:
 
     @property
     def heard(self) -> list[Received]:
-        """Its feedback in the order of publishing, with stamps; `msg.feedback` is the message."""
+        """Its feedback in the order of publishing, with stamps; the feedback message itself is `msg.feedback`."""
         return [heard for heard in self.action.feedback.messages if list(heard.msg.goal_id.uuid) == self.id]
 
     @property
@@ -117,8 +117,8 @@ class Goal:
         return found
 
     def _on_executor(self, act: Callable[[], Future], done: Callable[[Any], None]) -> None:
-        # rclpy notes a request only after it has sent it: from another thread than the executor's, a fast answer can
-        # come in between and is then dropped as unexpected.
+        # rclpy registers a request only after it has sent it. If the request is sent from another thread than the
+        # executor's, a fast response can arrive in between, and rclpy drops it as unexpected.
         def run() -> None:
             act().add_done_callback(finished)
 
@@ -147,11 +147,11 @@ class Goal:
 
     @property
     def empty_handed(self) -> bool:
-        """Whether its result has come, and nothing in it has been set."""
+        """Whether its result has come, and no field in it has been set."""
         return self.result is not None and bool(self.result == type(self.result)())
 
     def wait_for_feedback(self, count: int, within: float = 10.0) -> bool:
-        """Wait until at least `count` feedback messages are there; at most `within` seconds."""
+        """Wait until at least `count` feedback messages have come; at most `within` seconds."""
         return self._observer.wait(lambda: len(self.heard) >= count, within, self._give_up)
 
     def wait_for_result(self, within: float = 10.0) -> bool:
@@ -159,9 +159,9 @@ class Goal:
         return self._observer.wait(lambda: self.result is not None, within, self._give_up)
 
     def cancel(self, within: float = 5.0) -> bool:
-        """Ask the server to cancel this goal; whether it agreed within `within` seconds.
+        """Ask the server to cancel this goal, and return whether it agreed within `within` seconds.
 
-        The goal has then not yet ended: `wait_for_result` waits for that.
+        The goal has not necessarily ended then: use `wait_for_result` to wait for its end.
         """
         if not self.accepted or self._handle is None:
             return False
@@ -181,14 +181,14 @@ def send_goal(
     within: float,
     give_up: Callable[[], bool] = _never,
 ) -> Goal:
-    """Send a goal and wait for the server to accept or reject it (`Goal.accepted` stays None if it did not answer).
+    """Send a goal and wait for the server to accept or reject it (`Goal.accepted` stays None if it does not answer).
 
     Args:
-        observer: who asks.
+        observer: the observer that sends the goal.
         action: the action.
         goal: the goal message.
-        within: seconds, once for the server to appear and once for its answer.
-        give_up: says that no answer can come any more, for example because the program ended.
+        within: the seconds to wait, once for the server to appear and once for its response.
+        give_up: returns true if no response can come any more, for example because the program has ended.
 
     Raises:
         ServiceMissing: no server appeared.

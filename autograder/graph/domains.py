@@ -1,6 +1,6 @@
-"""ROS domains: each launch claims one for as long as it runs, and gives it back.
+"""ROS domains: each launch claims a domain for as long as it runs, and then releases it.
 
-DDS derives a participant's ports from its domain's number, so launches in different domains never meet at a port.
+DDS derives a participant's ports from the number of its domain, so launches in different domains never share a port.
 """
 
 from __future__ import annotations
@@ -12,33 +12,33 @@ import socket
 from pathlib import Path
 
 LAST = 100
-"""The highest domain id with all its ports below those that Linux hands out to others (ROS 2 documentation, The
-ROS_DOMAIN_ID)."""
+"""The highest domain ID all of whose ports are below those that Linux assigns to other programs (ROS 2 documentation,
+"The ROS_DOMAIN_ID")."""
 _FIRST_PORT, _PORTS_PER_DOMAIN = 7400, 250
-"""RTPS 2.5, 9.6.2.4."""
+"""The values of the RTPS 2.5 specification, section 9.6.2.4."""
 _DISCOVERY = 128
-"""The offset of the port on which the kit's participants announce themselves, as `fastdds.xml` says."""
+"""The offset of the port on which the kit's participants announce themselves, as `fastdds.xml` sets it."""
 
 
 class Domain:
-    """A domain that was given to this process, until `release`."""
+    """A domain that this process uses until `release`."""
 
     def __init__(self, number: int, claim: socket.socket | None) -> None:
-        """Use `claim_domain`."""
+        """Keep the claim; use `claim_domain` to create a domain."""
         self.id = number
         self._claim = claim
 
     def release(self) -> None:
-        """Give it back. Can be called twice; the end of the process, however it comes, does the same."""
+        """Release the domain. This can be called twice; it also happens whenever the process ends, in whatever way."""
         if self._claim is not None:
             self._claim.close()
 
 
 def claim_domain() -> Domain:
-    """Claim a domain that no other process of the kit has, and in which no participant is alive.
+    """Claim a domain that no other process of the kit uses, and in which there is no participant.
 
-    On a machine with more launches than domains, one is shared: they still do not hear each other, since each process
-    has a multicast group of its own (`autograder.sandbox.environment`).
+    On a machine with more launches than domains, launches share a domain. They still do not hear each other, because
+    each process has its own multicast group (`autograder.sandbox.environment`).
     """
     order = random.SystemRandom().sample(range(1, LAST + 1), LAST)
     for number in order:
@@ -51,11 +51,11 @@ def claim_domain() -> Domain:
 
 
 def _claimed(number: int) -> socket.socket | None:
-    """Take a domain among the kit's own processes, for as long as the socket is open; None if another one has it.
+    """Claim a domain among the kit's processes for as long as the returned socket is open; None if it is taken.
 
-    A look at the ports is not enough: between it and the first participant another process may look as well. A name
-    of this kind lives in the network namespace, as the ports do, and goes with its process. It needs no file, so
-    nothing is left by a process that was killed, and nothing depends on whose folder it is.
+    Looking at the ports is not enough, because another process may look at them before the first participant exists. An
+    abstract socket name belongs to the network namespace, like the ports, and disappears with its process. It needs no
+    file, so a killed process leaves nothing behind, and no folder's owner or permissions matter.
     """
     claim = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
     try:
@@ -67,7 +67,7 @@ def _claimed(number: int) -> socket.socket | None:
 
 
 def is_free(domain: int) -> bool:
-    """Whether no participant of this machine is alive in a domain, whichever of its ports it has."""
+    """Whether no participant on this machine uses any port of a domain."""
     first = _FIRST_PORT + _PORTS_PER_DOMAIN * domain
     return all(_is_unused(port) for port in range(first, first + _PORTS_PER_DOMAIN))
 
@@ -82,16 +82,16 @@ def _is_unused(port: int) -> bool:
 
 
 def group_of(domain: int) -> str | None:
-    """Return the multicast group in which this user's launch in a domain finds its programs; None if there is none.
+    """Return the multicast group in which this user's launch in a domain discovers its programs; None if there is none.
 
-    Every program that names no domain uses domain 0, so no launch claims it.
+    There is none for domain 0, because every program without a domain ID uses it, and no launch claims it.
     """
     wanted = f":{_FIRST_PORT + _PORTS_PER_DOMAIN * domain + _DISCOVERY:04X}"
     with contextlib.suppress(OSError):
         for line in Path("/proc/net/udp").read_text().splitlines()[1:] if domain else ():
             fields = line.split()
             address, user = fields[1], fields[7]
-            # An address is written as the number that its four bytes are on this machine: its first byte comes last.
+            # The kernel prints an address as a number in the byte order of this machine, so its first byte comes last.
             if address.endswith(wanted) and address[6:8] == "EF" and int(user) == os.getuid():
                 return socket.inet_ntoa(bytes.fromhex(address[:8])[::-1])
     return None

@@ -1,7 +1,7 @@
-"""A lifecycle node's states and transitions, asked for through its services and heard on its event topic.
+"""A lifecycle node's states and transitions, requested through its services and recorded from its event topic.
 
-Transitions are requested by label only, and only those the node offers at that moment: a request with an id that is
-not available in the current state ends a healthy rclpy node (rclpy 7.1), a label never does.
+Transitions are requested by label only, and only if the node offers them at that moment. A request with an ID that is
+not available in the current state ends a healthy rclpy node (rclpy 7.1), but a request with a label never does.
 """
 
 from __future__ import annotations
@@ -22,38 +22,38 @@ from autograder.graph.services import ServiceMissing
 GiveUp = Callable[[], bool]
 
 MATCH_SECONDS = 1.0
-"""How long a transition waits for the event topic to be matched: its events are volatile, late listeners miss them."""
+"""How long a request waits until the event topic is matched: events are volatile, so late subscriptions miss them."""
 
 
 @dataclass(frozen=True)
 class Change:
-    """One step of a node's state machine, as its `transition_event` told it."""
+    """One step of a node's state machine, as reported on its `transition_event` topic."""
 
     node: str
     start: str
     goal: str
     stamp: float
-    """When the node published it, seconds on its system clock; comparable between nodes of one machine."""
+    """When the node published it, in seconds on its system clock; comparable between nodes on one machine."""
 
     @property
     def step(self) -> tuple[str, str]:
-        """Labels of the state it left and the state it entered."""
+        """The labels of the state that the node left and of the state that it entered."""
         return self.start, self.goal
 
 
 @dataclass(frozen=True)
 class Requested:
-    """What became of one requested transition."""
+    """The outcome of one requested transition."""
 
     label: str
     before: str
-    """State in which it was requested."""
+    """The state in which it was requested."""
     after: str
-    """State the node reported afterwards."""
+    """The state that the node reported afterwards."""
     available: tuple[str, ...]
-    """Labels the node offered in the state `before`."""
+    """The labels of the transitions that the node offered in the state `before`."""
     success: bool
-    """What the node answered; False as well if it did not offer the transition, which then was not sent."""
+    """What the node responded; also False if the node did not offer the transition, so that no request was sent."""
 
     @property
     def offered(self) -> bool:
@@ -62,17 +62,17 @@ class Requested:
 
 
 class LifecycleClient:
-    """Asks and drives one lifecycle node, and keeps its state changes from the moment this object exists.
+    """Queries and controls one lifecycle node, and records its state changes from the moment this object exists.
 
-    Make it before the node starts: `transition_event` is volatile, and whoever subscribes later misses what was.
+    Create it before the node starts: `transition_event` is volatile, so a later subscription misses earlier events.
     """
 
     def __init__(self, observer: Observer, node: str) -> None:
-        """Subscribe to the events and make the clients; does not wait.
+        """Subscribe to the events and create the clients, without waiting.
 
         Args:
-            observer: who asks; its own thread spins it.
-            node: full node name.
+            observer: the observer that asks; its own thread spins it.
+            node: the full name of the node.
         """
         self.node = node
         self._observer = observer
@@ -98,7 +98,7 @@ class LifecycleClient:
 
     @property
     def changes(self) -> list[Change]:
-        """All state changes heard so far, in the order they were published."""
+        """All state changes received so far, in the order in which they were published."""
         heard = [
             Change(self.node, item.msg.start_state.label, item.msg.goal_state.label, item.stamp)
             for item in self._events.messages
@@ -106,22 +106,23 @@ class LifecycleClient:
         return sorted(heard, key=lambda change: change.stamp)
 
     def state(self, within: float = 10.0, give_up: GiveUp = lambda: False) -> str:
-        """Label of the current state.
+        """Return the label of the current state.
 
         Args:
-            within: seconds, once for the service to appear and once for the answer.
-            give_up: says that no answer can come any more, for example because the program ended.
+            within: the seconds to wait, once for the service to appear and once for the response.
+            give_up: returns true if no response can come any more, for example because the program has ended.
 
         Raises:
             ServiceMissing: there is no such lifecycle node.
-            NoAnswer: it did not answer in time: nothing spins it, or a callback of its never returned.
+            NoAnswer: the node did not answer in time, because nothing spins it or one of its callbacks never returned.
         """
         return str(self._ask(GetState, GetState.Request(), within, give_up).current_state.label)
 
     def available(self, within: float = 10.0, give_up: GiveUp = lambda: False) -> Mapping[str, str]:
-        """The transitions the node offers now: label of each, and the label of its goal state.
+        """Return the transitions that the node offers now: for the label of each, the label of its goal state.
 
-        No state offers two transitions of one label: the three shutdowns leave three states. Raises as `state`.
+        No state offers two transitions with the same label, because each of the three `shutdown` transitions starts
+        from a different state. This raises the same exceptions as `state`.
         """
         offered = self._offered(within, give_up)
         return {item.transition.label: item.goal_state.label for item in offered}
@@ -131,15 +132,15 @@ class LifecycleClient:
 
         Args:
             label: `configure`, `activate`, `deactivate`, `cleanup` or `shutdown`.
-            within: seconds for each question.
+            within: the seconds to wait for each response.
             give_up: as for `state`.
 
         Raises:
             ServiceMissing: there is no such lifecycle node.
-            NoAnswer: no answer, and the node does not tell its state any more either.
+            NoAnswer: the node did not answer the request, or does not answer when asked for its state.
         """
         transitions = self._offered(within, give_up)
-        # Each names the state it starts from; only a finalized node offers none.
+        # Each transition names the state from which it starts; only a finalized node offers none.
         before = str(transitions[0].start_state.label) if transitions else self.state(within, give_up)
         offered = tuple(str(item.transition.label) for item in transitions)
         if label not in offered:
@@ -149,8 +150,8 @@ class LifecycleClient:
         response = self._send(ChangeState, request, within, give_up)
         after = self.state(within, give_up)
         if response is None and after == before:
-            # The very first request can get lost while both sides are being matched. The node answers and has not
-            # moved, so a second request cannot do the transition twice.
+            # The very first request can get lost while both sides are being matched. The node answers and is still in
+            # the same state, so a second request cannot cause the transition twice.
             response = self._send(ChangeState, request, within, give_up)
             after = self.state(within, give_up)
         if response is None:
@@ -158,10 +159,10 @@ class LifecycleClient:
         return Requested(label, before, after, offered, success=bool(response.success))
 
     def wait_for_state(self, label: str, within: float = 10.0, give_up: GiveUp = lambda: False) -> str:
-        """Wait until the node is in a state; the label of its state then, or when the time was over. Raises as `state`.
+        """Wait until the node is in a state, and return the label of the state that it is in at the end of the wait.
 
-        The events tell when asking can help, so that a waiting observer does not flood the node. While they go on the
-        wait does so too, for twice as long at the most.
+        The node is asked again only after an event, so that a waiting observer does not flood it with requests. As long
+        as events come, the wait continues, for at most twice as long. This raises the same exceptions as `state`.
         """
         until = time.monotonic() + 2 * within
         while True:
@@ -171,7 +172,7 @@ class LifecycleClient:
                 return seen
 
     def wait_for_changes(self, count: int, within: float = 10.0, give_up: GiveUp = lambda: False) -> list[Change]:
-        """Wait until `count` state changes were heard, at most `within` seconds; all that were heard by then."""
+        """Wait until `count` state changes were received, at most `within` seconds, and return all of them."""
         self._observer.wait(lambda: self._events.count >= count, within, give_up)
         return self.changes
 
@@ -183,7 +184,7 @@ class LifecycleClient:
         return list(reply.available_transitions)
 
     def _ask(self, srv_type: type, request: Any, within: float, give_up: GiveUp) -> Any:
-        # Questions change nothing, so a lost first request may be repeated.
+        # These requests change nothing, so one may be repeated if the first was lost.
         for _ in range(2):
             response = self._send(srv_type, request, within / 2, give_up)
             if response is not None:
@@ -206,5 +207,5 @@ class LifecycleClient:
 
 
 def in_order(clients: Iterable[LifecycleClient]) -> list[Change]:
-    """State changes of several nodes in the order in which they were published."""
+    """Return the state changes of several nodes in the order in which they were published."""
     return sorted((change for client in clients for change in client.changes), key=lambda change: change.stamp)

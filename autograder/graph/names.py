@@ -1,4 +1,4 @@
-"""Names on the ROS graph: how they are put together and which one a student probably meant."""
+"""Names on the ROS graph: how they are formed, and which name a student probably meant."""
 
 from __future__ import annotations
 
@@ -10,21 +10,21 @@ if TYPE_CHECKING:
     from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 UNKNOWN_NODE = "_NODE_NAME_UNKNOWN_"
-"""What the middleware calls the node of an endpoint whose node it has not heard of yet."""
+"""The name that the middleware gives to the node of an endpoint as long as it does not know the node."""
 
 
 def full_name(namespace: str, name: str) -> str:
-    """Join a namespace and a node name: `/` and `talker` give `/talker`."""
+    """Return the full name of a node from its namespace and name: `/` and `talker` give `/talker`."""
     return f"{namespace.rstrip('/')}/{name}"
 
 
 def node_of(end: TopicEndpointInfo) -> str:
-    """The full name of the node to which an endpoint belongs."""
+    """Return the full name of the node to which an endpoint belongs."""
     return full_name(end.node_namespace, end.node_name)
 
 
 def nearest(wanted: str, names: Iterable[str]) -> str | None:
-    """The name that is most like `wanted`, if any is alike; ties go to the alphabetically first."""
+    """Return the name most similar to `wanted`, the alphabetically first if several are; None if none is similar."""
     best, score = None, 0.55
     for name in sorted(set(names)):
         likeness = SequenceMatcher(None, wanted, name).ratio()
@@ -36,12 +36,12 @@ def nearest(wanted: str, names: Iterable[str]) -> str | None:
 
 
 def type_name(interface: type) -> str:
-    """`std_msgs/msg/String` for the class `std_msgs.msg.String`.
+    """Return the type name of an interface class, such as `std_msgs/msg/String` for `std_msgs.msg.String`.
 
     Raises:
-        TypeError: it is no class.
+        TypeError: the argument is not a class.
     """
     if not isinstance(interface, type):
-        raise TypeError(f"{interface!r:.80} is no message class; import one, such as std_msgs.msg.String")
+        raise TypeError(f"{interface!r:.80} is not a message class; import one, such as std_msgs.msg.String")
     package, kind = interface.__module__.split(".")[:2]
     return f"{package}/{kind}/{interface.__name__}"

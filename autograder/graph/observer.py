@@ -1,6 +1,7 @@
-"""The observer: one node, in a context of its own, that watches the graph of one launch.
+"""The observer: a node with its own context that watches the graph of one launch.
 
-It is not a student's node and shares no process with one. It stays quiet: no services, no /rosout.
+It is not a student's node, and it shares no process with one. It has no services and does not publish on /rosout, so
+that it adds as little as possible to the graph.
 """
 
 from __future__ import annotations
@@ -29,23 +30,23 @@ from autograder.graph.patience import Patience
 from autograder.graph.recording import Bag, Recording, quiet_profile
 
 POLL = 0.02
-"""Seconds between two looks at the graph while waiting: rclpy reports messages, but not every graph change."""
+"""The seconds between two checks while waiting. Polling is needed because rclpy does not report every graph change."""
 
 _LONGEST_POLL = 0.1
 _POLLS_A_WAIT = 10
-"""A wait that goes on looks less often: it ends late by a tenth of what it has taken at the most."""
+"""A longer wait checks less often, so it ends late by at most a tenth of the time that it has taken."""
 
 RECORDED = 128 * 1024 * 1024
-"""Bytes of messages that one observer keeps; what comes later is let go by."""
+"""The bytes of messages that one observer keeps; later messages are dropped."""
 
 _ANSWERS = 20
-"""Answers that an observer keeps, for a check that breaks over one of them."""
+"""The number of answers that an observer keeps, in case one of them causes an error in a check."""
 
 OBSERVER_NAME = "grading_observer"
 
 
 class ForgedGraph(Exception):
-    """A program has told DDS of a node or topic whose name is no text, past ROS: the graph cannot be read any more."""
+    """A program bypassed ROS and announced an invalid node or topic name to DDS, so that the graph is unreadable."""
 
 
 class Observer:
@@ -53,8 +54,9 @@ class Observer:
 
     Args:
         domain_id: the domain of the launch, 0 to 101.
-        patience: how much longer its waits may take than they were asked to; by default, what one check has.
-        left: called when it has left the domain, also if it could not begin.
+        patience: how much longer its waits may take than requested; by default, a full patience for one check.
+        left: called when the observer has left the domain, also if it could not start.
+        bag: keeps the messages that are received; by default, a new bag.
     """
 
     def __init__(
@@ -64,8 +66,8 @@ class Observer:
         left: Callable[[], None] | None = None,
         bag: Bag | None = None,
     ) -> None:
-        """Join the domain and start to spin in a thread of its own."""
-        with contextlib.ExitStack() as leaving:  # nothing stays, wherever a beginning is broken off
+        """Join the domain and start to spin in a separate thread."""
+        with contextlib.ExitStack() as leaving:  # nothing is left behind if starting fails at any point
             if left is not None:
                 leaving.callback(left)
             self.bag = bag or Bag()
@@ -79,8 +81,8 @@ class Observer:
         self._context = Context()
         rclpy.init(context=self._context, domain_id=domain_id, args=[])
         leaving.callback(rclpy.try_shutdown, context=self._context)
-        # The random end keeps a student's node from having this name by chance; what is the observer's own is told by
-        # its participant, because any program can read a name off the graph and use it.
+        # The random suffix prevents a student's node from having this name by chance. The observer's own endpoints are
+        # recognised by their participant, because any program can read a name from the graph and use it.
         self.name = f"{OBSERVER_NAME}_{time.monotonic_ns() % 0xFFFFFF:06x}"
         self.node: Node = rclpy.create_node(
             self.name,
@@ -100,17 +102,20 @@ class Observer:
         self._quiet_text = str(self._quiet)
         self._room = RECORDED
         self.answers: deque[tuple[str, Any]] = deque(maxlen=_ANSWERS)
-        """What services and actions have answered last: of each its name and its answer."""
+        """The last answers of services and actions, each with the name of the service or action."""
         self.meanwhile: Callable[[], None] | None = None
-        """Called now and then in the thread of whoever waits."""
+        """Called at intervals in the thread that waits."""
         self._closing = False
         self._error: Exception | None = None
-        """Why it hears nothing any more."""
+        """Why it receives nothing any more."""
         self._thread = threading.Thread(target=self._spin, name="observer", daemon=True)
         self._thread.start()
 
     def _own_participant(self) -> bytes:
-        """The GUID prefix of the endpoints made here; every rclpy node publishes its parameters' events."""
+        """Return the GUID prefix of the observer's endpoints, read from its publisher on `/parameter_events`.
+
+        Every rclpy node has such a publisher.
+        """
         deadline = time.monotonic() + 30.0
         while time.monotonic() < deadline:
             for end in self.node.get_publishers_info_by_topic("/parameter_events"):
@@ -124,15 +129,15 @@ class Observer:
         try:
             self._executor.spin()
         except ExternalShutdownException:
-            pass  # by whoever shuts all contexts down, as rclpy does at Ctrl-C
+            pass  # caused by shutting down all contexts, as rclpy does at Ctrl-C
         except Exception as raised:
             error = raised
-        # An executor that is shut down as it begins to wait finds what it waits on gone.
+        # If the executor is shut down just as it begins to wait, it raises an error that does not matter.
         if not self._closing:
             self._error = error
 
     def close(self) -> None:
-        """Leave the domain. The thread is joined: a daemon thread that still spins at exit aborts the process."""
+        """Leave the domain. The thread is joined because a daemon thread that spins at exit would abort the process."""
         self._closing = True
         with self._leaving:
             self._executor.shutdown(timeout_sec=2.0)
@@ -140,9 +145,9 @@ class Observer:
             self._thread.join(timeout=5.0)
 
     def room_for(self, size: int, kept: int) -> bool:
-        """Take room for one more message of `size` bytes, for a recording that keeps `kept` bytes; False if none.
+        """Reserve room for a message of `size` bytes in a recording that keeps `kept` bytes; False if there is none.
 
-        A recording gets no more than what is left for all others: a topic that is flooded must not silence the rest.
+        A recording gets no more room than is left for all others, because a flooded topic must not silence the rest.
         """
         if kept + size > self._room:
             return False
@@ -150,19 +155,19 @@ class Observer:
         return True
 
     def notify(self) -> None:
-        """Wake whoever waits: something happened."""
+        """Wake all threads that wait, because something has happened."""
         with self.changed:
             self.changed.notify_all()
 
     def wait(self, ready: Callable[[], object], within: float, give_up: Callable[[], bool] | None = None) -> bool:
-        """Wait until `ready()` is true; at most `within` seconds, less if `give_up()` says that nothing can change.
+        """Wait until `ready()` is true, at most `within` seconds, or until `give_up()` says that nothing can change.
 
-        Time in which the grader or a program wanted to run and got no CPU because of others does not count, as long as
-        there is patience: a verdict must not depend on what else the machine does. The last look comes after the
-        deadline.
+        Time in which the grader or a program wanted to run but got no CPU because of other processes does not count, as
+        long as there is patience, because a verdict must not depend on what else the machine does. `ready` is checked
+        once more after the deadline.
 
         Raises:
-            KitError: the observer hears nothing any more.
+            KitError: the observer receives nothing any more.
         """
         began, came, within = time.monotonic(), False, max(0.0, within)
         self.patience.withheld.measure()
@@ -180,7 +185,7 @@ class Observer:
                 deadline = began + within + self.patience.more(began, within)
             else:
                 self.patience.withheld.measure()
-            if self._error is not None:  # silence would be held against the program
+            if self._error is not None:  # otherwise the silence would be blamed on the program
                 raise KitError(f"The observer hears nothing any more: {self._error!r}.", "Run it again.")
             late = now >= deadline or give_up()
             if ready():
@@ -195,7 +200,7 @@ class Observer:
                 self.changed.wait(min(poll, max(0.0, deadline - time.monotonic())))
 
     def pause(self, seconds: float) -> None:
-        """Let time go by, exactly as much as is said: for experiments in which its length matters."""
+        """Wait exactly `seconds`, for experiments in which the length of the time matters."""
         deadline = time.monotonic() + seconds
         while (left := deadline - time.monotonic()) > 0:
             interrupts.here()
@@ -206,24 +211,24 @@ class Observer:
                 self.changed.wait(min(left, 5 * POLL))
 
     def nodes(self) -> list[str]:
-        """Full names of all nodes but the observer, one entry per node: two nodes of one name are listed twice."""
+        """Return the full names of all nodes except the observer. A name that two nodes have is listed twice."""
         found = self._names()
         if (self.name, "/") in found:
-            found.remove((self.name, "/"))  # once: another node of this very name stays
+            found.remove((self.name, "/"))  # once, so that another node with the same name stays
         return sorted(full_name(namespace, name) for name, namespace in found)
 
     def _names(self) -> list[tuple[str, str]]:
-        """Names and namespaces of all nodes."""
+        """Return the names and namespaces of all nodes."""
         try:
             found: list[tuple[str, str]] = _read(self.node.get_node_names_and_namespaces)
-        except RuntimeError as error:  # rclpy's RCLError is one
-            if "empty node name" in str(error):  # rcl lets no program make such a node
+        except RuntimeError as error:  # rclpy's RCLError is a RuntimeError
+            if "empty node name" in str(error):  # rcl does not allow a program to create such a node
                 raise ForgedGraph from error
             raise
         return found
 
     def topics(self) -> dict[str, list[str]]:
-        """Topics and their type names, those that only the observer uses left out."""
+        """Return the topics with their type names, except those that only the observer uses."""
         return {
             name: types
             for name, types in _read(self.node.get_topic_names_and_types)
@@ -231,29 +236,29 @@ class Observer:
         }
 
     def publishers(self, topic: str) -> list[TopicEndpointInfo]:
-        """Publishers of a topic, the observer's own left out."""
+        """Return the publishers on a topic, except the observer's own."""
         ends = _read(self.node.get_publishers_info_by_topic, topic)
         return [end for end in ends if _participant(end) != self._participant]
 
     def subscriptions(self, topic: str) -> list[TopicEndpointInfo]:
-        """Subscriptions to a topic, the observer's own left out."""
+        """Return the subscriptions to a topic, except the observer's own."""
         ends = _read(self.node.get_subscriptions_info_by_topic, topic)
         return [end for end in ends if _participant(end) != self._participant]
 
     def services(self) -> dict[str, list[str]]:
-        """Services of all nodes, with their type names; the observer itself offers none."""
+        """Return the services of all nodes with their type names; the observer itself offers none."""
         found: dict[str, list[str]] = {}
         for name, namespace in self._names():
-            # A node may go away between the two questions, which is an RCLError, and forged names may be no UTF-8.
+            # A node may disappear between the two calls, which causes an RCLError; forged names may not be UTF-8.
             with contextlib.suppress(RuntimeError, ValueError):
                 found.update(self.node.get_service_names_and_types_by_node(name, namespace))
         return found
 
     def clients(self, node: str) -> dict[str, list[str]]:
-        """Services that a node asks, with the types as which it asks them.
+        """Return the services for which a node has clients, with the clients' types.
 
         Args:
-            node: its full name.
+            node: the full name of the node.
         """
         namespace, _, name = node.rpartition("/")
         with contextlib.suppress(RuntimeError, ValueError):  # as in `services`
@@ -261,27 +266,28 @@ class Observer:
         return {}
 
     def record(self, topic: str, msg_type: type, qos: QoSProfile | None = None) -> Recording:
-        """Subscribe to a topic and keep every message; the same topic and profile share one recording.
+        """Subscribe to a topic and keep every message. There is only one recording for each topic and profile.
 
         Args:
-            topic: full name.
-            msg_type: message class.
-            qos: the subscription's profile; by default best effort and volatile with a deep queue, which hears
-                every publisher whatever it offers.
+            topic: the full name of the topic.
+            msg_type: the message class.
+            qos: the subscription's profile; by default best effort and volatile with a deep queue, which matches every
+                publisher whatever it offers.
         """
         profile = qos or self._quiet
-        # Its repr would tell objects apart, not policies; and it takes long, while some ask again all the time.
+        # A profile's repr would distinguish objects, not policies, so its str is the key. To make that text takes long
+        # and this is called very often, so the text of the default profile is made only once.
         key = (topic, self._quiet_text if qos is None else str(profile))
         if key not in self._recordings:
             self._recordings[key] = Recording(self, topic, msg_type, profile)
         return self._recordings[key]
 
     def recordings(self) -> list[Recording]:
-        """All recordings so far."""
+        """Return all recordings that exist so far."""
         return list(self._recordings.values())
 
     def hears_all(self) -> bool:
-        """Whether every recording that accepts any QoS has matched all publishers that are on its topic by now."""
+        """Whether every recording with the default profile has matched all publishers that are now on its topic."""
         return all(
             recording.matched >= len(self.publishers(topic))
             for (topic, profile), recording in list(self._recordings.items())
@@ -289,19 +295,19 @@ class Observer:
         )
 
     def publisher(self, topic: str, msg_type: type, qos: QoSProfile) -> Any:
-        """Make a publisher of the observer's; rclpy's own warnings about subscriptions that do not match are off."""
+        """Create a publisher of the observer, without rclpy's warnings about subscriptions that do not match."""
         quiet = PublisherEventCallbacks(use_default_callbacks=False)
         return self.node.create_publisher(msg_type, topic, qos, event_callbacks=quiet)
 
     def sends_on(self) -> set[str]:
-        """Full names of the topics on which the observer itself publishes."""
+        """Return the full names of the topics on which the observer itself publishes."""
         return {publisher.topic_name for publisher in self.node.publishers}
 
 
 def leave_graph(node: Node) -> None:
-    """Destroy a node with all that was made on it.
+    """Destroy a node with everything that was created on it.
 
-    rclpy leaves action clients to whoever made them; as long as one is there, so are the node and its participant.
+    rclpy does not destroy a node's action clients, and as long as one exists, so do the node and its participant.
     """
     for waitable in list(node.waitables):
         if isinstance(waitable, ActionClient):
@@ -310,10 +316,10 @@ def leave_graph(node: Node) -> None:
 
 
 def _read(ask: Callable[..., Any], *about: str) -> Any:
-    """What rclpy tells of the graph.
+    """Return what rclpy says about the graph.
 
     Raises:
-        ForgedGraph: a name in it is no UTF-8, which ROS refuses and DDS does not.
+        ForgedGraph: a name in the graph is not UTF-8, which ROS refuses, but DDS does not.
     """
     try:
         return ask(*about)
@@ -322,5 +328,5 @@ def _read(ask: Callable[..., Any], *about: str) -> Any:
 
 
 def _participant(end: TopicEndpointInfo) -> bytes:
-    """The part of an endpoint's GID that all endpoints of a DDS participant have in common (RTPS 2.5, GUID prefix)."""
+    """Return the part of an endpoint's GID that all endpoints of a participant share (RTPS 2.5, GUID prefix)."""
     return bytes(end.endpoint_gid)[:12]

@@ -1,4 +1,4 @@
-"""A node's parameters, asked for through its parameter services."""
+"""Reads and sets a node's parameters through its parameter services."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ GiveUp = Callable[[], bool]
 
 
 class NoAnswer(Exception):
-    """The node's parameter service is there, but did not answer in time: nothing spins the node, or it is stuck."""
+    """The node's service exists, but did not answer in time, because nothing spins the node or it is stuck."""
 
 
 def _call(
@@ -35,25 +35,25 @@ def _call(
 def get_parameters(
     observer: Observer, node: str, names: Sequence[str], within: float, give_up: GiveUp = lambda: False
 ) -> Mapping[str, Any]:
-    """Values of the named parameters; those that are not declared are left out.
+    """Return the values of the named parameters, except those that are not declared.
 
     Raises:
-        ServiceMissing: no such node, or one without parameter services.
-        NoAnswer: it did not answer within `within` seconds.
+        ServiceMissing: there is no such node, or it has no parameter services.
+        NoAnswer: the node did not answer within `within` seconds.
     """
     found = {}
     for name in names:
-        # One by one: rclpy answers a request that names an undeclared parameter with an empty list for all.
+        # Each is requested alone, because rclpy answers with an empty list if any parameter in a request is undeclared.
         request = GetParameters.Request(names=[name])
         values = _call(observer, node, "get_parameters", GetParameters, request, within, give_up).values
-        # A service that a program offers in place of its node's can tell of types that do not exist.
+        # A program may offer a service of its own in place of its node's, and answer with types that do not exist.
         if values and ParameterType.PARAMETER_NOT_SET < values[0].type <= ParameterType.PARAMETER_STRING_ARRAY:
             found[name] = parameter_value_to_python(values[0])
     return found
 
 
 def list_parameters(observer: Observer, node: str, within: float, give_up: GiveUp = lambda: False) -> list[str]:
-    """Names of all declared parameters, sorted. Raises as `get_parameters`."""
+    """Return the sorted names of all declared parameters. Raise the same exceptions as `get_parameters`."""
     reply = _call(observer, node, "list_parameters", ListParameters, ListParameters.Request(), within, give_up)
     return sorted(reply.result.names)
 
@@ -61,7 +61,7 @@ def list_parameters(observer: Observer, node: str, within: float, give_up: GiveU
 def set_parameter(
     observer: Observer, node: str, name: str, value: Any, within: float, give_up: GiveUp = lambda: False
 ) -> SetParametersResult:
-    """Ask the node to set one parameter, and give its answer. Raises as `get_parameters`."""
+    """Ask the node to set one parameter, and return its answer. Raise the same exceptions as `get_parameters`."""
     request = SetParameters.Request(parameters=[Parameter(name, value=value).to_parameter_msg()])
     results = _call(observer, node, "set_parameters", SetParameters, request, within, give_up).results
     if not results:

@@ -1,4 +1,4 @@
-"""How much longer a check waits where others withhold the CPUs, and whether that was long enough."""
+"""Decides how much longer a check waits if other processes withhold the CPUs, and whether that was long enough."""
 
 from __future__ import annotations
 
@@ -8,75 +8,83 @@ import time
 from autograder.core.cpu_use import Withheld
 
 PATIENCE = 60.0
-"""Seconds that all waits of a check together may take longer on a busy machine."""
+"""The seconds by which all waits of a check together may be extended on a busy machine."""
 STRETCH = 3.0
-"""How often its own length one wait may take."""
+"""One wait may take at most this many times its requested length."""
 ALONE = 300.0
-"""Seconds by which all waits of a check together may grow where it runs alone; a single wait may take all of them."""
+"""The seconds by which all waits of a check that runs alone may be extended; one wait may use all of them."""
 _SHORT = 0.1
-"""Seconds after which it pays to measure again what was withheld."""
+"""The seconds after which it is worth measuring again how much CPU time was withheld."""
 _TOLERATED = 0.5
-"""Seconds that a long wait may lack, and a short one a quarter of its length: nowhere is a CPU free at any moment."""
+"""The seconds of CPU time that a long wait may lack; a short one may lack a quarter of its length. Some lack is normal
+on every machine."""
 _SHARE, _SHARE_ALONE = 0.25, 0.5
-"""A measurement is trusted if no more than this share of its time was withheld; a median stands up to one half."""
+"""A measurement is trusted if no more than this share of its time was withheld, first on a shared machine and then for
+a check that runs alone. Medians are reliable as long as no more than half of the time was withheld."""
 
 
 class Patience:
-    """Of one check, for all its launches.
+    """The patience of one check, for all its launches.
 
     Args:
-        alone: whether nothing else of this kit runs meanwhile.
+        alone: whether nothing else of this kit runs at the same time.
     """
 
     def __init__(self, alone: bool = False) -> None:
-        """All of it is left."""
+        """Begin with all of it left."""
         self.left = ALONE if alone else PATIENCE
         self.withheld = Withheld()
         self._stretch = math.inf if alone else STRETCH
         self._share = _SHARE_ALONE if alone else _SHARE
         self._lacked = 0.0
-        """The most that one of the waits in vain lacked since something was decided last."""
+        """The largest number of seconds that a failed wait lacked since the last decision."""
         self._in_vain = 0.0
-        """Seconds of those waits together."""
+        """The seconds that the failed waits since the last decision took together."""
         self._since = time.monotonic()
-        """When something was decided last."""
+        """When the last decision was made."""
         self._sure = False
 
     def more(self, began: float, within: float) -> float:
-        """Return how many seconds longer a wait may take that began then: as long as its time was withheld."""
+        """Return by how many seconds a wait may be extended: by the time that was withheld from it, within the limits.
+
+        Args:
+            began: when the wait began, on the monotonic clock.
+            within: its requested length in seconds.
+        """
         self.withheld.measure(_SHORT)
         return max(0.0, min(self.withheld.from_all(began), (self._stretch - 1) * within, self.left))
 
     def waited(self, began: float, within: float, came: bool) -> None:
-        """Note the end of a wait: what it took longer than asked for, and what it lacked if it was in vain."""
+        """Record the end of a wait: how much longer it took than requested, and what it lacked if it failed."""
         now = time.monotonic()
         over = now - began - within
         self.left -= max(0.0, over)
         if not came:
-            # A wait that was given up early has taken into account already what was withheld.
+            # A wait that was given up early lacks nothing: giving it up took what was withheld into account already.
             lacked = self.kept(began) - over if over >= 0 else 0.0
             if lacked > min(_TOLERATED, within / 4):
                 self._lacked = max(self._lacked, lacked)
             self._in_vain += now - began
 
     def kept(self, when: float) -> float:
-        """Return for how many seconds a process had no chance to run, from a moment of the monotonic clock on."""
+        """Return for how many seconds a process could not run since a moment on the monotonic clock."""
         self.withheld.measure(_SHORT)
         return self.withheld.from_one(when)
 
     def passed(self) -> None:
-        """Something was decided in favour of the program."""
+        """Record a decision in favour of the program."""
         self._lacked, self._in_vain, self._since, self._sure = 0.0, 0.0, time.monotonic(), False
 
     def is_sure(self) -> None:
-        """What is decided next is so on every machine, however long it takes to look for the reason."""
+        """Record that the next decision is the same on every machine, however long it takes to find the reason."""
         self._sure = True
 
     def decided(self) -> float:
-        """Return the seconds that were lacking for what is decided now, from the last time that something was.
+        """Make a decision, and return the seconds of CPU time that were lacking for it since the last one.
 
-        Zero means that the programs, and who watched them, had their chance to run. What decides is a wait that lacked
-        too much, or, where most of the time was no wait in vain, something that was measured in it.
+        Zero means that the programs and the observer had enough time to run. What counts is how much the failed wait
+        with the greatest lack was lacking. If failed waits took less than half of the time, what was withheld from the
+        whole time counts, too, if its share is too large.
         """
         kept, now = self.kept(self._since), time.monotonic()
         took = now - self._since

@@ -1,4 +1,4 @@
-"""What the observer publishes itself: a steady stream of messages, and the simulated time on `/clock`."""
+"""Publishes messages from the observer: a steady stream of messages, and the simulated time on `/clock`."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from autograder.graph.observer import Observer
 
 
 class Stream:
-    """Publishes one message again and again between `start` and `stop`; once it is there, the publisher stays."""
+    """Publishes one message repeatedly between `start` and `stop`. The publisher stays after the first `start`."""
 
     def __init__(
         self,
@@ -24,16 +24,16 @@ class Stream:
         qos: QoSProfile,
         expect_heard: Callable[[Callable[[], int]], None],
     ) -> None:
-        """Describe the stream; nothing is on the graph yet.
+        """Describe the stream, without creating anything on the graph yet.
 
         Args:
-            observer: whose node publishes.
-            topic: full name.
-            message: what is sent.
-            rate: hertz.
-            qos: what the publisher offers. With manual liveliness each message asserts it.
-            expect_heard: waits until the number of matched subscriptions, which it is given, is not 0 and these know
-                the publisher, or fails.
+            observer: the observer whose node publishes.
+            topic: the full name of the topic.
+            message: the message that is sent.
+            rate: the rate in hertz.
+            qos: the QoS that the publisher offers. With manual liveliness, each message asserts it.
+            expect_heard: called with a function that returns the number of matched subscriptions; waits until there is
+                one and it knows the publisher, and otherwise fails.
         """
         self._observer, self._topic, self._message, self._qos = observer, topic, message, qos
         self._period = 1 / rate
@@ -42,7 +42,7 @@ class Stream:
         self._timer: Any = None
 
     def start(self) -> None:
-        """Send, or send again; a subscription that is missing or does not match is a failed outcome."""
+        """Start or resume sending. If no subscription matches, this is recorded as a failed outcome."""
         if self._publisher is None:
             self._publisher = self._observer.publisher(self._topic, type(self._message), self._qos)
         self._expect_heard(self._publisher.get_subscription_count)
@@ -52,29 +52,30 @@ class Stream:
             self._timer.reset()
 
     def stop(self) -> None:
-        """Stop sending: from outside it looks like a program that hangs."""
+        """Stop sending, but keep the publisher, so that it looks like that of a program that hangs."""
         if self._timer is not None:
             self._timer.cancel()
 
 
 REPEAT = 0.1
-"""Seconds after which an unanswered stamp is sent again: it may have been lost before the node was matched."""
+"""The seconds after which a stamp without effect is sent again, because it may have been lost before the node was
+matched."""
 
 
 class ClockDriver:
-    """Publishes `/clock`, only when told to: time in the launch stands still in between."""
+    """Publishes `/clock`, but only on request. In between, the time in the launch stands still."""
 
     def __init__(self, observer: Observer) -> None:
-        """Start at 1 s: rclpy takes time 0 for "not set"."""
+        """Start at 1 s, because rclpy treats time 0 as "not set"."""
         self._observer = observer
         self._publisher = observer.publisher("/clock", Clock, 10)
         self.now = 1.0
-        """Simulated seconds."""
+        """The simulated time in seconds."""
 
     def advance(self, step: float, effect: Callable[[], bool], within: float = 5.0) -> bool:
-        """Move time on by `step` seconds and wait for its effect; the stamp is repeated until the effect shows.
+        """Advance the time by `step` seconds and wait for the effect. The stamp is repeated until the effect occurs.
 
-        A clock that runs freely loses ticks on a busy machine; in lock-step each run has the same ticks.
+        A free-running clock loses ticks on a busy machine. With this lock-step clock, every run has the same ticks.
         """
         self.now += step
         stamp = Clock(clock=Time(nanoseconds=round(self.now * 1e9)).to_msg())

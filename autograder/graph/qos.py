@@ -1,4 +1,4 @@
-"""QoS as the graph shows it, and which policy keeps two endpoints apart."""
+"""QoS as the graph shows it, and the policy that prevents two endpoints from matching."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from rclpy.duration import Duration
 from rclpy.qos import QoSProfile
 
 _INFINITE = 2**62
-"""Nanoseconds from which a duration on the graph means "never": the middleware's own infinity is about 2**63."""
+"""The nanoseconds from which a duration on the graph means "never"; the middleware's own infinity is about 2**63."""
 
 
 POLICIES = frozenset({"reliability", "durability", "deadline", "lifespan", "liveliness", "lease"})
@@ -19,13 +19,13 @@ Policies = Mapping[str, str | float | None]
 
 
 def seconds(duration: Duration) -> float | None:
-    """A duration in seconds; None for "never", which the middleware writes as zero or as infinity."""
+    """Return a duration in seconds; None for "never", which the middleware represents as zero or as infinity."""
     nanoseconds = duration.nanoseconds
     return None if nanoseconds <= 0 or nanoseconds >= _INFINITE else nanoseconds * 1e-9
 
 
 def describe(profile: QoSProfile) -> dict[str, str | float | None]:
-    """The policies that the graph shows, in words and seconds. History and depth are not among them."""
+    """Return the policies that the graph shows, in words and seconds. History and depth are not among them."""
     return {
         "reliability": profile.reliability.name.lower(),
         "durability": profile.durability.name.lower(),
@@ -37,23 +37,23 @@ def describe(profile: QoSProfile) -> dict[str, str | float | None]:
 
 
 def in_words(value: str | float | None) -> str:
-    """A policy's value as it stands in a sentence: `best effort`, `0.2 s`, `none`."""
+    """Return a policy's value as it is written in a sentence: `best effort`, `0.2 s`, `none`."""
     if value is None:
         return "none"
     return value.replace("_", " ") if isinstance(value, str) else f"{value:g} s"
 
 
 def first_mismatch(offered: QoSProfile, requested: QoSProfile) -> str | None:
-    """The first policy over which a publisher (offered) and a subscription (requested) do not match; None if they do.
+    """Return the first policy that prevents a publisher (offered) from matching a subscription (requested), or None.
 
-    Source: the DDS rule that a request must not be stricter than the offer, for reliability, durability, deadline,
-    liveliness and its lease.
+    The DDS rule is that a request must not be stricter than the offer. It applies to reliability, durability, deadline,
+    liveliness and the liveliness lease.
     """
     return mismatch_between(describe(offered), describe(requested))
 
 
 def mismatch_between(offered: Policies, requested: Policies) -> str | None:
-    """As `first_mismatch`, of profiles that `describe` has put into words."""
+    """Do the same as `first_mismatch` for profiles that `describe` has put into words."""
     if requested["reliability"] == "reliable" and offered["reliability"] == "best_effort":
         return "reliability"
     if requested["durability"] == "transient_local" and offered["durability"] == "volatile":

@@ -1,4 +1,4 @@
-"""What arrived on one topic; and the bag, in which messages are kept as they came over the wire, if asked."""
+"""Recordings of the messages on a topic, and the bag, which keeps serialised messages if that is requested."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from rclpy.qos import QoSDurabilityPolicy, QoSHistoryPolicy, QoSPolicyKind, QoSP
 from rclpy.serialization import deserialize_message
 
 _ROOM = 16 * 1024 * 1024
-"""Bytes of messages that are kept for one check."""
+"""The bytes of messages that are kept for one check."""
 
 
 class BagMessage(BaseModel):
@@ -27,31 +27,31 @@ class BagMessage(BaseModel):
     """The check that received it."""
     topic: str
     type: str
-    """Such as `std_msgs/msg/String`."""
+    """The type name, such as `std_msgs/msg/String`."""
     stamp: int
     """When it was published, in nanoseconds on the publisher's system clock."""
     data: str
-    """Its CDR, in base64."""
+    """The message in CDR, encoded in base64."""
 
 
 class Bag:
-    """Keeps messages for one check after the other."""
+    """Keeps the messages of one check after another."""
 
     def __init__(self) -> None:
-        """Keep nothing before somebody asks for it."""
+        """Begin empty; nothing is kept until `wanted` is set."""
         self.wanted = False
         self._taken: list[tuple[str, str, int, bytes]] = []
         self._room = _ROOM
 
     def add(self, topic: str, msg_type: type, stamp: int, data: bytes) -> None:
-        """Keep a message, if anybody wants it and there is room."""
+        """Keep a message if messages are wanted and there is room."""
         if self.wanted and len(data) <= self._room:
             self._room -= len(data)
             package, kind, *_ = msg_type.__module__.split(".")
             self._taken.append((topic, f"{package}/{kind}/{msg_type.__name__}", stamp, data))
 
     def empty(self, grade_id: str) -> list[BagMessage]:
-        """Return what was kept, as that of a check, and begin anew."""
+        """Return the messages that were kept as those of a check, and begin again with an empty bag."""
         taken, self._taken, self._room = self._taken, [], _ROOM
         return [
             BagMessage(
@@ -62,30 +62,33 @@ class Bag:
 
 
 _MESSAGE_OVERHEAD = 1024
-"""Bytes that a message takes besides its own, about."""
+"""The bytes that a message takes in addition to its data, approximately."""
 _AT_ONCE = 50
-"""Messages of one topic that are taken before others have their turn."""
+"""The number of messages that are taken from one topic before it is the turn of the others."""
 
 
 class Recorder(Protocol):
-    """Who records: an observer."""
+    """The object that records, which is an observer."""
 
     node: Node
     bag: Bag
-    """Keeps what is received."""
+    """The bag that keeps what is received."""
 
     def room_for(self, size: int, kept: int) -> bool:
-        """Take room for one more message of `size` bytes, for a recording that keeps `kept` bytes; False if none."""
+        """Reserve room for a message of `size` bytes in a recording that keeps `kept` bytes; False if there is none."""
 
     def notify(self) -> None:
-        """Wake whoever waits: something happened."""
+        """Wake all threads that wait, because something has happened."""
 
     def wait(self, ready: Callable[[], object], within: float) -> bool:
         """Wait until `ready()` is true; at most `within` seconds."""
 
 
 def quiet_profile() -> QoSProfile:
-    """Best effort, volatile, deep queue: compatible with every publisher, and deep enough for a grader that stalls."""
+    """Return a profile that is compatible with every publisher: best effort and volatile.
+
+    Its queue is deep enough for a grader that stalls for a while.
+    """
     return QoSProfile(
         reliability=QoSReliabilityPolicy.BEST_EFFORT,
         durability=QoSDurabilityPolicy.VOLATILE,
@@ -96,35 +99,36 @@ def quiet_profile() -> QoSProfile:
 
 @dataclass(frozen=True)
 class Received:
-    """One message and what the middleware says about it."""
+    """One message and the middleware's information about it."""
 
     msg: Any
     received: float
-    """When the observer took it, seconds on the monotonic clock."""
+    """When the observer took it, in seconds on the monotonic clock."""
     stamp: float
-    """When it was published, seconds on the publisher's system clock (same machine, so comparable between topics)."""
+    """When it was published, in seconds on the publisher's system clock. Stamps of different topics can be compared,
+    because all publishers run on the same machine."""
     sequence: int
-    """The publisher's own count of what it has published, from 1."""
+    """The number of the message in the publisher's own count, from 1."""
 
 
 class Recording:
-    """All messages of a topic since the observer subscribed, in the order of arrival, while the observer has room."""
+    """All messages on a topic since the observer subscribed, in the order of arrival, while the observer has room."""
 
     def __init__(self, observer: Recorder, topic: str, msg_type: type, qos: QoSProfile) -> None:
-        """Subscribe; use `Observer.record`, which shares recordings."""
+        """Subscribe to the topic; use `Observer.record`, which shares recordings."""
         self.topic = topic
         self.msg_type = msg_type
         self.qos = qos
         self.incompatible: list[str] = []
-        """Names of QoS policies over which a publisher and this subscription did not match."""
+        """The names of the QoS policies because of which a publisher did not match this subscription."""
         self.alive = 0
-        """Publishers that count as alive; a lease in the profile is needed to see one that hangs."""
+        """The number of publishers that count as alive. One that hangs is noticed only if the profile has a lease."""
         self._observer = observer
         self._messages: list[Received] = []
         self._kept = 0
-        # Every publisher matches the quiet profile, and no lease runs: its events would only be waited for.
+        # Every publisher matches the quiet profile, and it has no lease, so no such event can occur.
         quiet = qos == quiet_profile()
-        # The observer's thread may take a first message before `create_subscription` has returned in this one.
+        # The observer's thread may take a first message before `create_subscription` has returned in this thread.
         self._subscription: Any = None
         self._subscription = observer.node.create_subscription(
             msg_type,
@@ -140,10 +144,10 @@ class Recording:
         )
 
     def _take(self, data: bytes, info: dict[str, int]) -> None:
-        """Keep a message, and those that wait behind it.
+        """Keep a message, and those that are queued behind it.
 
-        An executor takes one of each topic in a round. One that was held up would be behind with a topic that has many,
-        while it knows already what was sent later on another.
+        An executor takes one message of each topic in turn. After a delay, it would lag behind on a topic with many
+        messages, although it already has later messages of other topics.
         """
         self._keep(data, info)
         for _ in range(_AT_ONCE if self._subscription is not None else 0):
@@ -161,7 +165,7 @@ class Recording:
         self._kept += size
         try:
             msg = deserialize_message(data, self.msg_type)
-        except Exception:  # whatever a program sends that is no such message
+        except Exception:  # a program can send data that is not a message of this type
             return
         stamp = info["source_timestamp"]
         self._observer.bag.add(self.topic, self.msg_type, stamp, data)
@@ -177,23 +181,23 @@ class Recording:
 
     @property
     def messages(self) -> list[Received]:
-        """What has arrived so far: a copy, so that it does not grow while it is looked at."""
+        """A copy of the list of messages that have arrived so far, so that it does not grow during an iteration."""
         return list(self._messages)
 
     def messages_from(self, number: int) -> list[Received]:
-        """Return what has arrived so far but for so many of the first."""
+        """Return the messages that have arrived so far, without the first `number`."""
         return self._messages[number:]
 
     @property
     def count(self) -> int:
-        """Number of messages so far."""
+        """The number of messages so far."""
         return len(self._messages)
 
     @property
     def matched(self) -> int:
-        """Number of publishers whose QoS this subscription accepted."""
+        """The number of publishers whose QoS matches this subscription."""
         return int(self._subscription.get_publisher_count()) if self._subscription is not None else 0
 
     def wait_for(self, count: int, within: float = 10.0) -> bool:
-        """Wait until at least `count` messages are there; at most `within` seconds."""
+        """Wait until at least `count` messages have arrived; at most `within` seconds."""
         return self._observer.wait(lambda: self.count >= count, within)

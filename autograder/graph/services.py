@@ -1,4 +1,4 @@
-"""Calling a student's services, and offering one to a student's client."""
+"""Calls a student's services, and offers a service to a student's client."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ from autograder.graph.observer import Observer
 
 @dataclass(frozen=True)
 class Answer:
-    """The answer to one call."""
+    """The response to one call."""
 
     response: Any | None
-    """None: no answer came in time."""
+    """The response; None if none came in time."""
     seconds: float
-    """From sending the request to the answer, or to giving up."""
+    """The seconds from sending the request to the response, or to giving up."""
 
 
 class ServiceMissing(Exception):
-    """No server of that name and type was found in time."""
+    """No server with this name and type was found in time."""
 
 
 def call_all(
@@ -36,15 +36,15 @@ def call_all(
     within: float,
     give_up: Callable[[], bool] | None = None,
 ) -> list[Answer]:
-    """Send all requests at once and wait for the answers.
+    """Send all requests at once and wait for the responses.
 
     Args:
-        observer: who asks.
-        name: full service name.
-        srv_type: service class.
+        observer: the observer that sends the requests.
+        name: the full name of the service.
+        srv_type: the service class.
         requests: the requests.
-        within: seconds, once for the server to appear and once for the answers.
-        give_up: says that no answer can come any more, for example because the program ended.
+        within: the seconds to wait, once for the server to appear and once for the responses.
+        give_up: returns true if no response can come any more, for example because the program has ended.
 
     Raises:
         ServiceMissing: no server appeared.
@@ -88,22 +88,22 @@ class OfferedService:
         answer: Callable[[Any, Any], Any],
         delay: float = 0.0,
     ) -> None:
-        """Offer it.
+        """Create the service.
 
         Args:
-            observer: who answers.
-            name: full service name.
-            srv_type: service class.
-            answer: fills and returns the response, from (request, response).
-            delay: seconds until each answer; other calls are answered meanwhile.
+            observer: the observer that answers.
+            name: the full name of the service.
+            srv_type: the service class.
+            answer: called with the request and the response; fills the response and returns it.
+            delay: the seconds until each response is sent; other requests are handled in the meantime.
         """
         self.requests: list[Any] = []
         self.served: list[tuple[float, float]] = []
-        """Of each answered request: its arrival and its answer, seconds on the system clock as message stamps are."""
+        """When each answered request arrived and was answered, in seconds on the system clock, like message stamps."""
         self._observer = observer
         self._answer = answer
         self._delay = delay
-        # A group of its own: while an answer is awaited, the observer goes on hearing messages and requests.
+        # The service has its own group, so that the observer receives messages and requests while a response waits.
         self._group = ReentrantCallbackGroup()
         self._service = observer.node.create_service(srv_type, name, self._handle, callback_group=self._group)
 
@@ -112,7 +112,7 @@ class OfferedService:
         self.requests.append(request)
         self._observer.notify()
         if self._delay:
-            # Awaiting frees the observer's only thread; a sleep would hide messages that arrive meanwhile.
+            # Awaiting frees the observer's only thread; with a sleep, it would not take messages that arrive meanwhile.
             later: Future = Future(executor=self._observer.node.executor)
 
             def time_is_up() -> None:

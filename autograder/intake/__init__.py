@@ -1,1 +1,1 @@
-"""What comes out of a learning platform: which file is whose submission, when it came, and what it replaces."""
+"""Read the submissions of a class from a learning platform: whose each file is, when it came, and what it replaces."""

@@ -1,9 +1,9 @@
-"""Takes in what was handed in: a folder or a zip with something of each student's, into `build/submitted`.
+"""Take in the submissions of a class from a folder or a zip, and write them to `build/submitted`.
 
-Of each student only the lab's notebook is taken, as bytes, and what nbgrader's exchange puts beside it. Names are
-checked, links are not followed, nothing is unpacked to a place that a name in a zip could choose. What is not taken is
-said, and costs nobody else anything. Where somebody would be lost or replaced, nothing is taken in until a person has
-said that this is right.
+Only the lab's notebook of each student is taken, as bytes, and the files that nbgrader's exchange puts beside it. Names
+are checked, links are not followed, and a name in a zip cannot choose where a file is written. Every file that is left
+out is reported, and does not affect other students. If a student would be missing or replaced, nothing is taken in
+until a person has accepted that.
 """
 
 from __future__ import annotations
@@ -35,22 +35,24 @@ from autograder.submission.notebook_file import NOTEBOOK_BYTES
 
 @dataclass(frozen=True)
 class Gone:
-    """Who is not among the submissions, though the roster or the last time says so."""
+    """The students from the roster or from the last run who are not among the submissions."""
 
     lost: Mapping[str, Taken]
+    """The students who are missing."""
     renamed: Mapping[str, Taken]
-    """Of them, those who are here under another name, because the roster has changed."""
+    """The students who are among the submissions under another name, because the roster has changed."""
 
 
 def gone(source: Path, students: Sequence[Student], roster: Roster | None, before: Mapping[str, Taken]) -> Gone:
-    """Return who is not among the submissions.
+    """Return the students who are not among the submissions.
 
-    Of what was taken in from elsewhere only that counts which was this class: some of its students are in this one.
+    A student who was taken in from another source counts only if that source held the same class, which is assumed if
+    some of its students are in this class.
 
     Args:
-        source: of the submissions.
-        students: in it.
-        roster: of the course, if it has one.
+        source: the folder or zip of the submissions.
+        students: the students whose work is in it.
+        roster: the course's roster, if it has one.
         before: what was taken in before for this lab, by student.
     """
     here = {file_name(student.name) for student in students}
@@ -77,18 +79,18 @@ def stop(
     before: Mapping[str, Taken],
     accepted: Collection[Accepted],
 ) -> None:
-    """Stop where somebody would be lost or replaced, or is not in the roster, and nobody has accepted that.
+    """Stop if a student would be missing or replaced, or is not in the roster, and no person has accepted that.
 
     Args:
-        source: of the submissions.
-        students: in it.
-        reading: how they were found.
-        lost: who is not among them.
+        source: the folder or zip of the submissions.
+        students: the students whose work is in it.
+        reading: how the source was read.
+        lost: the students who are missing.
         before: what was taken in before for this lab, by student.
-        accepted: what somebody has said to be right.
+        accepted: the objections that a person has accepted.
 
     Raises:
-        KitError: nobody has.
+        KitError: there is an objection that no person has accepted.
     """
     strangers = [repr(student.name[:100]) for student in students if not student.listed]
     objections = {
@@ -125,7 +127,7 @@ def _missing(source: Path, lost: Sequence[str]) -> str:
 
 
 def _replaced(students: Sequence[Student], before: Mapping[str, Taken]) -> list[str]:
-    """Sentences about whose work would take the place of somebody else's."""
+    """Return sentences about submissions that would replace the work of somebody else."""
     told = []
     first: dict[str, Student] = {}
     for student in students:
@@ -151,39 +153,39 @@ import sys
 
 sys.exit("This folder is not a course: start nbgrader in the folder above it. Nothing was executed.")
 """
-"""nbgrader's configuration in the folder of what was taken in."""
+"""The nbgrader configuration that is put into the folder above the submissions."""
 
 
 _ONCE = re.compile(r"([.;] [Ii]t was left out)?\.$")
-"""The end of a sentence about what was left out, which goes without saying in a list of such."""
+"""The end of a sentence about something that was left out; a list of such things does not repeat it."""
 
 
 @dataclass
 class Collected:
-    """What was taken in."""
+    """What was taken in, and what was left out."""
 
     format: str = ""
-    """The learning platform that the submissions came from; empty for a class that none gave out."""
+    """The learning platform that the submissions came from; empty if they do not come from a platform."""
     around: tuple[str, ...] = ()
-    """The folders and zips in the source that lie around the class."""
+    """The folders and zips in the source that contain the whole class."""
     notebooks: dict[str, Path] = field(default_factory=dict)
-    """The notebook under `build/submitted`, by student; an empty file where nothing was handed in."""
+    """The notebook under `build/submitted`, by student; an empty file if the student handed in nothing."""
     refused: list[str] = field(default_factory=list)
-    """What was left out, and why, as sentences."""
+    """Sentences about what was left out, and why."""
     notes: list[str] = field(default_factory=list)
-    """What replaced what, who was late, and who has another name here, as sentences."""
+    """Sentences about files that were replaced, students who were late, and students who have another name here."""
     files: int = 0
-    """How many were seen."""
+    """The number of files that were seen."""
     students: int = 0
-    """Whose they are."""
+    """The number of students to whom the files belong."""
     unused: list[str] = field(default_factory=list)
-    """Notebooks that do not count and need not, each with the reason, in a few words."""
+    """Notebooks that do not count because another one does, each with a short reason."""
     companions: int = 0
-    """Files of students that are no notebooks."""
+    """The number of students' files that are no notebooks."""
 
     @property
     def line(self) -> str:
-        """How many files were seen, how many students they are, and which files were not used and why."""
+        """A summary: the numbers of files and students, and the files that were not used, with the reasons."""
         given = f", from {self.format}" if self.format else ""
         inside = f", inside {'/'.join(self.around)[:100]!r}" if self.around else ""
         told = f"{count(self.files, 'file')} of {count(self.students, 'student')}{given}{inside}."
@@ -210,17 +212,18 @@ def collect(
     """Take in a class.
 
     Args:
-        source: a folder or a zip, as a learning platform gives it out (`formats`), or with something of each student's
-            under the student's name; folders and zips around all of them do no harm.
-        lab: to take.
-        root: of the course. A file `roster.csv` there joins the platforms' names to those of the gradebook.
-        format_name: as what to read it; empty: as what it is.
-        accepted: what somebody has said to be right.
-        tried_in: a folder that gets the notebooks in place of the course, of which nothing is changed then.
+        source: a folder or a zip with the submissions, either as a learning platform exports them (`formats`), or with
+            a folder, zip or notebook for each student, named after the student. The class may be inside further folders
+            and zips.
+        lab: the lab to take in.
+        root: the course's folder. A file `roster.csv` in it maps the platform's names to those of the gradebook.
+        format_name: the format of the submissions; empty to detect it.
+        accepted: the objections that a person has accepted.
+        tried_in: a folder to which the notebooks are written instead of the course. The course is then not changed.
 
     Raises:
-        KitError: there is nothing to take in, or it can be read in two ways, or somebody would be lost or replaced. In
-            each case nothing is changed.
+        KitError: there is nothing to take in, or the source can be read in two ways, or a student would be missing or
+            replaced. In each case nothing is changed.
     """
     roster = read_roster(root / FILE_NAME) if (root / FILE_NAME).is_file() else None
     before = taken_before(root, lab)
@@ -250,7 +253,7 @@ def collect(
     taken: dict[str, Taken] = {}
     for name, (student, chosen, notebook) in handed_in.items():
         collected.notebooks[name] = _write(paths, name, lab, chosen, notebook, collected)
-        if own and name in before:  # what the platform said of it still holds
+        if own and name in before:  # what the platform said about the submission is still true
             taken[name] = before[name].model_copy(update={"left": False})
         else:
             taken[name] = _taken(source, reading, student, chosen)
@@ -280,7 +283,7 @@ def _title(reading: Reading) -> str:
 def _number_of_files(entry: Entry) -> int:
     try:
         return len(entry.files)
-    except NotUnderstoodError:  # it is a file that cannot be looked into
+    except NotUnderstoodError:  # the entry is a file that cannot be opened
         return 1
 
 
@@ -294,7 +297,7 @@ def _known(own: bool, roster: Roster | None, before: Mapping[str, Taken]) -> Kno
 
 
 def _one_each(students: Sequence[Student], reading: Reading, collected: Collected) -> list[Student]:
-    """The students under the names that they have here, each once; what stands in the way of that has been accepted."""
+    """Return each student once, under the student's name here. Conflicts between them have been accepted before."""
     found: dict[str, Student] = {}
     for student in students:
         name = file_name(student.name)
@@ -305,7 +308,7 @@ def _one_each(students: Sequence[Student], reading: Reading, collected: Collecte
             who = ", ".join(student.claims[0].owner.values())[:100]
             collected.refused.append(f"{who!r} matches no student in the roster, or more than one; it was left out.")
         elif name in found:
-            # What somebody has added beside a platform's files is the later one.
+            # A file that a person has added to those of the platform counts as the later one.
             kept, left = (here, found[name]) if student.claims[0].by_hand else (found[name], here)
             one, other = (given.claims[0].entry.name[:80] for given in (kept, left))
             collected.refused.append(f"{one!r} and {other!r} belong to the same student; the second was left out.")
@@ -324,7 +327,7 @@ def _one_each(students: Sequence[Student], reading: Reading, collected: Collecte
 def _handed_in(
     student: Student, lab: str, others: Collection[str], reading: Reading, collected: Collected
 ) -> tuple[Chosen, bytes] | None:
-    """What of a student's counts, and its bytes; None if nobody can say, which is told."""
+    """Return the notebook of a student that counts, and its bytes. If this is unclear, report it and return None."""
     who = student.name[:80]
     try:
         chosen = choose(student.claims, lab, others)
@@ -339,7 +342,7 @@ def _handed_in(
             return None
         return chosen, notebook
     for other in chosen.doubtful:
-        with contextlib.suppress(Exception):  # each way of packing fails in its own way
+        with contextlib.suppress(Exception):  # each kind of archive raises its own errors
             if other.read(NOTEBOOK_BYTES + 1) == notebook:
                 collected.unused.append(f"{'/'.join(other.path)[-200:]!r} (the same as {chosen.member.name[:80]!r})")
                 continue
@@ -362,16 +365,16 @@ def _handed_in(
 
 
 def _write(paths: CoursePaths, student: str, lab: str, chosen: Chosen, notebook: bytes, collected: Collected) -> Path:
-    """Write a student's notebook, and what nbgrader's exchange put beside it; return the notebook's place."""
+    """Write a student's notebook and the exchange's files beside it, and return the path of the notebook."""
     path = paths.submitted_notebook(student, lab)
-    # An unchanged file keeps its time: nbgrader and people can see that nothing new was handed in.
+    # An unchanged file keeps its modification time, so nbgrader and people see that nothing new was handed in.
     if _read(paths.submitted, [student, lab, path.name]) != notebook:
         _remove_links(paths.submitted, student, lab)
         write_beside(path, notebook)
     stamp = chosen.claim.handed_in.encode() or beside(chosen, timestamp.FILE_NAME, timestamp.MOST_BYTES)
     said = timestamp.moment(stamp) if stamp else ""
     if said is None:
-        collected.refused.append(f"{timestamp.FILE_NAME} of {student} is no date and time; it was left out.")
+        collected.refused.append(f"{timestamp.FILE_NAME} of {student} is not a date and time; it was left out.")
     _keep(paths.submitted, [student, lab, timestamp.FILE_NAME], said or "")
     secret = exchange_secret.secret(beside(chosen, exchange_secret.FILE_NAME, exchange_secret.MOST_BYTES))
     _keep(paths.submitted, [student, lab, exchange_secret.FILE_NAME], secret)
@@ -379,7 +382,7 @@ def _write(paths: CoursePaths, student: str, lab: str, chosen: Chosen, notebook:
 
 
 def _farewells(missing: Gone, before: Mapping[str, Taken]) -> list[str]:
-    """Sentences about who has left the class."""
+    """Return sentences about students who have left the class or have a new name."""
     left = [
         f"{student} is no longer among the submissions and was removed from grades.csv, the class page and the exports."
         " The gradebook keeps the grades."
@@ -394,7 +397,7 @@ def _farewells(missing: Gone, before: Mapping[str, Taken]) -> list[str]:
 
 
 def _keep(submitted: Path, parts: Sequence[str], text: str) -> None:
-    """Write what nbgrader looks for beside a notebook: when it was handed in, and how feedback on it is fetched."""
+    """Write a file that nbgrader expects beside a notebook, such as its timestamp; remove it if the text is empty."""
     path = submitted.joinpath(*parts)
     if not text:
         path.unlink(missing_ok=True)
@@ -409,7 +412,7 @@ def _read(folder: Path, parts: Sequence[str]) -> bytes | None:
 
 
 def _remove_links(submitted: Path, student: str, lab: str) -> None:
-    """Remove links that lie where a notebook is to be written: writing would follow them."""
+    """Remove links in the path to which a notebook will be written, because writing would follow them."""
     for path in (submitted / student, submitted / student / lab):
         if path.is_symlink():
             path.unlink()

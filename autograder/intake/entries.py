@@ -1,9 +1,9 @@
-"""What lies side by side in a class: folders, zips and files, whose names decide whose they are.
+"""The entries of a class: folders, zips and files side by side, whose names say to which student they belong.
 
-The names at this level were written by a learning platform, or by who put the class together. What lies inside an
-entry was written by a student, and decides nothing about whose it is.
+The names at this level were written by a learning platform, or by the person who put the class together. The names
+inside an entry were written by a student, so they do not decide to whom the entry belongs.
 
-A format makes claims of the entries: whose each is, by its name.
+A format turns entries into claims: a claim says to whom an entry belongs according to its name.
 """
 
 from __future__ import annotations
@@ -36,15 +36,15 @@ from autograder.intake.members import (
 from autograder.intake.words import some
 
 _MOST_OF_CLASS = 500_000
-"""Files in a zip; a class of five thousand repositories has fewer."""
+"""The number of files that a zip may have. A class of five thousand repositories has fewer."""
 
 
 class NotUnderstoodError(Exception):
-    """Something was handed in, and not in a way that says which notebook counts. Nobody gets a zero for that."""
+    """Something was handed in, but it is unclear which notebook counts. Nobody gets a zero because of this."""
 
 
 class Kind(Enum):
-    """What an entry is."""
+    """The kind of an entry."""
 
     FOLDER = auto()
     ZIP = auto()
@@ -52,102 +52,104 @@ class Kind(Enum):
     OTHER = auto()
     """A file of another kind."""
     LINK = auto()
-    """Which is not followed."""
+    """A link, which is not followed."""
 
 
 @dataclass(eq=False)
 class Entry:
-    """One thing in a class."""
+    """A folder, zip, file or link in a class."""
 
     path: tuple[str, ...]
-    """From the source on; the last part is its name."""
+    """The path in the source; the last part is the entry's name."""
     kind: Kind
     list_files: Callable[[], list[Member]]
     list_entries: Callable[[], list[Entry]]
     shown: str = ""
-    """How a sentence calls a link."""
+    """The path of a link, as a sentence shows it."""
 
     @property
     def name(self) -> str:
-        """Its name at the level of the class."""
+        """The entry's name at the level of the class."""
         return self.path[-1]
 
     @property
     def stem(self) -> str:
-        """Its name; of a file and a zip without the ending."""
+        """The entry's name; for a file or zip, without the ending."""
         return self.name.rpartition(".")[0] if self.kind in (Kind.ZIP, Kind.NOTEBOOK, Kind.OTHER) else self.name
 
     @property
     def is_work(self) -> bool:
-        """Whether it may hold a notebook."""
+        """Whether the entry may contain a notebook."""
         return self.kind in (Kind.FOLDER, Kind.ZIP, Kind.NOTEBOOK)
 
     @cached_property
     def files(self) -> list[Member]:
-        """The files in it; of a file, that file.
+        """The files in a folder or zip; for a file, the file itself.
 
         Raises:
-            NotUnderstoodError: it cannot be looked into, or is too large for anybody's work.
+            NotUnderstoodError: the entry cannot be read, or has more files than the work of a student can have.
         """
         try:
             return self.list_files()
         except NotUnderstoodError:
             raise
         except TooManyError as error:
-            raise NotUnderstoodError(f"cannot be anybody's work: {error}") from error
-        except Exception as error:  # a damaged zip raises many kinds
+            raise NotUnderstoodError(f"cannot be the work of one student: {error}") from error
+        except Exception as error:  # a damaged zip raises many kinds of errors
             why = getattr(error, "strerror", None) or error
             raise NotUnderstoodError(f"cannot be read ({why})") from error
 
     @cached_property
     def inside(self) -> list[Entry]:
-        """What lies in a folder or zip, if that should be one around a class; nothing if it cannot be read."""
+        """The entries in a folder or zip, which may contain a whole class; empty if it cannot be read."""
         try:
             return self.list_entries()
-        except Exception:  # a damaged zip raises many kinds; reading its files says which
+        except Exception:  # a damaged zip raises many kinds of errors, which are reported when its files are read
             return []
 
     def below(self, member: Member) -> tuple[str, ...]:
-        """Return a file's path in this folder or zip."""
-        # A zip counts as a folder of its name without the ending, so its path is as long.
+        """Return the path of a file in this folder or zip."""
+        # A zip counts as a folder with its name without the ending, so both paths have the same length.
         return member.path[len(self.path) :] if self.kind in (Kind.FOLDER, Kind.ZIP) else (member.name,)
 
 
 @dataclass
 class Listed:
-    """What lies in a source."""
+    """The contents of a source."""
 
     entries: list[Entry]
     bad: list[str] = field(default_factory=list)
-    """Names in a zip that lead nowhere in it."""
+    """Names in a zip that are no valid paths in it."""
 
     def bad_names(self) -> list[str]:
         """Return a sentence about the bad names, if there are any."""
         if not self.bad:
             return []
         names = some([repr(name[:60]) for name in self.bad], ", ")
-        return [f"The zip has entries whose names lead nowhere in it; they were left out: {names}."]
+        return [f"Some names in the zip are no valid paths; these entries were left out: {names}."]
 
 
 def listed(source: Path, lab: str) -> Listed:
-    """Return what lies in a folder or zip.
+    """Return the entries of a folder or zip.
 
     Raises:
-        KitError: it is neither, or no class.
+        KitError: the source is neither a folder nor a zip, or is an empty zip, or has too many files for a class.
     """
     if source.is_dir():
         return Listed(_of_folder(source, ()))
     try:
         archive = zipfile.ZipFile(source)
-    except Exception as error:  # a damaged directory raises more than BadZipFile
+    except Exception as error:  # a zip with a damaged directory raises more than BadZipFile
         raise KitError(
             f"{source} is neither a folder nor a zip that can be read ({error}).",
             f"Give a folder that holds `<student>/{lab}.ipynb` for each student, or a whole zip of it.",
         ) from error
     if not archive.infolist():
-        raise KitError(f"{source} is an empty zip: there is nothing in it.", "Download or pack it once more.")
+        raise KitError(f"{source} is an empty zip.", "Download or pack it again.")
     if len(archive.infolist()) > _MOST_OF_CLASS:
-        raise KitError(f"{source} has {len(archive.infolist())} entries; that is no class.", "Check the file.")
+        raise KitError(
+            f"{source} has {len(archive.infolist())} entries, which is too many for a class.", "Check the file."
+        )
     bad: list[str] = []
     files = list(in_zip(archive, bad))
     return Listed(grouped(files, (), list(empty_folders(archive))), bad)
@@ -171,10 +173,10 @@ def _of_folder(source: Path, parts: tuple[str, ...]) -> list[Entry]:
 
 
 def _few(files: Callable[[], Iterator[Member]]) -> list[Member]:
-    """The files of one student, with those in zips that can be read.
+    """Return the files of one student, including those in zips that can be read.
 
     Raises:
-        TooManyError: there are more than that can be.
+        TooManyError: there are more files than the work of a student can have.
     """
     found: list[Member] = []
     for file in files():
@@ -198,18 +200,18 @@ def _some(member: Member, held: Callable[[], list[Member]]) -> list[Member]:
     if not files:
         bad = bad_names(member)
         raise NotUnderstoodError(
-            f"is a zip whose names lead nowhere in it, such as {bad[0][:60]!r}" if bad else "is an empty zip"
+            f"is a zip in which no name is a valid path, such as {bad[0][:60]!r}" if bad else "is an empty zip"
         )
     return files
 
 
 def grouped(files: Sequence[Member], above: tuple[str, ...], empty: Sequence[tuple[str, ...]] = ()) -> list[Entry]:
-    """Return what lies side by side in a zip, or in a folder of it.
+    """Return the entries of a zip, or of a folder in it.
 
     Args:
-        files: of the zip.
-        above: the folder.
-        empty: paths of folders that the zip names, whether they hold anything or not.
+        files: the files of the zip.
+        above: the path of the folder.
+        empty: the paths of the folders that the zip lists, whether or not they contain anything.
     """
     depth = len(above)
     folders: dict[str, list[Member]] = {
@@ -238,35 +240,35 @@ def grouped(files: Sequence[Member], above: tuple[str, ...], empty: Sequence[tup
 
 @dataclass(frozen=True)
 class Claim:
-    """An entry that is somebody's."""
+    """A statement that an entry belongs to a student."""
 
     entry: Entry
     owner: Mapping[str, str]
-    """What the platform calls the student, by kind: `name`, `email`, `id`, `canvas_id`, `moodle_id`, `github`."""
+    """The platform's names for the student, by kind, such as `name`, `email`, `id`, `canvas_id` or `github`."""
     called: str = ""
-    """A file's name as the student gave it, without what the platform put before it."""
+    """The name that the student gave to the file, without what the platform put before it."""
     attempt: tuple[Any, ...] = ()
-    """Of two attempts of one student, the greater one is the later."""
+    """A value that is greater for a later attempt of the same student."""
     number: int = 0
-    """The same for the files of one attempt, where the platform counts them."""
+    """A number that is greater for a later file of the same attempt, if the platform counts them."""
     turn: tuple[Any, ...] = ()
-    """Of the files of one attempt, the one with the greatest counts."""
+    """The rank of the file in its attempt. The file with the greatest rank counts."""
     handed_in: str = ""
-    """Date and time, as nbgrader reads them; empty if nothing says so."""
+    """The date and time of the submission, in a form that nbgrader reads; empty if they are unknown."""
     late: bool = False
-    """The platform has marked it as late."""
+    """Whether the platform has marked the submission as late."""
     by_hand: bool = False
-    """Its name is not of the platform's form: somebody has added it."""
+    """Whether a person has added the entry, because its name does not have the platform's form."""
     only: str = ""
-    """The folder in the entry in which the work for this lab lies; empty: anywhere."""
+    """The folder in the entry that contains the work for this lab; empty if the work may be anywhere in the entry."""
 
 
 @dataclass
 class Recognised:
-    """What a format makes of the entries of a class."""
+    """The entries of a class, as a format understands them."""
 
     claims: list[Claim] = field(default_factory=list)
     strange: list[str] = field(default_factory=list)
-    """Sentences about what was recognised and is nobody's."""
+    """Sentences about entries that cannot be assigned to a student."""
     aside: list[Entry] = field(default_factory=list)
-    """What is of another lab, or tells whose the others are: it is not used, and needs not be."""
+    """Entries that are no submissions for this lab, such as work for another lab or the platform's own files."""

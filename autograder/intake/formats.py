@@ -1,8 +1,8 @@
-"""The formats in which learning platforms hand out submissions, each told by the names that only it gives.
+"""The formats in which learning platforms export submissions. Each is recognised by names that only it uses.
 
-A format reads the names at the level of the class, and says of each that has its form whose it is, in the words of the
-platform. It never looks at a name inside a student's folder or zip. Sources: the platforms' own documentation of their
-downloads.
+A format reads the names at the level of the class. For each name of its form, it says to which student the entry
+belongs, with the names that the platform uses. It does not rely on names inside a student's folder or zip, except to
+recognise GitHub repositories. The forms are taken from the platforms' documentation of their downloads.
 """
 
 from __future__ import annotations
@@ -28,49 +28,49 @@ _TEXT_BYTES = 2000
 
 @dataclass(frozen=True)
 class Format:
-    """One form of a class."""
+    """A form in which the submissions of a class are exported."""
 
     name: FormatName
     title: str
-    """Who gives it out."""
+    """The platform that exports this format."""
     read: Callable[[Sequence[Entry], str], Recognised]
-    """Says of the entries of a class, for a lab, whose they are."""
+    """A function that takes the entries of a class and the lab, and says to whom the entries belong."""
     around: re.Pattern[str] = re.compile(r"(?!)")
-    """Names of folders that only this platform puts around a class."""
+    """The names of folders that only this platform puts around a class."""
     certain: bool = True
-    """Nobody else gives such names; otherwise most of a class must have them."""
+    """Whether only this platform uses such names; if not, most entries of a class must have them."""
 
 
-# What a platform writes comes first in a name, and what the student called the file last: what has the form once more
-# is the student's.
+# In a name, the platform's part comes first and the student's name for the file comes last. If the form of the
+# platform's part occurs a second time, the second occurrence belongs to the student's name for the file.
 _CANVAS = re.compile(
     r"(?P<name>.+?)(?P<late>_LATE)?_(?P<user>\d+)_((?P<number>\d+)_(?P<file>.+)|(text|link)\.html)", re.IGNORECASE
 )
-"""`doejane_LATE_12345_678910_lab2_executors-1.ipynb`: who, the user, the upload, and the file as it was called."""
+"""`doejane_LATE_12345_678910_lab2_executors-1.ipynb`: the student, the ids of user and upload, and the file's name."""
 _MOODLE = re.compile(r"(?P<name>.+?)_(?P<id>\d+)_assignsubmission_[a-z]+(?:_(?P<file>.*)|\.html)?")
 _MOODLE_FOLDER = re.compile(r"(?P<name>.+)_(?P<id>\d+)_assignsubmission_[a-z]+_?")
-"""The folder `Jane Doe_12345_assignsubmission_file_`, or the beginning of a file's name: Moodle offers both."""
+"""The folder `Jane Doe_12345_assignsubmission_file_`. Moodle can also put this text before each file's name."""
 _MOODLE_ID = re.compile(r"_(\d+)_assignsubmission_[a-z]+")
 _BLACKBOARD = re.compile(r"(?P<head>.+?_(?P<user>[^_]+_*?))_attempt_(?P<when>\d{4}(?:-\d\d){5})(?:_(?P<file>.+)|\.txt)")
 """`Lab 2_jdoe_attempt_2026-11-20-18-30-00_lab2_executors.ipynb`, and a text with the same beginning."""
 _BLACKBOARD_NAME = re.compile(r"Name:.*\((?P<user>[^()]+)\)\s*")
 _SUBMISSION = re.compile(r"submission_(?P<number>\d+)")
-"""Gradescope's folders; whose they are stands in `submission_metadata.yml`."""
+"""Gradescope's folders. The file `submission_metadata.yml` says to whom they belong."""
 _INBOUND = re.compile(r"(?P<student>.+?)\+(?P<lab>[^+]+)\+(?P<when>\d{4}-\d\d-\d\d \d\d:\d\d:\d\d(\.\d+)?[^+]*)(\+.+)?")
-"""nbgrader's exchange: `inbound/jane+lab2_executors+2026-11-20 18:30:00.123456 UTC+Hc2x`. What stands behind the time
-keeps others from guessing the folder's name, and may be switched off; it says nothing about the student."""
+"""nbgrader's exchange: `inbound/jane+lab2_executors+2026-11-20 18:30:00.123456 UTC+Hc2x`. The random text after the
+time keeps others from guessing the folder's name. It can be switched off, and says nothing about the student."""
 _OF_NBGRADER = {"source", "release", "submitted", "autograded", "feedback", "solutions", "labs", "build", "gradebook"}
-"""Folders of a course beside nbgrader's folder of submissions."""
+"""The folders that a course may have beside nbgrader's folder of submissions."""
 
 
 def _forms(entries: Sequence[Entry], form: re.Pattern[str]) -> list[tuple[Entry, re.Match[str]]]:
-    """The entries whose names are of a form; a zip's and a folder's name counts without the ending."""
+    """Return the entries whose names match a form. The name of a zip counts without its ending."""
     named = ((entry, entry.stem if entry.kind is Kind.ZIP else entry.name) for entry in entries)
     return [(entry, match) for entry, name in named if entry.kind is not Kind.LINK and (match := form.fullmatch(name))]
 
 
 def canvas(entries: Sequence[Entry], lab: str) -> Recognised:
-    """Canvas, "Download submissions": one flat folder."""
+    """Recognise Canvas, "Download submissions": one folder with the files of all students."""
     found = Recognised()
     for entry, match in _forms(entries, _CANVAS):
         owner = {"canvas": match["name"], "canvas_id": match["user"]}
@@ -82,7 +82,7 @@ def canvas(entries: Sequence[Entry], lab: str) -> Recognised:
 
 
 def moodle(entries: Sequence[Entry], lab: str) -> Recognised:
-    """Moodle, "Download all submissions": a folder for each student and kind of submission, or files with its name."""
+    """Recognise Moodle, "Download all submissions": a folder for each student, or files with such names."""
     found = Recognised()
     folders = _forms([entry for entry in entries if entry.kind is Kind.FOLDER], _MOODLE_FOLDER)
     files = _forms([entry for entry in entries if entry.kind is not Kind.FOLDER], _MOODLE)
@@ -98,11 +98,11 @@ def moodle(entries: Sequence[Entry], lab: str) -> Recognised:
 
 
 def blackboard(entries: Sequence[Entry], lab: str) -> Recognised:
-    """Blackboard, "Assignment file download": one flat folder, with a text for each attempt."""
+    """Recognise Blackboard, "Assignment file download": one folder, with a text file for each attempt."""
     found = Recognised()
     matches = _forms(entries, _BLACKBOARD)
     heads = list({match["head"]: None for _, match in matches})
-    start = len(_common_start(heads, "_")) if len(heads) > 1 else 0  # the assignment; a user's name may have a `_`, too
+    start = len(_common_start(heads, "_")) if len(heads) > 1 else 0  # the assignment; user names may also contain `_`
     users = {match["head"]: user for entry, match in matches if (user := _blackboard_user(entry, match))}
     for entry, match in matches:
         user = users.get(match["head"]) or (match["head"][start:] if start else match["user"])
@@ -115,10 +115,10 @@ def blackboard(entries: Sequence[Entry], lab: str) -> Recognised:
 
 
 def _blackboard_user(entry: Entry, match: re.Match[str]) -> str:
-    """The user name in the text that Blackboard writes for an attempt: `Name: Jane Doe (jdoe)`; empty if not there."""
+    """Return the user name in Blackboard's text file of an attempt, `Name: Jane Doe (jdoe)`; empty if it has none."""
     if match["file"] or entry.kind is not Kind.OTHER:
         return ""
-    with contextlib.suppress(Exception):  # a damaged zip raises many kinds
+    with contextlib.suppress(Exception):  # a damaged zip raises many kinds of errors
         first = entry.files[0].read(_TEXT_BYTES).decode("utf-8-sig", "replace").splitlines()[:1]
         named = _BLACKBOARD_NAME.fullmatch(first[0]) if first else None
         if named and match["head"].endswith(f"_{named['user']}"):
@@ -127,7 +127,7 @@ def _blackboard_user(entry: Entry, match: re.Match[str]) -> str:
 
 
 def gradescope(entries: Sequence[Entry], lab: str) -> Recognised:
-    """Gradescope, "Export submissions": folders with numbers, and a file that says whose they are."""
+    """Recognise Gradescope, "Export submissions": numbered folders, and a file that says to whom they belong."""
     found = Recognised()
     metadata = next((entry for entry in entries if entry.name == _METADATA and entry.kind is Kind.OTHER), None)
     if metadata is None:
@@ -147,11 +147,11 @@ def gradescope(entries: Sequence[Entry], lab: str) -> Recognised:
 
 
 def _gradescope_metadata(entry: Entry) -> dict[str, tuple[list[dict[str, str]], str]] | None:
-    """Of each folder, who handed it in, which may be a group, and when; None if the file cannot be read."""
+    """Return who handed in each folder, which may be a group, and when; None if the file cannot be read."""
     try:
-        # Ruby writes its keys as symbols, `:name:`, which YAML takes for texts that begin with a colon.
+        # Ruby writes its keys as symbols, `:name:`. In YAML these are strings that begin with a colon.
         read = yaml.safe_load(entry.files[0].read(_METADATA_BYTES))
-    except Exception:  # what PyYAML does not understand raises many kinds
+    except Exception:  # PyYAML raises many kinds of errors
         return None
     told: dict[str, tuple[list[dict[str, str]], str]] = {}
     for folder, line in (read if isinstance(read, dict) else {}).items():
@@ -165,7 +165,7 @@ def _gradescope_metadata(entry: Entry) -> dict[str, tuple[list[dict[str, str]], 
 
 
 def classroom(entries: Sequence[Entry], lab: str) -> Recognised:
-    """GitHub Classroom: a repository for each student, whose name is that of the assignment and the student's."""
+    """Recognise GitHub Classroom: a repository for each student, named after the assignment and the student."""
     found = Recognised()
     folders = [entry for entry in entries if entry.kind in (Kind.FOLDER, Kind.ZIP) and "-" in entry.stem]
     with_lab = [entry for entry in folders if _has_labs(entry, lab)]
@@ -180,7 +180,10 @@ def classroom(entries: Sequence[Entry], lab: str) -> Recognised:
 
 
 def repositories(entries: Sequence[Entry], lab: str) -> Recognised:
-    """GitHub Classroom, if somebody says so: also a single repository, whose whole name is the student's then."""
+    """Recognise GitHub Classroom if a person named this format.
+
+    In this case even a single repository is accepted. Its whole name counts as the student's name.
+    """
     found = classroom(entries, lab)
     single = [entry for entry in entries if entry.kind in (Kind.FOLDER, Kind.ZIP) and _has_labs(entry, lab)]
     if not found.claims and len(single) == 1:
@@ -189,7 +192,7 @@ def repositories(entries: Sequence[Entry], lab: str) -> Recognised:
 
 
 def _has_labs(entry: Entry, lab: str) -> bool:
-    """Whether it is laid out as the repository that students get."""
+    """Return whether an entry has the layout of the repository that students get."""
     with contextlib.suppress(NotUnderstoodError):
         paths = [entry.below(member) for member in entry.files]
         return any(len(path) == 3 and path[:2] == ("labs", lab) and is_notebook(path[2]) for path in paths)
@@ -197,7 +200,7 @@ def _has_labs(entry: Entry, lab: str) -> bool:
 
 
 def exchange(entries: Sequence[Entry], lab: str) -> Recognised:
-    """nbgrader's exchange, before `collect`: the folder `inbound`."""
+    """Recognise the folder `inbound` of nbgrader's exchange, as it is before `nbgrader collect`."""
     found = Recognised()
     for entry, match in _forms([entry for entry in entries if entry.kind is Kind.FOLDER], _INBOUND):
         if match["lab"] == lab:
@@ -208,7 +211,7 @@ def exchange(entries: Sequence[Entry], lab: str) -> Recognised:
 
 
 def submitted(entries: Sequence[Entry], lab: str) -> Recognised:
-    """nbgrader's `submitted` folder in a course: `submitted/STUDENT/LAB/LAB.ipynb`."""
+    """Recognise nbgrader's `submitted` folder in a course: `submitted/STUDENT/LAB/LAB.ipynb`."""
     found = Recognised()
     folder = next((entry for entry in entries if entry.kind is Kind.FOLDER and entry.name == "submitted"), None)
     if folder is None:
@@ -221,16 +224,17 @@ def submitted(entries: Sequence[Entry], lab: str) -> Recognised:
 
 
 def by_lab(entries: Sequence[Entry], lab: str) -> Recognised:
-    """Return whose folders there are with one for the lab in them, as nbgrader's `submitted` and the kit's own have it.
+    """Recognise folders of students that contain a folder for the lab, as in nbgrader's `submitted` and the kit's own.
 
-    Whatever else lies there is read as in a class without a platform, but for folders with work for other labs only.
+    Folders that contain only folders for other labs are not used. All other entries are read as in a class without a
+    platform.
     """
     found = Recognised()
     others = []
     for entry in entries:
         paths = None
         if entry.kind is Kind.FOLDER:
-            with contextlib.suppress(NotUnderstoodError):  # which is said when it is looked into
+            with contextlib.suppress(NotUnderstoodError):  # this is reported later, when the entry is read
                 paths = [entry.below(member) for member in entry.files]
         if paths is not None and any(path[0] == lab and len(path) > 1 for path in paths):
             found.claims.append(Claim(entry, {"id": entry.name}, only=lab))
@@ -245,7 +249,7 @@ def by_lab(entries: Sequence[Entry], lab: str) -> Recognised:
 
 
 def plain(entries: Sequence[Entry], lab: str) -> Recognised:
-    """No platform: a folder, a zip or a notebook for each student, with the student's name."""
+    """Recognise a class without a platform: a folder, zip or notebook for each student, named after the student."""
     found = Recognised()
     for entry in entries:
         student = owner_of(entry, lab)
@@ -260,12 +264,12 @@ def plain(entries: Sequence[Entry], lab: str) -> Recognised:
             because = "because it has the name of the lab"
             found.strange.append(f"It is not clear to whom {entry.name[:80]!r} belongs, {because}.")
         elif entry.name != ROSTER:
-            found.strange.append(f"{entry.name[:80]!r} is no student's folder, notebook or zip.")
+            found.strange.append(f"{entry.name[:80]!r} is not a student's folder, notebook or zip.")
     return found
 
 
 def owner_of(entry: Entry, lab: str) -> str | None:
-    """Return the student after whom something in a class without a platform is named; None if it is nobody's."""
+    """Return the student after whom an entry is named in a class without a platform; None if it names no student."""
     if entry.kind is Kind.FOLDER:
         return entry.name
     if entry.kind not in (Kind.ZIP, Kind.NOTEBOOK) or is_of_lab(entry.stem, lab):
@@ -274,7 +278,7 @@ def owner_of(entry: Entry, lab: str) -> str | None:
 
 
 def _common_start(names: Sequence[str], end: str) -> str:
-    """What all names begin with, up to a character at which it may end; empty if that is nothing, or all of one."""
+    """Return the beginning that all names share, up to and including the last `end` in it; empty if there is none."""
     start = names[0] if names else ""
     for name in names:
         while not name.startswith(start):
@@ -295,6 +299,6 @@ PLATFORMS: Mapping[str, Format] = {
         Format(FormatName.CLASSROOM, "GitHub Classroom", classroom, re.compile(r".+-submissions(-.+)?"), certain=False),
     )
 }
-"""Those that give names of their own."""
+"""The formats of platforms, by the names of the formats."""
 CLASSROOM = replace(PLATFORMS["classroom"], read=repositories)
-"""The same, where somebody has named it."""
+"""The format of GitHub Classroom for the case that a person named it."""

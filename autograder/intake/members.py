@@ -1,4 +1,4 @@
-"""The files in what was handed in, a folder or a zip, with zips inside taken for folders. No link is followed."""
+"""List and read the files in a folder or zip. Zips inside it count as folders, and links are not followed."""
 
 from __future__ import annotations
 
@@ -15,45 +15,47 @@ from pathlib import Path, PurePosixPath
 from autograder.core.files import read_plain
 
 MOST = 20_000
-"""More files than this are no student's work."""
+"""The number of files that the work of a student can have."""
 _DEPTH = 32
-"""Folders inside each other that are looked into."""
+"""The deepest nesting of folders that is read."""
 _ZIP_BYTES = 64 * 1024 * 1024
-"""The largest zip inside another, in bytes; one student's repository."""
+"""The size of the largest zip inside another, in bytes. Such a zip is the repository of one student."""
 _ZIPS = 3
-"""Zips inside each other that are looked into: a class in a folder's zip, a student's, and what they packed."""
+"""The deepest nesting of zips that is read: the zip of a class, that of a student, and one that the student packed."""
 _OF_SYSTEMS = ("__MACOSX", ".git", ".DS_Store")
-"""Folders that a system or a program made, with nothing in them that somebody handed in."""
+"""Names that an operating system or a program creates, and that contain nothing that a student handed in."""
 
 
 class TooManyError(Exception):
-    """It holds more files than anybody's work."""
+    """A folder or zip has more files than the work of a student can have."""
 
 
 @dataclass(frozen=True)
 class Member:
-    """One file, or a link or something else that cannot be read as one."""
+    """A file, or a link or something else that cannot be read like a file."""
 
     path: tuple[str, ...]
-    """From the source on; a zip inside is a folder of its name without `.zip`."""
+    """The path in the source. A zip in it counts as a folder with the zip's name without `.zip`."""
     read: Callable[[int], bytes]
-    """At most so many bytes of it. Raises OSError, or what a damaged zip raises."""
+    """A function that reads at most so many bytes. It raises OSError, or the errors of a damaged zip."""
 
     @property
     def name(self) -> str:
-        """The file's own name."""
+        """The file's own name, without its folders."""
         return self.path[-1]
 
 
 def in_folder(source: Path, parts: tuple[str, ...]) -> Iterator[Member]:
-    """Give the files of a folder, with those below it.
+    """Yield the files of a folder and of the folders below it.
+
+    A folder below it that cannot be read is yielded as a file that cannot be read.
 
     Args:
-        source: from which paths count.
-        parts: the folder's path in it.
+        source: the folder to which the paths are relative.
+        parts: the path of the folder in the source.
 
     Raises:
-        OSError: the folder cannot be looked into. One below it is then a file that cannot be read.
+        OSError: the folder itself cannot be read.
     """
     for entry in sorted(os.scandir(source.joinpath(*parts)), key=lambda entry: entry.name):
         path = (*parts, entry.name)
@@ -73,22 +75,22 @@ def _refuse(error: OSError, most: int) -> bytes:
 
 
 def is_unseen(name: str) -> bool:
-    """Whether a file or folder is none that somebody handed in: a system or a packer put it there."""
+    """Return whether an operating system or a packing program added this file or folder, and not the student."""
     return name in _OF_SYSTEMS or name.startswith("._")
 
 
 def is_hidden(path: tuple[str, ...]) -> bool:
-    """Whether a listing would not show it, or what it lies in, such as a checkpoint of JupyterLab's."""
+    """Return whether a file or one of its folders is hidden, such as a checkpoint of JupyterLab."""
     return any(part.startswith(".") for part in path)
 
 
 def in_zip(archive: zipfile.ZipFile, bad: list[str], above: tuple[str, ...] = ()) -> Iterator[Member]:
-    """Give the files of a zip, which stays open for as long as they are read.
+    """Yield the files of a zip, which must stay open while they are read.
 
     Args:
         archive: the zip.
-        bad: gets the names that lead nowhere in it, or out of it.
-        above: the folders that the zip counts as being in.
+        bad: a list to which names are added that are no valid paths in the zip or that lead out of it.
+        above: the path of the folder that the zip counts as.
     """
     for info in archive.infolist():
         path = _path(info)
@@ -99,14 +101,14 @@ def in_zip(archive: zipfile.ZipFile, bad: list[str], above: tuple[str, ...] = ()
 
 
 def empty_folders(archive: zipfile.ZipFile) -> Iterator[tuple[str, ...]]:
-    """Give the paths of the folders that a zip names as such."""
+    """Yield the paths of the folders that a zip lists."""
     for info in archive.infolist():
-        if (path := _path(info)) and info.is_dir():  # Python cannot say it of a name without characters
+        if (path := _path(info)) and info.is_dir():  # the path is checked first: `is_dir` fails if the name is empty
             yield path
 
 
 def _path(info: zipfile.ZipInfo) -> tuple[str, ...]:
-    """Where in a zip a member lies; empty if its name leads nowhere in it, or out of it."""
+    """Return the path of a member in a zip; empty if its name is no valid path or leads out of the zip."""
     path = PurePosixPath(_name(info).replace("\\", "/"))
     leads_out = path.is_absolute() or ".." in path.parts or "\0" in info.orig_filename
     return () if leads_out else path.parts
@@ -114,13 +116,16 @@ def _path(info: zipfile.ZipInfo) -> tuple[str, ...]:
 
 def _read(archive: zipfile.ZipFile, info: zipfile.ZipInfo, most: int) -> bytes:
     if stat.S_IFMT(info.external_attr >> 16) not in (0, stat.S_IFREG):
-        raise OSError("it is a link or something else that is no file")
+        raise OSError("it is a link or something else, not a file")
     with archive.open(info) as file:
         return file.read(most)
 
 
 def _name(info: zipfile.ZipInfo) -> str:
-    """A member's name; some packers write UTF-8 without saying so, which then is taken for the DOS character set."""
+    """Return the name of a member.
+
+    Some programs write names in UTF-8 without marking them, and Python then decodes them in the DOS character set.
+    """
     if not info.flag_bits & 0x800:
         try:
             return info.filename.encode("cp437").decode("utf-8")
@@ -130,52 +135,58 @@ def _name(info: zipfile.ZipInfo) -> str:
 
 
 def is_zip(name: str) -> bool:
-    """Whether a file is a zip by its name."""
+    """Return whether a file is a zip, according to its name."""
     return name.lower().endswith(".zip")
 
 
 def is_notebook(name: str) -> bool:
-    """Whether a file is a notebook by its name."""
+    """Return whether a file is a notebook, according to its name."""
     return name.lower().endswith(".ipynb")
 
 
 def looked_into(file: Member) -> list[Member]:
-    """Return a file, or what it holds if it is a zip that can be read.
+    """Return a file, or the files in it if it is a zip that can be read.
 
     Raises:
-        TooManyError: it holds more than anybody's work.
+        TooManyError: the zip has more files than the work of a student can have.
     """
     return _inner(file, file, _ZIPS)
 
 
 def unpacked(zipped: Member) -> list[Member]:
-    """Return the files of a zip, and of zips in it that can be read, which count as folders.
+    """Return the files of a zip. Zips in it that can be read count as folders.
 
-    What a zip holds is read out of it anew for each file that is wanted: large zips do not fill the memory.
+    The zip is opened again for each file that is read, so that large zips do not fill the memory.
 
     Raises:
-        OSError, zipfile.BadZipFile: or what else a damaged zip raises.
-        TooManyError: it holds more than anybody's work.
+        OSError, zipfile.BadZipFile: the zip cannot be read. A damaged zip may also raise other errors.
+        TooManyError: the zip has more files than the work of a student can have.
     """
     return _held(zipped, zipped, _ZIPS)
 
 
 def bad_names(zipped: Member) -> list[str]:
-    """Return the names in a zip that lead nowhere in it; raises as `unpacked`."""
+    """Return the names in a zip that are no valid paths in it. It raises the same errors as `unpacked`."""
     bad: list[str] = []
     list(in_zip(_opened(zipped), bad))
     return bad
 
 
 def packed_in(zipped: Member) -> list[Member]:
-    """Return the files of a zip, among which other zips are files; raises as `unpacked`."""
+    """Return the files of a zip, where zips inside it count as files. It raises the same errors as `unpacked`."""
     above = (*zipped.path[:-1], zipped.name[: -len(".zip")])
     files = enumerate(in_zip(_opened(zipped), [], above))
     return [Member(file.path, partial(_read_again, zipped, above, number)) for number, file in files]
 
 
 def _held(zipped: Member, now: Member, depth: int) -> list[Member]:
-    """The files of a zip, which is `now` in an archive that is open, and `zipped` when that is closed again."""
+    """Return the files of a zip and of the zips in it.
+
+    Args:
+        zipped: the zip as it is read later, when the archive around it is closed.
+        now: the same zip as it is read now, while the archive around it is open.
+        depth: how many levels of zips may be read.
+    """
     above = (*zipped.path[:-1], zipped.name[: -len(".zip")])
     files: list[Member] = []
     for number, file in enumerate(in_zip(_opened(now), [], above)):
@@ -187,19 +198,19 @@ def _held(zipped: Member, now: Member, depth: int) -> list[Member]:
 
 
 def _inner(later: Member, now: Member, depth: int) -> list[Member]:
-    """A file, or what it holds if it is a zip that can be read."""
+    """Return a file, or the files in it if it is a zip that can be read. For the arguments see `_held`."""
     if not is_zip(now.name) or not depth:
         return [later]
     try:
         return _held(later, now, depth) or [later]
     except TooManyError:
         raise
-    except Exception:  # a damaged zip raises many kinds; it is then a file as any other
+    except Exception:  # a damaged zip raises many kinds of errors; it then counts as an ordinary file
         return [later]
 
 
 def _read_again(zipped: Member, above: tuple[str, ...], number: int, most: int) -> bytes:
-    """Read one file of a zip, known by its place: two may have one name."""
+    """Read one file of a zip, given by its number, because two files may have the same name."""
     for at, file in enumerate(in_zip(_opened(zipped), [], above)):
         if at == number:
             return file.read(most)

@@ -1,4 +1,4 @@
-"""What somebody may say of a class: as what it is to be read, and what need not stop it."""
+"""Options for taking in a class: the format of the submissions, and which objections a person has accepted."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from enum import StrEnum
 
 
 class FormatName(StrEnum):
-    """As what a class is read; one for each of `formats`."""
+    """The name of a format in which a class can be read; `formats` has one format for each name."""
 
     GRADESCOPE = "gradescope"
     EXCHANGE = "exchange"
@@ -19,11 +19,11 @@ class FormatName(StrEnum):
 
 
 class Accepted(StrEnum):
-    """What stops an intake until somebody has said that it is right."""
+    """A reason to stop before anything is taken in, until a person has accepted it."""
 
     SMALLER = "smaller"
-    """Students of the roster, or of the last time, are not among the submissions."""
+    """Students from the roster, or from the last run, are not among the submissions."""
     REPLACED = "replaced"
-    """Work would take the place of other work, and nothing says that both are of one student."""
+    """A submission would replace another one, and nothing says that both belong to the same student."""
     ROSTER = "roster"
-    """Somebody is not in the roster."""
+    """A submission belongs to somebody who is not in the roster."""

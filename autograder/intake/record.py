@@ -1,4 +1,7 @@
-"""Who is in a lab's class, and what the learning platform called each submission: kept for what goes back to it."""
+"""Record who is in a lab's class and what the learning platform called each submission.
+
+The exports that go back to the platform need this, and so does the next run, to find out who is missing.
+"""
 
 from __future__ import annotations
 
@@ -12,39 +15,38 @@ from autograder.core.files import write_beside
 from autograder.course.paths import CoursePaths
 
 _OF_PLATFORMS = ("canvas_id", "moodle_id", "repository", "email")
-"""Kinds of names that mean one person on a platform, the surest first."""
+"""The kinds of names that identify one person on a platform, the most reliable first."""
 _IN_EACH_LAB = ("moodle_id",)
-"""Those that a platform gives anew for each assignment."""
+"""The kinds of names that are different for each assignment."""
 
 
 class Taken(BaseModel):
-    """One student's submission, as it came in."""
+    """What is recorded about the submission of one student."""
 
     model_config = ConfigDict(extra="forbid")
 
     source: str
     """The folder or zip that it was taken from."""
     around: str = ""
-    """The folders and zips in the source that lay around the class."""
+    """The path of the folders and zips in the source that contained the whole class."""
     file: str = ""
-    """The notebook's path in there, with the platform's names; empty where no platform gave it out."""
+    """The path of the notebook in the source, with the platform's names; empty if it does not come from a platform."""
     owner: dict[str, str] = {}
-    """What the platform calls the student, by kind."""
+    """The platform's names for the student, by kind."""
     late: bool = False
-    """The platform has marked it as late."""
+    """Whether the platform has marked the submission as late."""
     left: bool = False
-    """The student was not among the submissions when they were taken in once more, or never was, and somebody has said
-    that this is right."""
+    """Whether the student has left the class: either is missing, which a person has accepted, or has a new name."""
 
 
 _CLASS = TypeAdapter(dict[str, Taken])
 
 
 def read_class(root: Path, lab: str) -> dict[str, Taken]:
-    """Return what is known of a lab's submissions, by student; empty if nothing was taken in yet.
+    """Return what is recorded about a lab's submissions, by student; empty if nothing has been taken in yet.
 
     Raises:
-        KitError: it cannot be understood, so that nobody could say who is missing.
+        KitError: the record cannot be read, so that it is unknown who is missing.
     """
     path = CoursePaths(root).taken(lab)
     try:
@@ -52,7 +54,7 @@ def read_class(root: Path, lab: str) -> dict[str, Taken]:
     except FileNotFoundError:
         return {}
     except (OSError, ValidationError) as error:
-        why = error.strerror if isinstance(error, OSError) else "it is not as this version of the kit writes it"
+        why = error.strerror if isinstance(error, OSError) else "this version of the kit uses another form"
         raise KitError(
             f"{path}, which records who was in the class in the last run, cannot be read: {why}.",
             "Replace it with an earlier copy. If you have none, move the file away; the next run then cannot tell who"
@@ -61,21 +63,21 @@ def read_class(root: Path, lab: str) -> dict[str, Taken]:
 
 
 def left_class(root: Path, lab: str) -> set[str]:
-    """Return who has left the class of a lab."""
+    """Return the students who have left the class of a lab."""
     return {student for student, taken in read_class(root, lab).items() if taken.left}
 
 
 def person(owner: Mapping[str, str]) -> tuple[str, str] | None:
-    """Return by what a platform tells one person from all others; None if a name is all that is known."""
+    """Return the kind and value of the name that identifies a person on a platform; None if there is no such name."""
     return next(((kind, owner[kind]) for kind in _OF_PLATFORMS if owner.get(kind)), None)
 
 
 def known_persons(root: Path, lab: str) -> dict[tuple[str, str], str]:
-    """Return what the persons of a course's platforms are called here, as taken in before, for this lab or another."""
+    """Return the names in the gradebook of all persons who were taken in before, for this lab or for another."""
     known: dict[tuple[str, str], str] = {}
     folder = CoursePaths(root).taken(lab).parent
     others = [path.stem for path in sorted(folder.glob("*.json")) if path.stem != lab]
-    for name in (*others, lab):  # what this lab's class says counts most
+    for name in (*others, lab):  # this lab's record comes last, so it takes precedence
         for student, taken in read_class(root, name).items():
             who = person(taken.owner)
             if who is not None and (name == lab or who[0] not in _IN_EACH_LAB):
@@ -84,15 +86,15 @@ def known_persons(root: Path, lab: str) -> dict[tuple[str, str], str]:
 
 
 def keep_class(root: Path, lab: str, taken: Mapping[str, Taken], gone: Mapping[str, Taken]) -> None:
-    """Note what was taken in.
+    """Record what was taken in, and remove the feedback pages of students who have left.
 
-    Grades of who has left stay in the gradebook, and count again when the student is back.
+    Their grades stay in the gradebook, and count again if they come back.
 
     Args:
-        root: of the course.
-        lab: that the submissions answer.
-        taken: what is known of each, by student.
-        gone: who is not in the class any more.
+        root: the course's folder.
+        lab: the lab to which the submissions belong.
+        taken: what is known about each submission, by student.
+        gone: the students who are no longer in the class.
     """
     known = read_class(root, lab)
     for student in gone:

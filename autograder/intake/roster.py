@@ -1,9 +1,10 @@
-"""The roster: a table of the class, by which a platform's names become the names of the gradebook.
+"""The roster: a table of the class that maps a platform's names to the names in the gradebook.
 
-A CSV file with a line of headings, or the roster that GitHub Classroom gives out. `id` is the name in the gradebook;
-`name`, `email`, `section`, `canvas_id`, `moodle_id`, `github` and others are what platforms call the same student.
+The roster is a CSV file with a line of headings, or the roster that GitHub Classroom exports. The column `id` is the
+name in the gradebook. Columns such as `name`, `email`, `canvas_id`, `moodle_id` and `github` hold the names of the same
+student on platforms.
 
-Without a roster students are called as they were before, or as the platform calls them.
+Without a roster, students keep the names that they had before, or get the names that the platform uses.
 """
 
 from __future__ import annotations
@@ -26,17 +27,17 @@ from autograder.intake.record import person
 
 FILE_NAME = "roster.csv"
 _OF_CLASSROOM = {"identifier": "id", "github_username": "github"}
-"""What GitHub Classroom calls the columns of the roster that it gives out."""
+"""The names of the columns in the roster that GitHub Classroom exports, with the kit's names for them."""
 
 
 class Roster:
     """The students of a class."""
 
     def __init__(self, students: Mapping[str, Mapping[str, str]]) -> None:
-        """Take them.
+        """Index the students by all of their names.
 
         Args:
-            students: what is known of each, by heading, by their id.
+            students: for each student's id, the values in the roster by heading.
         """
         self.students = students
         self._known: dict[str, set[str]] = {}
@@ -46,31 +47,34 @@ class Roster:
                     self._known.setdefault(word, set()).add(student)
 
     def student(self, owner: Mapping[str, str]) -> str | None:
-        """Return whom a platform means; None if nobody, or more than one.
+        """Return the id of the student that a platform's names belong to; None if there is no or more than one match.
 
         Args:
-            owner: what it calls the student, by kind.
+            owner: the platform's names for the student, by kind.
         """
-        if owner.get("id") in self.students:  # even if another student is called so elsewhere
+        if owner.get("id") in self.students:  # even if another student has this name on a platform
             return owner["id"]
         for kind in ("id", "canvas_id", "moodle_id", "email", "github", "name", "canvas"):
             for word in _ways(kind, owner.get(kind, "")):
                 found = self._known.get(word, set())
                 if len(found) == 1:
                     return next(iter(found))
-        # The name of a repository ends with its owner's, either of which may have hyphens.
+        # The name of a repository ends with the name of its owner, and both parts may contain hyphens.
         name = owner.get("repository", "").partition("-")[2]
         return self.student({"github": name, "repository": name}) if name else None
 
 
 def _ways(kind: str, value: str) -> set[str]:
-    """The forms in which a value may be met: numbers of platforms by their kind, names by their words in any order."""
+    """Return the normalised forms of a value by which it is found.
+
+    A platform's number includes its kind, and the words of a name may be in any order.
+    """
     plain = unicodedata.normalize("NFKC", value).strip().casefold()
     if not plain:
         return set()
     if kind.endswith("_id"):
         return {f"{kind} {plain}"}
-    if kind == "canvas":  # letters alone, the family name first; some take the accents away
+    if kind == "canvas":  # only letters, with the family name first; sometimes without accents
         return {f"canvas {plain}", f"canvas {_without_accents(plain)}"}
     if kind == "name":
         words = plain.replace(",", " ").split()
@@ -87,10 +91,10 @@ def _without_accents(word: str) -> str:
 
 
 def read_roster(path: Path) -> Roster:
-    """Read a roster, as an editor or a spreadsheet writes it: Excel has its own encodings and separators.
+    """Read a roster that was saved by an editor or a spreadsheet. Excel uses other encodings and separators.
 
     Raises:
-        KitError: it cannot be read, has no column `id`, names nobody, or one id twice.
+        KitError: the roster cannot be read, has no column `id`, lists no student, or lists an id twice.
     """
     try:
         text = _decoded(path.read_bytes()).lstrip("\r\n")
@@ -112,27 +116,27 @@ def read_roster(path: Path) -> Roster:
     for number, line in lines:
         given = {(key or "").strip().lower(): value.strip() for key, value in line.items() if isinstance(value, str)}
         named = {other.get(key, key): value for key, value in given.items()}
-        # Spreadsheets give a column of numbers in which one is missing a decimal point: 4711.0.
+        # If one number in a column is missing, spreadsheets write the others with a decimal point: 4711.0.
         known = {
             key: re.sub(r"^(\d+)\.0+$", r"\1", value) if key.endswith("_id") else value for key, value in named.items()
         }
-        if not any(known.values()):  # spreadsheets write lines of nothing but commas
+        if not any(known.values()):  # spreadsheets may write lines that contain only commas
             continue
         student = known.get("id", "")
         if not student:
             raise KitError(f"Line {number} of the roster {path} has no `id`.", "Add an `id`, or remove this line.")
         if student in students:
             raise KitError(
-                f"The roster {path} names {student!r} twice, the second time in line {number}.", "Keep one of the two."
+                f"The roster {path} lists {student!r} twice, the second time in line {number}.", "Keep one of the two."
             )
         students[student] = known
     if not students:
-        raise KitError(f"The roster {path} names nobody.", "Write a line for each student, or remove the file.")
+        raise KitError(f"The roster {path} lists nobody.", "Write a line for each student, or remove the file.")
     return Roster(students)
 
 
 def _decoded(content: bytes) -> str:
-    """The text of a file in UTF-8, in Excel's UTF-16, or in the character set of a Western Windows."""
+    """Decode a file in UTF-8, in Excel's UTF-16, or in the character set of Western versions of Windows."""
     if content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         return content.decode("utf-16")
     try:
@@ -142,32 +146,32 @@ def _decoded(content: bytes) -> str:
 
 
 _NOT_FIRST = " .@+-,()"
-"""To a shell, a spreadsheet or a listing these mean something at the beginning of a name."""
+"""Characters that have a special meaning for a shell, a spreadsheet or a listing at the beginning of a name."""
 _NOT_LAST = " ."
 _NAME_BYTES = 120
-"""A longer name is shortened: a gradebook takes 128 characters, a file's name 255 bytes with what is put around it."""
+"""The longest name in bytes. The gradebook allows 128 characters, and a file's name with all its parts 255 bytes."""
 
 
 @dataclass
 class Student:
-    """One student, and what is claimed to be theirs."""
+    """A student and the entries that belong to the student."""
 
     name: str
     claims: list[Claim] = field(default_factory=list)
     listed: bool = True
-    """The roster has them, or there is none."""
+    """Whether the student is in the roster; also True if there is no roster."""
 
 
 def named(claims: Sequence[Claim], roster: Roster | None, before: Mapping[tuple[str, str], str]) -> list[Student]:
-    """Return the students of a class, each owner by one name; several may have come to the same name.
+    """Return the students of a class, one for each owner. Two of them may have the same name.
 
-    Who was taken in before keeps their name, whoever hands in besides. Where nothing says which of two entries of one
-    owner is the later one, each counts as a student of that name.
+    Students who were taken in before keep their names, even if others with the same name hand in later. If nothing says
+    which of two entries of one owner is the later one, each of them becomes a student with that name.
 
     Args:
-        claims: whose each entry is.
-        roster: of the course, if it has one.
-        before: what the persons of the platforms were called before.
+        claims: for each entry, to whom it belongs.
+        roster: the course's roster, if it has one.
+        before: the names in the gradebook of persons who were taken in before.
     """
     by_owner: dict[tuple[object, ...], list[Claim]] = {}
     for claim in claims:
@@ -182,17 +186,17 @@ def named(claims: Sequence[Claim], roster: Roster | None, before: Mapping[tuple[
 
 
 def _by_roster(owners: Sequence[Mapping[str, str]], roster: Roster) -> list[str]:
-    """The roster's names; empty for whom it does not have."""
+    """Return the roster's ids of the owners; an empty one if the roster does not have the owner."""
     found = []
     for owner in owners:
-        plain = set(owner) == {"id"}  # a folder's name may be any of them
+        plain = set(owner) == {"id"}  # the name of a folder may be any kind of name
         ways = dict.fromkeys(("id", "email", "name", "github"), owner["id"]) if plain else owner
         found.append(roster.student(ways) or "")
     return found
 
 
 def _by_platform(owners: Sequence[Mapping[str, str]], before: Mapping[tuple[str, str], str]) -> list[str]:
-    """The platform's names; with its number for a person where two have one name."""
+    """Return the platform's names of the owners; if two persons have the same name, with the platform's number."""
     persons = [person(owner) for owner in owners]
     given = [given_name(owner) for owner in owners]
     many = Counter(name for name, who in zip(given, persons, strict=True) if who is not None)
@@ -211,11 +215,11 @@ def given_name(owner: Mapping[str, str]) -> str:
 
 
 def file_name(given: str) -> str:
-    """The name by which a student is known here, which files and pages can have; empty if nothing was given.
+    """Return a student's name in a form that is safe as the name of a file or page; empty if `given` is empty.
 
-    Accents are joined to their letters: a Mac writes `José` with two characters where other systems write one. A name
-    that is long, or has characters that would mean something to a program, is made different from all others by a
-    digest of the whole.
+    Accents are combined with their letters, because a Mac writes the `é` in `José` as two characters and other systems
+    as one. If a name is too long or contains characters with a special meaning, it is changed, and a digest of the
+    original name is added so that it stays different from all others.
     """
     name = unicodedata.normalize("NFC", given)
     plain = "".join(character if _in_names(character) else "_" for character in name)
@@ -230,5 +234,5 @@ def file_name(given: str) -> str:
 
 
 def _in_names(character: str) -> bool:
-    """Letters and digits of any script with their marks, and what stands between the parts of names."""
+    """Return whether a name may contain this character: letters, digits and marks of any script, and separators."""
     return unicodedata.category(character)[0] in "LMN" or character in "_ .@+-,'\u2018\u2019()"

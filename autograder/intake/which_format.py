@@ -1,7 +1,7 @@
-"""Decides as what a class is to be read: which platform gave it out, and what lies around it.
+"""Decide how a class is read: which platform exported it, and which folders and zips are around it.
 
-A class without a platform is always one of the readings. Where two are possible, nobody guesses: the reading stops with
-a sentence, and an option names the format.
+A class without a platform is always one of the possible readings. If two readings are possible, the kit does not guess.
+It stops with a message, and an option of the command names the format.
 """
 
 from __future__ import annotations
@@ -19,38 +19,38 @@ from autograder.intake.which_notebook import choose, is_of_lab
 from autograder.intake.words import some
 
 _MOST_AROUND = 3
-"""So many folders and zips may lie around a class."""
+"""The number of folders and zips that may be around a class, one inside the other."""
 
 
 @dataclass
 class Reading:
-    """A class, as it is read."""
+    """A way to read the entries of a class."""
 
     format: Format
     recognised: Recognised
     around: tuple[str, ...] = ()
-    """The folders and zips around it, in the source."""
+    """The folders and zips in the source that are around the class."""
     notes: list[str] = field(default_factory=list)
-    """Who was added by hand, as sentences."""
+    """Sentences about students whose work was added by hand."""
 
     @property
     def owners(self) -> list[str]:
-        """What the students are called, each once."""
+        """The names of the students; each is listed once."""
         return list(dict.fromkeys(given_name(claim.owner) for claim in self.recognised.claims))
 
 
 @dataclass(frozen=True)
 class Known:
-    """What is known of a class before it is read."""
+    """What is known about a class before it is read."""
 
     is_student: Callable[[str], bool] = lambda _: False
-    """Whether the roster has a student of that name, or one was taken in before."""
+    """A function that returns whether a student with this name is in the roster or was taken in before."""
     roster: bool = False
-    """There is a roster, so that whoever is not in it is no student."""
+    """Whether there is a roster, so that somebody who is not in it is no student."""
     own: bool = False
-    """The source is the course's own folder of what was taken in, which holds the work for every lab."""
+    """Whether the source is the course's own folder of submissions, which holds the work for every lab."""
     around: Collection[str] | None = None
-    """The folders and zips that lay around the class when it was taken in before; None: it was not."""
+    """The folders and zips that were around the class when it was taken in before; None if it was not taken in."""
 
 
 @dataclass(frozen=True)
@@ -58,21 +58,21 @@ class _Asked:
     source: Path
     lab: str
     format: Format | None
-    """Which somebody has named."""
+    """The format that a person has named; None if no format was named."""
     known: Known
 
 
 def read_class(source: Path, lab: str, format_name: str = "", known: Known | None = None) -> Reading:
-    """Read what lies in a folder or zip as a class.
+    """Read the contents of a folder or zip as a class.
 
     Args:
         source: the folder or zip.
-        lab: whose notebooks are wanted.
-        format_name: of the format, if somebody has named it; else empty.
-        known: what is known beforehand.
+        lab: the lab whose notebooks are wanted.
+        format_name: the name of the format, if a person has named it; otherwise empty.
+        known: what is known about the class.
 
     Raises:
-        KitError: the source is no class, or can be read in two ways.
+        KitError: the source is not a class, or it can be read in two ways.
     """
     named = {**PLATFORMS, PLAIN.name: PLAIN, CLASSROOM.name: CLASSROOM}.get(format_name)
     found = listed(source, lab)
@@ -107,10 +107,10 @@ def _work(entries: Sequence[Entry]) -> list[Entry]:
 
 
 def _of_platform(entries: Sequence[Entry], around: tuple[str, ...], asked: _Asked) -> Reading | None:
-    """What a platform gave out, if the names say so; None if no name does.
+    """Return the class as a platform exported it; None if no name has the form of a platform.
 
     Raises:
-        KitError: some names say so, and others do not.
+        KitError: some names have the form of a platform and too many others do not, or two platforms are possible.
     """
     work = _work(entries)
     formats = [asked.format] if asked.format is not None else list(PLATFORMS.values())
@@ -162,17 +162,17 @@ def _do(names: Sequence[str]) -> str:
 
 
 def _inside(only: Entry, around: tuple[str, ...], asked: _Asked) -> Reading | None:
-    """The class in the one folder or zip that lies in the source; None if that is a student's.
+    """Return the class in the only folder or zip of the source; None if that folder or zip is a student's work.
 
     Raises:
-        KitError: it may be either.
+        KitError: it may be a class or a student's work.
     """
     student = owner_of(only, asked.lab)
     if student is not None and asked.known.is_student(student):
         return None
     if any(is_notebook(entry.name) and entry.stem.casefold() == asked.lab.casefold() for entry in only.inside):
-        return None  # whatever else is in it
-    if asked.format is PLAIN:  # the innermost names, then, that can be students'
+        return None  # a notebook with the lab's name makes it a student's work, whatever else is in it
+    if asked.format is PLAIN:  # then the innermost names that can be names of students count
         work = _work(only.inside)
         alone = not work or (len(work) == 1 and work[0].kind is Kind.NOTEBOOK)
         return None if alone or _is_packed(work, asked.lab) else _read(only.inside, (*around, only.name), asked)
@@ -180,7 +180,7 @@ def _inside(only: Entry, around: tuple[str, ...], asked: _Asked) -> Reading | No
     if inner.format.around.fullmatch(only.stem) or inner.format is asked.format is not PLAIN:
         return inner
     is_class = len(inner.around) > len(around) + 1 or _is_class(inner, only.inside, asked.lab)
-    if student is None:  # nobody can be called so
+    if student is None:  # the name cannot be the name of a student
         return inner if is_class else None
     if not is_class and not _may_be_class(inner, only.inside, asked.lab):
         return None
@@ -201,7 +201,7 @@ def _inside(only: Entry, around: tuple[str, ...], asked: _Asked) -> Reading | No
 
 
 def _is_students(entry: Entry, lab: str) -> bool:
-    """Whether it can be understood as one student's work."""
+    """Return whether an entry can be read as the work of one student."""
     try:
         return choose([Claim(entry, {"id": entry.stem}, entry.name)], lab).member is not None
     except NotUnderstoodError:
@@ -209,7 +209,7 @@ def _is_students(entry: Entry, lab: str) -> bool:
 
 
 def _may_be_class(inner: Reading, inside: Sequence[Entry], lab: str) -> bool:
-    """Whether it could be a class, by the names in it: more than what one student packs."""
+    """Return whether the names in a folder or zip allow that it is a class and not the work of one student."""
     work = _work(inside)
     if any(is_notebook(entry.name) and is_of_lab(entry.name, lab) for entry in work):
         return False
@@ -217,7 +217,10 @@ def _may_be_class(inner: Reading, inside: Sequence[Entry], lab: str) -> bool:
 
 
 def _is_packed(work: Sequence[Entry], lab: str) -> bool:
-    """Whether it is laid out as students get it: the labs alone, or their whole kit; but somebody may be called so."""
+    """Return whether entries have the layout that students get: only the labs, or the whole kit.
+
+    A student may have the name of one of these folders, so no other entry may contain a notebook.
+    """
     names = {entry.name for entry in work}
     own = {lab, "labs", *(("kit", "lectures") if {"labs", "kit"} <= names else ())}
     others = [entry for entry in work if entry.name not in own]
@@ -225,7 +228,7 @@ def _is_packed(work: Sequence[Entry], lab: str) -> bool:
 
 
 def _is_class(inner: Reading, inside: Sequence[Entry], lab: str) -> bool:
-    """Whether it can hardly be anything but a class: a platform's names, or two students' notebooks of the lab."""
+    """Return whether this is almost certainly a class: it has a platform's names, or the lab's notebook twice."""
     if not _may_be_class(inner, inside, lab):
         return False
     if inner.format is not PLAIN:

@@ -1,4 +1,4 @@
-"""Which of the notebooks that one student handed in counts."""
+"""Choose which of the notebooks that a student handed in counts."""
 
 from __future__ import annotations
 
@@ -12,49 +12,49 @@ from autograder.submission import exchange_secret, timestamp
 from autograder.submission.notebook_file import NOTEBOOK_BYTES
 
 _COPY = re.compile(r"(-\d+| ?\(\d+\)|[- ]+copy ?(\d+|\(\d+\))?)$", re.IGNORECASE)
-"""What platforms, browsers, desktops and JupyterLab put behind the name of a file that they have already."""
+"""The suffix that platforms, browsers, desktops and JupyterLab add to a file's name if that name already exists."""
 _BESIDE = (timestamp.FILE_NAME, exchange_secret.FILE_NAME)
 
 
 @dataclass
 class Chosen:
-    """The notebook that counts, and what was in its way."""
+    """The notebook that counts, and the other files of the student."""
 
     claim: Claim
     member: Member | None
-    """None: the student handed in nothing at all."""
+    """The notebook; None if the student handed in no notebook."""
     replaced: list[tuple[Claim, str]] = field(default_factory=list)
-    """Of the same student's, with a notebook each in whose place this one came, and why, in a few words."""
+    """The student's other entries with a notebook that does not count, each with a short reason."""
     not_understood: list[tuple[Claim, NotUnderstoodError]] = field(default_factory=list)
-    """Of the same student's, beside the one that counts."""
+    """The student's other entries in which it is unclear which notebook counts."""
     others: list[Member] = field(default_factory=list)
-    """Notebooks beside the one that counts that have other names."""
+    """Notebooks in the same entry that have other names."""
     doubtful: list[Member] = field(default_factory=list)
-    """Notebooks that may have been meant: copies by their names, beside the one that counts."""
+    """Notebooks in the same entry that may have been meant, because their names are those of copies."""
     companions: int = 0
-    """Files that are no notebooks."""
+    """The number of files that are no notebooks."""
 
 
 def plain_name(name: str) -> str:
-    """Return a notebook's name without its ending, and without what was put behind it because there was one already."""
+    """Return a notebook's name in lower case, without its ending and without the suffix of a copy."""
     return _COPY.sub("", name.casefold().removesuffix(".ipynb"))
 
 
 def is_of_lab(name: str, lab: str) -> bool:
-    """Whether a notebook has the lab's name, or is a copy of one that had it."""
+    """Return whether a notebook has the lab's name or the name of a copy of it."""
     return lab.casefold() in (name.casefold().removesuffix(".ipynb"), plain_name(name))
 
 
 def choose(claims: Sequence[Claim], lab: str, others: Collection[str] = ()) -> Chosen:
-    """Return the notebook that counts: in the last attempt the one with the lab's name, or else the only one.
+    """Return the notebook that counts: the one in the last attempt that has the lab's name, or else the only one.
 
     Args:
-        claims: what one student handed in.
-        lab: whose notebook is wanted.
-        others: the other labs of the course; a notebook with the name of one never counts.
+        claims: the entries of one student.
+        lab: the lab whose notebook is wanted.
+        others: the other labs of the course. A notebook with the name of one of them never counts.
 
     Raises:
-        NotUnderstoodError: nothing says which it is, or there are only other files.
+        NotUnderstoodError: it is unclear which notebook counts, or there are only other files.
     """
     seen: list[Chosen] = []
     not_understood: list[tuple[Claim, NotUnderstoodError]] = []
@@ -73,7 +73,7 @@ def choose(claims: Sequence[Claim], lab: str, others: Collection[str] = ()) -> C
     among = [one for one in with_notebook if one.claim.attempt == attempt]
     named = [one for one in among if is_of_lab(_called(one), lab)]
     unclear = next((reason for claim, reason in not_understood if claim.attempt == attempt), None)
-    if not named and unclear is not None:  # the lab's notebook may be in there
+    if not named and unclear is not None:  # the lab's notebook may be in the entry that was not understood
         raise unclear
     if not named and len({plain_name(_called(one)) for one in among}) > 1:
         names = " and ".join(sorted(repr(_called(one)[:100]) for one in among)[:2])
@@ -86,7 +86,7 @@ def choose(claims: Sequence[Claim], lab: str, others: Collection[str] = ()) -> C
 
 
 def _why(one: Chosen, last: Chosen, lab: str) -> str:
-    """Why another notebook of the same student counts."""
+    """Say why another notebook of the same student counts."""
     if one.claim.attempt != last.claim.attempt:
         return "a later attempt counts"
     called = _called(last)
@@ -99,7 +99,7 @@ def _why(one: Chosen, last: Chosen, lab: str) -> str:
 
 
 def _called(one: Chosen) -> str:
-    """The notebook's name as the student gave it."""
+    """Return the name that the student gave to the notebook."""
     assert one.member is not None
     return one.claim.called if one.claim.entry.kind is Kind.NOTEBOOK and one.claim.called else one.member.name
 
@@ -110,10 +110,10 @@ def _first_file(claims: Sequence[Claim]) -> str:
 
 
 def _in_entry(claim: Claim, lab: str, others: Collection[str]) -> Chosen:
-    """What counts in one folder, zip or file.
+    """Return the notebook that counts in one folder, zip or file.
 
     Raises:
-        NotUnderstoodError: it cannot be looked into, or nothing says which notebook counts.
+        NotUnderstoodError: the entry cannot be read, or it is unclear which notebook counts.
     """
     entry = claim.entry
     if entry.kind is Kind.NOTEBOOK:
@@ -146,7 +146,7 @@ def _refuse_other_lab(name: str, lab: str, others: Collection[str]) -> None:
 
 
 def _unwrapped(files: dict[Member, tuple[str, ...]], lab: str) -> dict[Member, tuple[str, ...]]:
-    """The files by their paths without the folders around all of them, which do no harm."""
+    """Return the files with their paths, without the folders that contain all of them, because these do not matter."""
     while (
         files
         and not any(is_hidden(path[:1]) for path in files.values())
@@ -160,17 +160,20 @@ def _unwrapped(files: dict[Member, tuple[str, ...]], lab: str) -> dict[Member, t
 
 
 def _refuse_wrong_kinds(files: dict[Member, tuple[str, ...]], lab: str) -> None:
-    """Refuse a folder in the notebook's place, and a file or a link in that of the lab's folder."""
+    """Refuse a folder with the name of the notebook, and a file or link with the name of the lab's folder."""
     for member, path in files.items():
         if path[:1] == (f"{lab}.ipynb",) and len(path) > 1:
-            raise NotUnderstoodError(f"holds what cannot be read: '{lab}.ipynb' is a folder, not a file")
+            raise NotUnderstoodError(f"cannot be read: '{lab}.ipynb' is a folder, not a file")
         if path == (lab,):
             read(member)
-            raise NotUnderstoodError(f"holds what cannot be read: {lab!r} is a file, not a folder")
+            raise NotUnderstoodError(f"cannot be read: {lab!r} is a file, not a folder")
 
 
 def _of_notebooks(notebooks: dict[Member, tuple[str, ...]], lab: str) -> tuple[Member, list[Member]]:
-    """Which of a folder's notebooks counts: by its name, or the only one, for downloads get renamed; and its copies."""
+    """Return the notebook in a folder that counts, and its copies.
+
+    It is the one with the lab's name, or else the only one, because downloads may have been renamed.
+    """
     for place in ((), (lab,), ("labs", lab)):
         here = [member for member, path in notebooks.items() if path[:-1] == place]
         if here:
@@ -193,7 +196,7 @@ def _of_notebooks(notebooks: dict[Member, tuple[str, ...]], lab: str) -> tuple[M
 
 
 def beside(chosen: Chosen, name: str, most: int) -> bytes:
-    """Return what nbgrader's exchange put beside a student's notebook; nothing if it did not."""
+    """Return the contents of a file that nbgrader's exchange put beside a notebook; empty if there is no such file."""
     entry = chosen.claim.entry
     if entry.kind in (Kind.NOTEBOOK, Kind.OTHER):
         return b""
@@ -203,20 +206,20 @@ def beside(chosen: Chosen, name: str, most: int) -> bytes:
             if member.path == (*place, name):
                 try:
                     return member.read(most)
-                except Exception:  # each way of packing fails in its own way
+                except Exception:  # each kind of archive raises its own errors
                     return b""
     return b""
 
 
 def read(member: Member) -> bytes:
-    """Return what a notebook holds.
+    """Return the contents of a notebook.
 
     Raises:
-        NotUnderstoodError: it cannot be read, or is empty, which an upload that failed leaves behind.
+        NotUnderstoodError: the notebook cannot be read, or it is empty, for example because an upload failed.
     """
     try:
         content = member.read(NOTEBOOK_BYTES + 1)
-    except Exception as error:  # each way of packing fails in its own way (zlib.error, LZMAError); the class goes on
+    except Exception as error:  # each kind of archive raises its own errors (zlib.error, LZMAError); go on with others
         why = getattr(error, "strerror", None) or error
         raise NotUnderstoodError(f"holds {'/'.join(member.path)[:200]!r}, which cannot be read ({why})") from error
     if not content.strip():

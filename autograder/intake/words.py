@@ -1,19 +1,19 @@
-"""Parts of sentences about a class."""
+"""Build parts of sentences about a class."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
 _NAMED = 5
-"""Of more names than this only their number is said."""
+"""The number of names that a sentence lists. Of the others it gives only the number."""
 
 
 def count(number: int, what: str) -> str:
-    """Return a number of things: `1 file`, `2 files`."""
+    """Return a number with its noun: `1 file`, `2 files`."""
     return f"{number} {what}{'s' * (number != 1)}"
 
 
 def some(names: Sequence[str], between: str) -> str:
-    """Return the first of several names or sentences, and how many more there are."""
+    """Join the first few names or sentences, and say how many more there are."""
     more = f"{between}and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
     return between.join(names[:_NAMED]) + more

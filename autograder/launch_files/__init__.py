@@ -1,11 +1,11 @@
-"""Launch files: ROS 2's YAML launch schema, read without the `launch` packages (they are on no package index).
+"""Launch files in ROS 2's YAML schema, read without the `launch` packages, because these are on no package index.
 
-What they do here is what `ros2 launch` of Jazzy does with them (launch 3.4, launch_ros 0.26), and what it refuses is
-refused here. What is not covered is refused, too, with a sentence that says so and where it stands; `schema` has the
-actions and keys that are, `substitutions` the substitutions.
+A launch file has the same effect here as with `ros2 launch` of Jazzy (launch 3.4, launch_ros 0.26), and everything that
+`ros2 launch` refuses is refused here. Features that are not covered are refused, too, with a sentence that says so and
+names the place. `schema` lists the actions and keys that are covered, and `substitutions` the substitutions.
 
-A student wrote the file: it is parsed by the loader for students' files, in the grading sandbox only, and everything
-that could grow has a limit.
+The files are written by students. Therefore they are parsed by the loader for students' files, only in the grading
+sandbox, and everything that could grow has a limit.
 """
 
 from autograder.launch_files.errors import INCLUDE_DEPTH, MOST_NODES

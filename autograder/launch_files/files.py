@@ -1,8 +1,8 @@
-"""Where a launch file finds other files: a package's share folder as it is installed, seen from the lab's one folder.
+"""Finds the files that a launch file names: paths in an installed package, translated to the lab's single folder.
 
-An installed package has its launch files and parameter files in `share/PACKAGE/launch`; a lab has them all in one
-folder. `$(dirname)` is that folder, and `$(find-pkg-share PACKAGE)/launch` leads to it. Of a package that was built,
-the folder is the one that it is installed in, `…/share/PACKAGE`, with its files where they are.
+An installed package has its launch files and parameter files in `share/PACKAGE/launch`, but a lab has all of them in
+one folder. `$(dirname)` is that folder, and `$(find-pkg-share PACKAGE)/launch` leads to it. The folder of a package
+that was built is the one in which it is installed, `…/share/PACKAGE`, and its files are where they were installed.
 """
 
 from __future__ import annotations
@@ -27,12 +27,12 @@ class Packages:
         programs: Collection[str] | None,
         stand_ins: Mapping[str, str] | None = None,
     ) -> None:
-        """Keep what the packages hold.
+        """Keep how packages and files are found.
 
         Args:
-            find: asked for the folder of a package, KeyError if there is none.
-            programs: names of a package's programs; None: any program is taken to exist.
-            stand_ins: names of launch files to read in place of others, by the names of those.
+            find: returns the folder of a package, or raises KeyError if there is none.
+            programs: the names of a package's programs; None if any program is assumed to exist.
+            stand_ins: the names of launch files to read in place of others, by the names of the others.
         """
         self.programs = programs
         self.stand_ins = dict(stand_ins or {})
@@ -40,7 +40,7 @@ class Packages:
         self._folders: dict[str, Path] = {}
 
     def folder(self, name: str) -> Path:
-        """The folder that has a package's files.
+        """Return the folder with a package's files.
 
         Raises:
             KeyError: there is no such package.
@@ -50,7 +50,9 @@ class Packages:
         return self._folders[name]
 
     def share(self, name: str) -> str:
-        """What `$(find-pkg-share NAME)` stands for; unless it was built, only `launch/` below it holds files.
+        """Return the value of `$(find-pkg-share NAME)`.
+
+        If the package was not built, only the folder `launch/` below it contains files.
 
         Raises:
             KeyError: there is no such package.
@@ -59,36 +61,39 @@ class Packages:
         return str(place) if _is_installed(place, name) else f"{place}/share/{name}"
 
     def is_built(self, name: str) -> bool:
-        """Whether a package has been built, and its folder is the one that it is installed in."""
+        """Whether a package has been built, so that its folder is the one in which it is installed."""
         return _is_installed(self.folder(name), name)
 
     def in_installed(self, text: str) -> str:
-        """The path below the folder that a package was installed in; empty if it is in no such folder."""
+        """Return a path relative to the folder in which its package is installed, or "" if it is in no such folder."""
         path = os.path.normpath(text)
         places = [str(place) for name, place in self._folders.items() if _is_installed(place, name)]
         return next((path[len(place) + 1 :] for place in places if path.startswith(f"{place}/")), "")
 
     def called_in_words(self, path: Path) -> str:
-        """How a command line names a file: by its name in the lab's folder, by its path in an installed package."""
+        """Return a file as a command line names it.
+
+        A file in the lab's folder is named by its name, and a file in an installed package by its path.
+        """
         return str(path) if self.in_installed(str(path)) else path.name
 
     def called(self, path: Path) -> str:
-        """The name by which the launch files know a file: of a stand-in, the one that it stands for."""
+        """Return the name of a file in the launch files; for a stand-in, this is the name of the file it replaces."""
         return next((name for name, file in self.stand_ins.items() if file == path.name), path.name)
 
     def has(self, program: str, file: str) -> bool:
-        """Whether a launch file may start a program; a stand-in may start any."""
+        """Whether a launch file may start a program; a stand-in may start any program."""
         return self.programs is None or program in self.programs or file in self.stand_ins.values()
 
     def file(self, text: str, folder: Path) -> Path | None:
-        """The file that a path leads to once the package is installed; None if there is none, or not in the lab.
+        """Return the file to which a path leads after the package is installed, or None if the lab has no such file.
 
         Args:
-            text: the path as the launch file has it.
-            folder: of the launch file.
+            text: the path as written in the launch file.
+            folder: the folder of the launch file.
         """
         if not text.startswith("/"):
-            return None  # looked for in the folder that `ros2 launch` is called from
+            return None  # `ros2 launch` looks for it in the folder from which it is called
         if self.in_installed(text) and Path(text).name not in self.stand_ins:
             built = Path(os.path.normpath(text))
             return built if built.is_file() else None
@@ -108,7 +113,7 @@ class Packages:
 
 
 def _is_installed(place: Path, name: str) -> bool:
-    """Whether a package's folder is the one that building it made."""
+    """Whether a package's folder was created by building the package."""
     return place.parts[-2:] == ("share", name)
 
 
@@ -140,14 +145,14 @@ _IN_YAML = {
     "parameters": "`param:` with entries `{name: NAME, value: VALUE}`, or `{from: FILE}` for a file",
     "arguments": "`args:`",
 }
-"""The words of Python, and where the same stands in YAML."""
+"""The words of launch files in Python, and what corresponds to them in YAML."""
 
 
 def content(path: Path, place: Place) -> Any:
-    """What stands below `launch:` in a launch file.
+    """Return the content of `launch:` in a launch file.
 
     Raises:
-        Refused: it is missing, or no launch file in YAML.
+        Refused: the file is missing, or is not a launch file in YAML.
     """
     if not path.is_file():
         hint = "Its name is the one after `%%file` in the first line of its cell."
@@ -173,10 +178,10 @@ def content(path: Path, place: Place) -> Any:
 
 
 def _refuse_python(path: Path, place: Place) -> None:
-    """Say that a file is a launch file in Python, if it is one.
+    """Refuse a file that is a launch file in Python.
 
     Raises:
-        Refused: it is.
+        Refused: the file is one.
     """
     with path.open("rb") as file:
         text = file.read(student_yaml.FILE_BYTES).decode("utf-8", "replace")

@@ -1,4 +1,4 @@
-"""What a launch file starts, and the command line that `ros2 launch` gives to it."""
+"""The programs that a launch file starts, and the command lines that `ros2 launch` gives to them."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ import yaml
 from pydantic import BaseModel, ConfigDict
 
 WRITTEN = ".launch_params_*.yaml"
-"""Parameter files that a launch writes into the folder of its launch file, as a pattern."""
+"""The pattern of the names of parameter files that a launch writes into the folder of its launch file."""
 _ON_A_COMMAND_LINE = re.compile(r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)*")
 
 
 class Inline(BaseModel):
-    """A parameter that stands in the launch file itself."""
+    """A parameter whose value is in the launch file itself."""
 
     model_config = ConfigDict(extra="forbid")
     name: str
@@ -24,7 +24,7 @@ class Inline(BaseModel):
 
 
 class ForAll(BaseModel):
-    """A parameter of `set_parameter`: its value goes to the command line as a text, and is read there once more."""
+    """A parameter of `set_parameter`. Its value is written on the command line as a text, and parsed again there."""
 
     model_config = ConfigDict(extra="forbid")
     name: str
@@ -36,53 +36,56 @@ class ParamsFile(BaseModel):
 
     model_config = ConfigDict(extra="forbid")
     file: str
-    """Its name in the folder of the launch file; its path if it is in a package that was built."""
+    """Its name in the folder of the launch file, or its path if it is in a package that was built."""
 
 
 class ParamsText(BaseModel):
-    """What a parameter file holds after its substitutions (`allow_substs: true`)."""
+    """The text of a parameter file after its substitutions (`allow_substs: true`)."""
 
     model_config = ConfigDict(extra="forbid")
     text: str
 
 
 class NodeAction(BaseModel):
-    """One program that a launch file starts, with every substitution done."""
+    """One program that a launch file starts, after all substitutions."""
 
     model_config = ConfigDict(extra="forbid")
     package: str
     program: str
-    """`exec:`, the name of the executable."""
+    """The name of the executable, `exec:`."""
     namespace: str = ""
-    """Absolute; empty when neither the node nor a group gives one."""
+    """The absolute namespace; empty if neither the node nor a group sets one."""
     name: str = ""
-    """Empty when the launch file leaves it to the program."""
+    """The name of the node; empty if the launch file does not set it."""
     remappings: list[tuple[str, str]] = []
     parameters: list[Inline | ForAll | ParamsFile | ParamsText] = []
-    """In the order in which they are given."""
+    """The parameters in the order in which they are given."""
     arguments: list[str] = []
-    """Words of the program's own."""
+    """The words of `args`, which are the program's own arguments."""
     ros_words: list[str] = []
-    """Words of `ros_args`; they come first after `--ros-args`."""
+    """The words of `ros_args`, which come before the other ROS arguments."""
     environment: dict[str, str] = {}
-    """Variables that the launch file sets."""
+    """The variables that the launch file sets."""
     warnings: list[str] = []
-    """What `ros2 launch` only warns about: parameter files that do not exist."""
+    """The faults about which `ros2 launch` only warns, which are parameter files that do not exist."""
     folder: Path = Path()
-    """Where its parameter files are."""
+    """The folder of its parameter files."""
 
     def rules(self) -> list[str]:
-        """The remap rules of the launch file, without those of `ros_args`, in the order in which they are given."""
+        """Return the remap rules of the launch file, without those of `ros_args`, in the order in which they are given.
+
+        The rules for the node's name and namespace come first.
+        """
         rules = [f"__node:={self.name}"] if self.name else []
         if self.namespace:
             rules.append(f"__ns:={self.namespace}")
         return rules + [f"{old}:={new}" for old, new in self.remappings]
 
     def ros_arguments(self) -> list[str]:
-        """The words that follow `--ros-args`, in the order of `ros2 launch`.
+        """Return the words that follow `--ros-args`, in the order of `ros2 launch`.
 
-        Where a parameter file is among them, the parameters of the launch file itself are written into files too, as
-        `ros2 launch` does: then which value wins depends on the keys of the files. The files are named `WRITTEN`.
+        If there is a parameter file among them, the parameters of the launch file itself are written to files, too, as
+        `ros2 launch` does. Then the keys of the files decide which value wins. The files have names like `WRITTEN`.
         """
         own = len(self.rules()) - len(self.remappings)
         words = [word for rule in self.rules()[:own] for word in ("-r", rule)]
@@ -106,13 +109,13 @@ class NodeAction(BaseModel):
         return ["--params-file", self._written(yaml.safe_dump(content, default_flow_style=False))]
 
     def _named(self) -> bool:
-        """Whether the launch file gives a full name: then its parameters are for this name only."""
+        """Whether the launch file gives the node a full name, so that its parameters are for this name only."""
         return bool(self.namespace and self.name)
 
     def _only_inline(self) -> bool:
         files = any(isinstance(parameter, (ParamsFile, ParamsText)) for parameter in self.parameters)
         words = (*self.ros_words, *self.arguments)
-        renamed = self._named() and any("__n" in word for word in words)  # `__node:=` or `__ns:=`, before its own
+        renamed = self._named() and any("__n" in word for word in words)  # `__node:=` or `__ns:=` before its own rules
         return not files and not renamed and "--params-file" not in words
 
     def _written(self, text: str) -> str:
@@ -128,6 +131,9 @@ def remove_written(folder: Path) -> None:
 
 
 def _on_a_command_line(value: Any) -> str:
-    """A value as `launch_ros` writes it, with `yaml.dump`, in one word: here a text may become a number, too."""
+    """Return a value in one word, as `launch_ros` writes it with `yaml.dump`.
+
+    As in `launch_ros`, a text may become a number by this.
+    """
     text = yaml.safe_dump(value, default_flow_style=True, width=1_000_000)
     return text.removesuffix("\n...\n").removesuffix("\n")

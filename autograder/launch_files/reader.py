@@ -1,4 +1,4 @@
-"""Runs a launch file: what each action does with what the file knows at that moment, and what it starts."""
+"""Runs the actions of a launch file on the state of the launch, and collects the nodes that it starts."""
 
 from __future__ import annotations
 
@@ -23,30 +23,30 @@ from autograder.launch_files.substitutions import Context
 from autograder.launch_files.texts import Text, parse
 from autograder.reasons import Refused
 
-# `launch_ros` keeps these three among the launch configurations; the lists are not copied for a group.
+# `launch_ros` stores these three as launch configurations. The lists are not copied for a group.
 NAMESPACE, RULES, PARAMETERS = "ros_namespace", "ros_remaps", "global_params"
 _KIT_VARIABLES = ("LD_", "PYTHON", "ROS_", "RMW_", "FASTRTPS_", "FASTDDS_", "AUTOGRADER", "_")
 
 
 class ActionInContext:
-    """One action and what is known when it runs."""
+    """One action, and the state in which it runs."""
 
     def __init__(self, action: Action, context: Context) -> None:
-        """Keep both."""
+        """Keep the action and the state."""
         self.action, self.context = action, context
         self.given, self.place = action.given, action.place
 
     def perform(self, text: Text, place: Place) -> str:
-        """A text with its substitutions done."""
+        """Return a text after its substitutions."""
         done: str = refusing(place, lambda: substitutions.perform(text, self.context, self.place.folder))
         return done
 
     def text(self, key: str) -> str:
-        """The text behind a key that is there."""
+        """Return the text of a key that is present."""
         return self.perform(self.given[key], self.place.at(key))
 
     def name(self) -> str:
-        """The node's name; empty without one."""
+        """Return the node's name, or an empty text if the launch file gives none."""
         if "name" not in self.given:
             return ""
         name = self.text("name")
@@ -57,7 +57,7 @@ class ActionInContext:
         return name
 
     def command_line(self, key: str) -> list[str]:
-        """The words of a command line; none if the key is not there."""
+        """Return the words of a command line; there are none if the key is missing."""
         words = [self.perform(word, self.place.at(key)) for word in self.given.get(key, [])]
         own = words.index("--ros-args") if "--ros-args" in words else len(words)
         for option, file in itertools.pairwise(words if key == "ros_args" else words[own:]):
@@ -70,14 +70,14 @@ class ActionInContext:
         return words
 
     def rules(self) -> list[tuple[str, str]]:
-        """The node's own remap rules."""
+        """Return the node's own remap rules."""
         place = self.place.at("remap")
         return [
             (self.perform(rule["from"], place), self.perform(rule["to"], place)) for rule in self.given.get("remap", [])
         ]
 
     def environment(self) -> dict[str, str | None]:
-        """The variables that the file sets for a program, those of the node's own included."""
+        """Return the variables that the file sets for a program, including those of the node itself."""
         found = {key: value for key, value in self.context.environment.items() if key not in substitutions.JAZZY}
         for pair in self.given.get("env", []):
             name = self.perform(pair["name"], self.place.at("env"))
@@ -86,7 +86,7 @@ class ActionInContext:
         return found
 
     def condition(self) -> bool:
-        """Whether `if` or `unless` lets the action run."""
+        """Whether `if` and `unless` allow the action to run."""
         for key in ("if", "unless"):
             if key in self.given:
                 word = self.text(key).strip().lower()
@@ -96,28 +96,28 @@ class ActionInContext:
         return True
 
     def unreserved(self, name: str) -> None:
-        """Refuse names of launch configurations that `launch_ros` uses itself."""
+        """Refuse a name of a launch configuration that `launch_ros` uses itself."""
         if name in (NAMESPACE, RULES, PARAMETERS):
             raise self.place.error(f"`{name}` is a name that `launch_ros` uses itself; it is not covered here.")
 
     def settable(self, name: str) -> None:
-        """Refuse environment variables on which the kit relies."""
+        """Refuse an environment variable on which the kit relies."""
         if name.startswith(_KIT_VARIABLES) or substitutions.of_the_machine(name):
             raise self.place.error(f"the environment variable `{name}` is the kit's; setting it is not covered here.")
 
     def file(self, key: str) -> Path | None:
-        """The file that a key names; None if there is none."""
+        """Return the file that a key names, or None if there is no such file."""
         return self.context.packages.file(self.text(key), self.place.folder)
 
     def missing(self, key: str) -> Exception:
-        """The error for a file that does not exist."""
+        """Return the error for a file that does not exist."""
         text = self.text(key)
         near = nearest(text.rsplit("/", 1)[-1], {*self.context.packages.stand_ins, *_beside(self.place.folder)})
         hint = f" Is `{near}` meant?" if near else ""
         return self.place.error(self.no_file(text), f"Write `$(dirname)/NAME.yaml`; NAME is a cell's `%%file`.{hint}")
 
     def no_file(self, text: str) -> str:
-        """Why a path leads to no file."""
+        """Return why a path leads to no file."""
         if not text.startswith("/"):
             return f"there is no file `{text}`: `ros2 launch` looks for it in the folder that it is called from."
         installed = self.context.packages.in_installed(text)
@@ -129,7 +129,7 @@ class ActionInContext:
         )
 
     def parameters(self, node: NodeAction) -> None:
-        """Add the parameters of a node's own."""
+        """Add the node's own parameters."""
         for number, entry in enumerate(self.given.get("param", []), start=1):
             place = self.place.at(f"param (entry {number})")
             if "from" not in entry:
@@ -145,7 +145,7 @@ class ActionInContext:
                 node.parameters.append(ParamsFile(file=self.context.packages.called_in_words(path)))
 
     def inline(self, entry: dict[str, Any], prefix: str, place: Place) -> list[Inline]:
-        """The parameters of one `param` entry; those of entries inside it get dotted names."""
+        """Return the parameters of one `param` entry. Those of nested entries get names with dots."""
         name = prefix + self.perform(entry["name"], place.at("name"))
         if "param" in entry:
             return [one for inner in entry["param"] for one in self.inline(inner, f"{name}.", place)]
@@ -158,7 +158,7 @@ class ActionInContext:
         return [Inline(name=name, value=value)]
 
     def substituted(self, path: Path, place: Place) -> ParamsText:
-        """A parameter file with its substitutions done."""
+        """Return the text of a parameter file after its substitutions."""
 
         def read() -> ParamsText:
             text = parse(_text_of(path))
@@ -167,8 +167,8 @@ class ActionInContext:
             try:
                 student_yaml.load(done, f"`{path.name}` with its substitutions done")
             except Refused as error:
-                if error.reason.kind is student_yaml.NOT_YAML:  # what `launch` lets pass is the program's to read
-                    raise refused(error.reason.because, "A value that holds a colon stands in quotes.") from None
+                if error.reason.kind is student_yaml.NOT_YAML:  # everything else is left to the program, as in `launch`
+                    raise refused(error.reason.because, "Write a value with a colon in quotes.") from None
             return ParamsText(text=done)
 
         found: ParamsText = refusing(place.at("from"), read)
@@ -195,10 +195,10 @@ class ActionInContext:
 
 
 def _text_of(path: Path) -> str:
-    """The text of a file, which the build of a package may have made.
+    """Return the text of a file, which may come from the build of a package.
 
     Raises:
-        Refused: it is no text, or too large.
+        Refused: the file is not a text, or is too large.
     """
     try:
         with path.open("rb") as file:
@@ -215,7 +215,7 @@ def _beside(folder: Path) -> list[str]:
 
 
 def namespace(outer: str | None, inner: str | None, place: Place) -> str | None:
-    """A namespace below another, None if there is neither; an absolute one (leading slash) stands alone."""
+    """Join a namespace to an outer one, unless it is absolute (with a leading slash); None if there is neither."""
     if inner is None:
         joined = outer
     elif not outer or inner.startswith("/"):
@@ -234,7 +234,7 @@ def namespace(outer: str | None, inner: str | None, place: Place) -> str | None:
 
 
 def _invalid(what: str, error: Exception) -> tuple[str, str]:
-    """rclpy's reason why a name is invalid, as one sentence."""
+    """Return rclpy's reason why a name is invalid, as one sentence, and a hint."""
     reason = str(error).splitlines()[0].split(": ", 1)[-1].rstrip(".:")
     if "${" in what:
         return f"{what}: {reason}.", "The value of an argument is written with round brackets: `$(var NAME)`."
@@ -252,19 +252,20 @@ def read_launch_file(
     stand_ins: Mapping[str, str] | None = None,
     around: str = "",
 ) -> list[NodeAction]:
-    """Read a launch file and say what it starts, in its order.
+    """Read a launch file and return the programs that it starts, in its order.
 
     Args:
-        path: a launch file in YAML; its folder also holds what it includes and its parameter files.
-        arguments: launch arguments, as `name:=value` on the command line of `ros2 launch`.
-        find: the folder with a package's files; KeyError if there is no such package. Without it every
-            package is the folder of the launch file.
-        programs: names of the programs that a package has; without it they are not looked at.
-        stand_ins: names of launch files to read in place of included ones, by the names of those.
-        around: the namespace that a file which includes this one would push.
+        path: a launch file in YAML. Its folder also contains the files that it includes, and its parameter files.
+        arguments: the launch arguments, which are given as `name:=value` on the command line of `ros2 launch`.
+        find: returns the folder with a package's files, or raises KeyError if there is no such package. Without it,
+            every package is in the folder of the launch file.
+        programs: the names of the programs that a package has; without it, they are not checked.
+        stand_ins: the names of launch files to read in place of included ones, by the names of the included ones.
+        around: the namespace that a file that includes this one would push.
 
     Raises:
-        Refused: it is missing, is no launch file, is refused by `ros2 launch`, or uses what is not covered.
+        Refused: the file is missing, is not a launch file, is refused by `ros2 launch`, or uses something that is not
+            covered.
     """
     folder = path.resolve().parent
     reader = _Reader()
@@ -279,10 +280,10 @@ def read_launch_file(
 
 
 def declared_arguments(path: Path) -> list[str]:
-    """The names of the arguments that a launch file declares, included files left out.
+    """Return the names of the arguments that a launch file declares, without those of included files.
 
     Raises:
-        Refused: it cannot be read.
+        Refused: the file cannot be read.
     """
 
     def among(actions: list[Action]) -> list[str]:
@@ -298,7 +299,15 @@ class _Reader:
         self.actions = 0
 
     def file(self, path: Path, context: Context, given: set[str], place: Place, depth: int) -> None:
-        """Run a file; `given` are the arguments that whoever starts it gives, `place` is where that stands."""
+        """Run a file.
+
+        Args:
+            path: the file.
+            context: the state in which it runs.
+            given: the names of the arguments that are given to it.
+            place: the place from which it is started, which errors name.
+            depth: the depth of nested includes.
+        """
         if depth > INCLUDE_DEPTH:
             raise place.error(
                 f"launch files include one another more than {INCLUDE_DEPTH} deep.", "Does a file include itself?"
@@ -379,7 +388,7 @@ class _Reader:
         do.context.environment[do.text("name")] = None
 
     def _log(self, do: ActionInContext, depth: int) -> None:
-        do.text("message")  # it may be refused; where the text goes is the kit's business
+        do.text("message")  # only to refuse an invalid text; the kit does not print it
 
     def _include(self, do: ActionInContext, depth: int) -> None:
         path = do.file("file")
@@ -389,7 +398,7 @@ class _Reader:
             raise do.place.error(f"`{path.name}` is not a launch file in YAML; others are not covered.")
         pairs = do.given.get("arg", [])
         given = {do.perform(pair["name"], do.place.at("arg")) for pair in pairs}
-        # No scope of its own: as in ROS 2 Jazzy, what the file sets stays set, unless the include stands in a group.
+        # An included file has no scope of its own. As in ROS 2 Jazzy, what it sets stays set, unless it is in a group.
         for pair in pairs:
             name = do.perform(pair["name"], do.place.at("arg"))
             do.unreserved(name)
@@ -423,9 +432,9 @@ class _Reader:
 
 
 def _required(actions: list[Action]) -> list[Action]:
-    """The launch arguments without a default that must be given when the file is started.
+    """Return the launch arguments without a default, which must be given when the file is started.
 
-    Of several with one name the first counts; those below a condition are not looked at.
+    If several have the same name, the first one counts. Arguments below a condition are not required.
     """
     first: dict[str, Action | None] = {}
 

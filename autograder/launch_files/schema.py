@@ -1,6 +1,6 @@
-"""The schema of a launch file: which keys each action has and what may stand behind them.
+"""The schema of a launch file: which keys each action has, and which values they may have.
 
-A whole file is read and checked before any of it runs, the parts below `if: "false"` too.
+A whole file is read and checked before any of it runs, including the parts below `if: "false"`.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _ELSEWHERE = {
     "push_launch_configurations", "reset", "reset_environment", "set_ros_log_dir", "set_use_sim_time", "shutdown",
     "test", "timer",
 }  # fmt: skip
-"""Actions that `ros2 launch` has and that are not covered here."""
+"""The actions of `ros2 launch` that are not covered here."""
 _KEYS_ELSEWHERE = {"cwd", "forwarding", "keep", "launch-prefix", "on_exit", "respawn_max_retries"}
 _WHY_NOT = {
     "executable": "only the lab's own programs can be started in the sandbox.",
@@ -33,12 +33,12 @@ _WHY_NOT = {
 
 @dataclass
 class Action:
-    """One action of a launch file, read and checked."""
+    """One action of a launch file that has been read and checked."""
 
     kind: str
     place: Place
     given: dict[str, Any] = field(default_factory=dict)
-    """By key; a key that is left out is not there."""
+    """The values by key. A key that the file leaves out is missing here."""
     children: list[Action] = field(default_factory=list)
 
 
@@ -46,7 +46,8 @@ def read_file(path: Path) -> list[Action]:
     """Read and check a launch file.
 
     Raises:
-        Refused: it is missing, is no launch file, or has what `ros2 launch` refuses or what is not covered.
+        Refused: the file is missing, is not a launch file, or contains something that `ros2 launch` refuses or that is
+            not covered.
     """
     place = Place(path.name, path.resolve().parent)
     body = files.content(path, place)
@@ -69,7 +70,7 @@ def _action(entry: Any, number: int, place: Place) -> Action:
     if not isinstance(entry, dict) or len(entry) != 1:
         raise place.at(f"entry {number}").error(
             "each entry of the list is one action, such as `- node:`.",
-            "The keys of the action stand below it, indented further than its name.",
+            "Write the keys of the action below it, indented further than its name.",
         )
     kind, body = next(iter(entry.items()))
     here = place.at(f"{kind} (entry {number})")
@@ -92,7 +93,7 @@ def _action(entry: Any, number: int, place: Place) -> Action:
 
 @dataclass(frozen=True)
 class Key:
-    """One key: what reads the value behind it, and whether it must be there."""
+    """One key: the function that reads its value, and whether the key is required."""
 
     read: Callable[[Any, Place], Any]
     needed: bool = True
@@ -102,10 +103,10 @@ def _keys(body: Any, schema: dict[str, Key], place: Place, ignored: bool = False
     """Read the keys below an action.
 
     Args:
-        body: what stands below it.
-        schema: its keys.
-        place: for errors.
-        ignored: whether further keys are passed over, as `launch` does in one place.
+        body: the content of the action.
+        schema: the keys of the action.
+        place: the place that errors name.
+        ignored: whether unknown keys are ignored, as `launch` does in one place.
     """
     if not isinstance(body, dict):
         raise place.error("keys with values are expected here, such as `name: …`, indented further than the action.")
@@ -113,7 +114,7 @@ def _keys(body: Any, schema: dict[str, Key], place: Place, ignored: bool = False
         if expected.needed and key not in body:
             hint = f"Write `{key}: …` below it."
             if key == "children":
-                hint = "Below `group:` stands a list: each entry begins with a `-`, such as `- push_ros_namespace:`."
+                hint = "Write a list below `group:`: each entry begins with a `-`, such as `- push_ros_namespace:`."
             raise place.error(f"the key `{key}` is missing.", hint)
     unknown = [] if ignored else [str(key) for key in body if key not in schema]
     if unknown:
@@ -129,7 +130,7 @@ def _keys(body: Any, schema: dict[str, Key], place: Place, ignored: bool = False
 
 
 def refusing(place: Place, what: Callable[[], Any]) -> Any:
-    """Do something, and say the place if it is refused."""
+    """Call a function, and add the place to its error if it is refused."""
     try:
         return what()
     except Refused as error:
@@ -173,7 +174,7 @@ def _command_line(value: Any, place: Place) -> list[Text]:
 
 
 def _switch(value: Any, place: Place) -> bool:
-    """`true`, `false`, or any text, which counts as true: so does `launch`, which never reads the text."""
+    """Read `true`, `false`, or any text, which counts as true because `launch` never reads the text."""
     if not isinstance(value, (bool, str)):
         raise place.error("`true` or `false` is expected here.")
     return bool(value)
@@ -209,7 +210,7 @@ def _entries(schema: dict[str, Key], ignored: bool = False) -> Callable[[Any, Pl
 
 
 def _parameters(value: Any, place: Place) -> list[dict[str, Any]]:
-    """`param` entries: `name` with a `value` or with further `param` below it, or a file (`from`)."""
+    """Read `param` entries, which have a `name` with a `value` or with nested `param`, or a file (`from`)."""
     if not isinstance(value, list) or not value or not all(isinstance(entry, dict) for entry in value):
         raise place.error("a list is expected here, each entry with a `-` and keys of its own.")
     nested = place.where.count("param (entry") > 0
@@ -229,7 +230,7 @@ def _parameter(entry: dict[str, Any], place: Place) -> dict[str, Any]:
     given = _keys(entry, schema, place)
     if "param" in given:
         if "value" in given or "type" in given:
-            raise place.error("`param` stands in the place of `value` and `type`.", "Leave those two out.")
+            raise place.error("`param` takes the place of `value` and `type`.", "Leave those two out.")
         return given
     if "value" not in given:
         raise place.error("the key `value` is missing.", "Write `value: …` below it.")

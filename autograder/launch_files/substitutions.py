@@ -1,6 +1,7 @@
-"""What the substitutions of a launch file stand for.
+"""Evaluates the substitutions of a launch file.
 
-`$(eval …)` is worked out without running Python on what a student wrote: comparisons and arithmetic, and nothing else.
+`$(eval …)` is evaluated without running the student's text as Python. Only comparisons, arithmetic and a few functions
+are supported.
 """
 
 from __future__ import annotations
@@ -50,7 +51,7 @@ _COMPARE: dict[type[ast.cmpop], Callable[[Any, Any], Any]] = {
     ast.Is: operator.is_,
     ast.IsNot: operator.is_not,
 }
-# `launch` lets an expression use what the module `math` has, which hides Python's own `pow`.
+# `launch` allows an expression to use the names of the module `math`, so `pow` is that of `math`.
 _MATH = {
     name: getattr(math, name)
     for name in (
@@ -79,10 +80,10 @@ _METHODS = {
 
 
 def evaluate(expression: str) -> str:
-    """Work out an expression and return what Python's `str` makes of the result.
+    """Evaluate an expression and return its result as a text, as Python's `str` writes it.
 
     Raises:
-        Refused: it is no expression, is not covered here, or fails as it would fail in Python.
+        Refused: it is not an expression, it is not covered here, or it fails as it would fail in Python.
     """
     shown = f"`$(eval …)` of `{expression[:80]}`"
     if len(expression) > _LONGEST:
@@ -119,7 +120,7 @@ def _bounded(value: Any) -> Any:
 
 
 def _size(value: Any) -> int:
-    """How many characters and items a value has, those of the lists in it counted each time."""
+    """Return the number of characters and items in a value. A list that occurs several times in it counts each time."""
     if isinstance(value, (tuple, list)):
         return sum(1 + _size(item) for item in value)
     return len(value) if isinstance(value, str) else 1
@@ -130,7 +131,7 @@ def _name(node: ast.Name) -> Any:
         return _NAMES[node.id]
     if hasattr(builtins, node.id) or hasattr(math, node.id):
         raise refused(f"`{node.id}` is not covered here.")
-    quoted = f"Python has `True` and `False`; a text stands in quotes: `'{node.id}'`."
+    quoted = f"Python has `True` and `False`; write a text in quotes: `'{node.id}'`."
     raise refused(f"Python knows no name `{node.id}` there.", quoted)
 
 
@@ -234,7 +235,7 @@ _VALUES = {
     "var": (1, 2), "env": (1, 2), "dirname": (0, 0), "find-pkg-share": (1, 1), "eval": (1, 2), "equals": (2, 2),
     "not-equals": (2, 2), "not": (1, 1), "and": (2, 2), "or": (2, 2), "if": (2, 3),
 }  # fmt: skip
-"""How many values each substitution takes."""
+"""The least and the largest number of values that each substitution takes."""
 _NOT_COVERED = {
     "all", "anon", "any", "command", "exec-in-pkg", "file-content", "filename", "find-exec", "find-pkg-prefix",
     "launch_log_dir", "log_dir", "param",
@@ -244,7 +245,7 @@ _IN_ROS_2 = {
     "optenv": "In ROS 2 it is `$(env NAME DEFAULT)`.",
     "find": "In ROS 2 it is `$(find-pkg-share PACKAGE)`.",
 }
-"""What ROS 1 had, and what it is now."""
+"""The substitutions of ROS 1, and what replaces them in ROS 2."""
 _OF_THE_MACHINE = {
     "COLUMNS", "DISPLAY", "EDITOR", "HOME", "HOST", "HOSTNAME", "LANG", "LANGUAGE", "LINES", "LOGNAME", "MAIL",
     "OLDPWD", "PATH", "PWD", "SHELL", "SHLVL", "SUDO_USER", "TERM", "TMPDIR", "TZ", "USER", "USERNAME", "VIRTUAL_ENV",
@@ -254,21 +255,22 @@ _OF_THE_MACHINE_PREFIXES = (
     "PYTHON", "RCL", "RMW_", "ROS_", "SSH_", "TURTLEBOT3_", "XDG_",
 )  # fmt: skip
 JAZZY = {"ROS_DISTRO": "jazzy", "ROS_VERSION": "2", "ROS_PYTHON_VERSION": "3"}
-"""What every installed Jazzy has in its environment."""
+"""The environment variables that every installation of Jazzy sets."""
 
 
 @dataclass
 class Context:
-    """What a launch file knows while it runs; a group works on a copy."""
+    """The state of a running launch file. A group works on a copy of it."""
 
     packages: Packages
     configurations: dict[str, Any] = field(default_factory=dict)
-    """Launch arguments and `let`s, and what a group keeps for its nodes under the names that `launch_ros` uses."""
+    """The values of launch arguments and of `let`, and the settings of a group under the names that `launch_ros`
+    uses."""
     environment: dict[str, str | None] = field(default_factory=lambda: dict[str, str | None](JAZZY))
-    """Variables that are known: None where the launch file unset one."""
+    """The known variables; None for a variable that the launch file has unset."""
 
     def scoped(self) -> Context:
-        """A copy for a group. The lists in it are the same ones, as in `launch`."""
+        """Return a copy for a group. It shares the lists with the original, as in `launch`."""
         return Context(self.packages, dict(self.configurations), dict(self.environment))
 
 
@@ -276,7 +278,7 @@ def check(text: Text) -> None:
     """Refuse substitutions that `launch` refuses when it reads a file, and those that are not covered here.
 
     Raises:
-        Refused: for the first of them.
+        Refused: for the first such substitution.
     """
     covered = ", ".join(f"`{name}`" for name in sorted(_VALUES))
     for call in calls(text):
@@ -291,20 +293,20 @@ def check(text: Text) -> None:
             raise refused(
                 f"`{call.written}`: `{call.name}` takes {wanted} value{'s' if most != 1 else ''}, "
                 f"and {len(call.values)} {'is' if len(call.values) == 1 else 'are'} given.",
-                "A value with spaces stands in quotes.",
+                "Write a value with spaces in quotes.",
             )
 
 
 def perform(text: Text, context: Context, folder: Path) -> str:
-    """Do the substitutions of a text.
+    """Perform the substitutions of a text.
 
     Args:
-        text: what `texts.parse` and `check` let pass.
-        context: what is known at this moment.
-        folder: of the launch file that the text stands in.
+        text: a text that `texts.parse` and `check` have accepted.
+        context: the current state.
+        folder: the folder of the launch file that contains the text.
 
     Raises:
-        Refused: one of them cannot be done, or the text grows too long.
+        Refused: a substitution cannot be performed, or the text becomes too long.
     """
     done, length = [], 0
     for part in text:
@@ -383,7 +385,7 @@ def _variable(name: str, default: str | None, context: Context) -> str:
 
 
 def of_the_machine(name: str) -> bool:
-    """Whether an environment variable is usually set, to a value that a launch file cannot know."""
+    """Whether an environment variable is usually set to a value that depends on the machine."""
     return name in _OF_THE_MACHINE or name.startswith(_OF_THE_MACHINE_PREFIXES)
 
 

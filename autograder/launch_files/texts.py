@@ -1,8 +1,8 @@
-"""The texts of a launch file: plain words and `$(…)` substitutions, taken apart as the grammar of `launch` does.
+"""Parses the texts of a launch file, which consist of words and `$(…)` substitutions, like the grammar of `launch`.
 
-A substitution is `$(NAME)` or `$(NAME VALUE VALUE)` with exactly one space before each value. A value is a run of
-characters without spaces, quotes and brackets, or it stands in quotes. Both may hold further substitutions. A backslash
-takes the meaning from the character after it.
+A substitution is `$(NAME)` or `$(NAME VALUE VALUE)` with exactly one space before each value. A value is a sequence of
+characters without spaces, quotes and brackets, or it is in quotes. Both may contain further substitutions. A backslash
+removes the special meaning of the next character.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
 
 @dataclass(frozen=True)
 class Call:
-    """One `$(NAME VALUE …)`."""
+    """One substitution, `$(NAME VALUE …)`."""
 
     name: str
     values: tuple[Text, ...]
@@ -29,17 +29,17 @@ class Call:
 
 
 Text = tuple[str | Call, ...]
-"""The parts of a text in their order. A text without substitutions has one part, or two if it has both kinds of quotes:
-so has it in `launch`, and what it is counted as depends on it."""
+"""The parts of a text in their order. A text without substitutions has one part, or two if it contains both kinds of
+quotes. It is the same in `launch`, where the number of parts decides whether the text is a literal."""
 
 
 def plain(text: Text) -> str | None:
-    """The text itself if `launch` takes it for a literal, None if it counts as a substitution."""
+    """Return the text itself if `launch` treats it as a literal, or None if it counts as a substitution."""
     return text[0] if len(text) == 1 and isinstance(text[0], str) else None
 
 
 def calls(text: Text) -> Iterator[Call]:
-    """Every substitution in a text, the inner ones too."""
+    """Yield every substitution in a text, including nested ones."""
     for part in text:
         if isinstance(part, Call):
             yield part
@@ -48,12 +48,12 @@ def calls(text: Text) -> Iterator[Call]:
 
 
 def unescaped(text: str) -> str:
-    """A text without the backslashes that take the meaning from the character after them."""
+    """Return a text without the backslashes that remove the special meaning of the next character."""
     return re.sub(r"\\(.)", r"\1", text)
 
 
 def parse(text: str) -> Text:
-    """Take a text apart.
+    """Parse a text.
 
     Raises:
         Refused: a substitution in it is not well formed.
@@ -74,7 +74,7 @@ class _Reader:
         return refused(f"in `{shown}`, {because}", hint)
 
     def quoted(self, at: int, quote: str | None, depth: int) -> tuple[list[str | Call], int]:
-        """The parts up to the closing quote; without a quote, up to the end of the text."""
+        """Return the parts up to the closing quote, and its position; without a quote, up to the end of the text."""
         text, parts, start = self.text, list[str | Call](), at
         while at < len(text) and text[at] != quote:
             if text.startswith("$(", at):
@@ -100,7 +100,7 @@ class _Reader:
         return [unescaped(text)]
 
     def call(self, at: int, quote: str | None, depth: int) -> tuple[Call, int]:
-        """The substitution that begins here, and where the text goes on."""
+        """Return the substitution that begins here, and the position after it."""
         if depth >= SUBSTITUTION_DEPTH:
             raise self.error("substitutions are nested too deep.")
         text, start = self.text, at
@@ -137,15 +137,15 @@ class _Reader:
                 )
         found += [unescaped(text[start:at])] if at > start else []
         if not found:
-            raise self.error("a value is missing after a space.", "Exactly one space stands before each value.")
+            raise self.error("a value is missing after a space.", "Write exactly one space before each value.")
         return tuple(found), at
 
 
 def split(text: Text) -> list[Text]:
-    """Split `args` or `ros_args`, one text, into the words of a command line.
+    """Split the text of `args` or `ros_args` into the words of a command line.
 
-    `launch` splits what stands between the substitutions, before it does them: what a substitution stands for is never
-    split, so it may hold spaces or be empty.
+    `launch` splits the text between the substitutions before it performs them. The value of a substitution is never
+    split, so it may contain spaces or be empty.
 
     Raises:
         Refused: a quotation mark between two substitutions is not closed there.
@@ -166,7 +166,7 @@ def split(text: Text) -> list[Text]:
             word.append(part)
             continue
         pieces = _pieces(part)
-        if not pieces:  # only spaces: they part what stands before from what follows
+        if not pieces:  # only spaces, which end the word before them
             end_word()
             continue
         if part[0].isspace() and word:
@@ -194,5 +194,5 @@ def _pieces(part: str) -> list[str]:
         raise refused(
             f"a quotation mark is not closed in `{part.strip()[:60]}`: a command line is split into words before its "
             "substitutions are done.",
-            "What `$(var …)` stands for is one word in any case: leave the quotation marks around it out.",
+            "The value of `$(var …)` is one word in any case, so leave out the quotation marks around it.",
         ) from None

@@ -1,4 +1,4 @@
-"""The types of parameter values: what `launch` and `launch_ros` make of a `value` and a `type`."""
+"""Parameter values and their types, converted from a `value` and a `type` as `launch` and `launch_ros` do."""
 
 from __future__ import annotations
 
@@ -18,31 +18,31 @@ _TYPES: dict[str, tuple[type | None, bool]] = {
     "list_of_str": (str, True), "list_of_bool": (bool, True), "list_of_float": (float, True),
     "list_of_int": (int, True), "yaml": (None, False),
 }  # fmt: skip
-"""What the words of `type:` mean: the type of a value or of a list's items, and whether it is a list."""
+"""The meaning of each word for `type:`: the type of the value or of a list's items, and whether it is a list."""
 _OWN_QUOTES = "For a text, write `type: str` beside the value."
 
 
 @dataclass(frozen=True)
 class Value:
-    """A `value` as it stands in the file: a text with substitutions is a `Text`, everything else is as YAML has it."""
+    """A `value` as written in the file: a text with substitutions is a `Text`, everything else is as YAML reads it."""
 
     content: Text | bool | float | str | list[Any]
     kind: type | None
-    """Of the value or of a list's items; None if YAML decides."""
+    """The type of the value or of a list's items; None if YAML decides."""
 
 
 def read(value: Any, kind: Any) -> Value:
     """Read a `value` and its `type` as `launch` does when it reads a file.
 
     Args:
-        value: what stands behind `value:`.
-        kind: what stands behind `type:`, None without it.
+        value: the content of `value:`.
+        kind: the content of `type:`; None if the key is missing.
 
     Raises:
         Refused: `launch` refuses it.
     """
     if kind is not None and (not isinstance(kind, str) or kind not in _TYPES):
-        raise refused(f"`{kind}` is no type.", f"Types are {', '.join(_TYPES)}.")
+        raise refused(f"`{kind}` is not a type.", f"Types are {', '.join(_TYPES)}.")
     wanted, is_list = _TYPES[kind] if kind is not None else (None, False)
     if isinstance(value, list):
         if kind not in (None, "yaml") and not is_list:
@@ -50,10 +50,10 @@ def read(value: Any, kind: Any) -> Value:
         return Value(_list(value, wanted), wanted)
     if not isinstance(value, _SIMPLE):
         raise refused(
-            f"a parameter is a bool, a number, a text or a list of such, not {_shown(value)}.",
-            "A text stands in quotes.",
+            f"a parameter is a bool, a number, a text or a list of these, not {_shown(value)}.",
+            "Write a text in quotes.",
         )
-    if is_list:  # `launch` takes no text there, not even one that would become a list
+    if is_list:  # `launch` accepts no text here, not even one that YAML would convert to a list
         raise refused(f"{_shown(value)} is not of the type `{kind}`.", "Write a list, such as `[1, 2]`.")
     content = _text(value) if isinstance(value, str) else value
     if not isinstance(content, tuple) and wanted is not None and not isinstance(content, wanted):
@@ -65,7 +65,7 @@ def read(value: Any, kind: Any) -> Value:
 
 
 def _text(value: str) -> Text | str:
-    """A text; a literal one is settled, one with substitutions is read as YAML when they have been done."""
+    """Return the text itself if it is a literal, or its parts if it has substitutions, which are performed later."""
     parts = parse(value)
     substitutions.check(parts)
     literal = plain(parts)
@@ -85,10 +85,10 @@ def _list(value: list[Any], wanted: type | None) -> list[Any]:
 
 
 def settle(value: Value, perform: Callable[[Text], str]) -> Any:
-    """Do the substitutions of a value and convert what comes of them.
+    """Perform the substitutions of a value and convert the result.
 
     Raises:
-        Refused: it cannot be converted.
+        Refused: the result cannot be converted.
     """
     content = value.content
     if isinstance(content, tuple):
@@ -100,10 +100,10 @@ def settle(value: Value, perform: Callable[[Text], str]) -> Any:
 
 
 def read_as_yaml(text: str) -> Any:
-    """A parameter's text, read as YAML: a bool, a number, a text or a list of values of one type.
+    """Read a parameter's text as YAML and return a bool, a number, a text or a list of values of one type.
 
     Raises:
-        Refused: it is something else.
+        Refused: the text is something else.
     """
     try:
         value = student_yaml.load(text, "the value")
@@ -114,7 +114,7 @@ def read_as_yaml(text: str) -> Any:
     if not isinstance(value, _SIMPLE):
         raise refused(
             f"`{text[:60]}` is read as YAML, which makes {_shown(value)} of it; a parameter is a bool, a number, a "
-            "text or a list of such.",
+            "text or a list of these.",
             _OWN_QUOTES,
         )
     return value

@@ -1,4 +1,4 @@
-"""The IPython extension: what a student sees and uses in a notebook."""
+"""The IPython extension, and everything that a student sees and uses in a notebook."""
 
 from pathlib import Path
 

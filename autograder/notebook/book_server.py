@@ -1,7 +1,7 @@
-"""The lectures of a student's kit, served by JupyterLab itself below `/lectures`.
+"""Serves the lectures of a student's kit through JupyterLab itself, below `/lectures`.
 
-Jupyter shows HTML files of a user's folder in a sandbox, without their pictures and style sheets and with links that
-lead nowhere: anybody may have written them. These are the course's own.
+Jupyter shows HTML files in a user's folder in a sandbox, without their pictures and style sheets and with links that do
+not work, because anybody may have written them. The lectures are files of the course itself, so they are not sandboxed.
 """
 
 from __future__ import annotations
@@ -17,15 +17,15 @@ ROUTE = "lectures"
 
 
 class Pages(AuthenticatedFileHandler):  # type: ignore[misc]
-    """The book's files, for who is logged in."""
+    """Serves the book's files to users who are logged in."""
 
     @property
     def content_security_policy(self) -> str:
-        """No sandbox; scripts and pictures of the book itself only."""
+        """The policy: there is no sandbox, but only the book's own scripts and pictures are allowed."""
         return "default-src 'self' 'unsafe-inline' data:; frame-ancestors 'self'"
 
     def check_xsrf_cookie(self) -> None:
-        """Whoever asks may have the pages: they say the same to everybody, and change nothing."""
+        """Allow every request, because the pages are the same for everybody and change nothing."""
 
 
 def _load_jupyter_server_extension(server: Any) -> None:

@@ -1,6 +1,6 @@
-"""The IPython extension: `%load_ext autograder` brings the cell magics that write programs and files.
+"""The IPython extension: `%load_ext autograder` registers the cell magics that write programs and files.
 
-The programs lie in a folder of the notebook's own, `nodes/NAME OF THE NOTEBOOK`, where `launch` finds them.
+The programs are written to the notebook's own folder, `nodes/NAME OF THE NOTEBOOK`, where `launch` finds them.
 """
 
 from __future__ import annotations
@@ -49,10 +49,11 @@ _ANEW = "Correct this and run the cell again. Until then, the checks use what th
 
 
 def register(shell: Any) -> None:
-    """Give an IPython shell the `%%node`, `%%file`, `%ros2` and `%lab` magics, and start each cell's findings afresh.
+    """Register the `%%node`, `%%file`, `%ros2` and `%lab` magics in an IPython shell, and hooks for each cell.
 
-    Programs of an earlier kernel do not count: one whose cell has been renamed or deleted since would still pass here,
-    and be missing when the notebook is graded. Those of this kernel stay, also when the extension is loaded again.
+    The hooks make each cell begin without findings. Programs of an earlier kernel do not count: if the cell of a
+    program had been renamed or deleted since then, the program would pass here, but would be missing when the notebook
+    is graded. Programs of this kernel are kept, even if the extension is loaded again.
     """
     known = front_end.active
     kernel = known if isinstance(known, Kernel) and known.shell is shell else Kernel(shell)
@@ -74,17 +75,20 @@ def register(shell: Any) -> None:
 
 
 def _with_body(lines: list[str]) -> list[str]:
-    """A cell that is nothing but `%%file NAME` is an empty file; IPython refuses a magic without a line below it."""
+    """Add an empty line to a cell that has only its first line, such as `%%file NAME`.
+
+    Such a cell stands for an empty file, but IPython refuses a cell magic without a line below it.
+    """
     alone = len(lines) == 1 and re.match(r"%%(node|file)\s+\S", lines[0])
     return [lines[0].rstrip("\n") + "\n", "\n"] if alone else lines
 
 
 def shown_score(score: Score, **_: object) -> dict[str, str]:
-    """Return what a front end shows for a score."""
+    """Return the texts that a front end shows for a score."""
     from autograder.report.html import check_html
     from autograder.report.terminal import check_text
 
-    # nbgrader takes the points from the plain text, and all of them where that is no number.
+    # nbgrader takes the points from the plain text, and gives all points if that is not a number.
     graded = "NBGRADER_EXECUTION" in os.environ
     book = NO_BOOK if graded else _book()
     return {
@@ -96,7 +100,7 @@ def shown_score(score: Score, **_: object) -> dict[str, str]:
 
 
 def _book() -> Book:
-    """The lectures of the course that the student works in; without one, hints lead nowhere."""
+    """Return the lectures of the student's course; if there is no course, hints have no links."""
     try:
         return read_book(trusted_course(None) if is_students_kit() else course_root(), _address())
     except KitError:
@@ -104,7 +108,10 @@ def _book() -> Book:
 
 
 def _address() -> str:
-    """Link to the lectures of a student's kit: below the server's address, in VS Code a path; elsewhere empty."""
+    """Return the address of the lectures of a student's kit.
+
+    It is below the server's address, or a path in VS Code; elsewhere it is empty.
+    """
     lectures = book_of_kit()
     here = front_end.active
     notebook = here.folder.notebook if isinstance(here, Kernel) else None
@@ -129,16 +136,16 @@ def _writer(kernel: Kernel, magic: str, text: str) -> Any:
 
 
 def _write(here: Kernel, magic: str, name: str, cell: str) -> list[str]:
-    """Write a cell's file and return what to tell the student.
+    """Write a cell's file and return sentences for the student.
 
     Raises:
-        BadNameError: it cannot have this name.
-        OSError: it cannot be written.
+        BadNameError: the file cannot have this name.
+        OSError: the file cannot be written.
     """
     check_name(magic, name)
     whole = here.cell.replace("\r\n", "\n")
     file = _parsed(whole)
-    if file is None or (file.magic, file.name) != (magic, name):  # called from other code, not by its own cell
+    if file is None or (file.magic, file.name) != (magic, name):  # the magic was called by other code, not by a cell
         whole = "\n" * _lines_above(whole, cell) + f"%%{magic} {name}\n{cell}"
         file = parse(whole) or CellFile(magic, name, cell)
     check_free(file)
@@ -152,7 +159,10 @@ def _write(here: Kernel, magic: str, name: str, cell: str) -> list[str]:
 
 
 def _lines_above(whole: str, cell: str) -> int:
-    """How many lines stand above the magic, such as `%%time`: the file's lines have the numbers of the whole cell."""
+    """Return the number of lines above the magic, such as `%%time`.
+
+    It is needed because line numbers in the file are those of the whole cell.
+    """
     body = cell.rstrip("\n")
     above = whole.rstrip("\n").removesuffix(body) if body else whole
     return max(above.count("\n") - 1, 0) if len(above) < len(whole) else 0
@@ -166,7 +176,7 @@ def _parsed(source: str) -> CellFile | None:
 
 
 def _defect(file: CellFile) -> str:
-    """What keeps the file from being read at all, with the line as the notebook counts it; empty if nothing."""
+    """Say why the file cannot be read at all, with the line number in the cell; the text is empty if it can be read."""
     if file.magic == "node":
         try:
             compile(file.text, file.file_name, "exec", dont_inherit=True)
@@ -185,7 +195,7 @@ def _defect(file: CellFile) -> str:
         except Refused as error:
             return error.reason.because.removeprefix("the file, ").rstrip(".")
     elif file.name.endswith(".json"):
-        import json  # the magic above is line 1
+        import json  # line 1 of the cell is the magic, so one is added to line numbers below
 
         try:
             json.loads(file.text)

@@ -1,4 +1,4 @@
-"""What a student should know before a notebook is handed in: what is not saved, not run, outdated, ignored or empty."""
+"""Finds what is unsaved, not run, outdated, ignored or empty in a notebook that a student hands in."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from autograder.submission.reader import read_submission
 
 @dataclass
 class HandIn:
-    """What was found about a notebook, as sentences; none of it keeps the notebook from being handed in."""
+    """Sentences about a notebook. None of them prevents the notebook from being handed in."""
 
     unsaved: list[str] = field(default_factory=list)
     outdated: list[str] = field(default_factory=list)
@@ -28,17 +28,17 @@ class HandIn:
 
     @property
     def warnings(self) -> list[str]:
-        """All of them, in the order in which they matter."""
+        """All sentences, the most important ones first."""
         return [*self.unsaved, *self.ignored, *self.outdated, *self.unrun, *self.empty]
 
 
 def look_over(notebook: Path, lab: Lab, packed: Path) -> HandIn:
-    """Return what to tell the student about a notebook.
+    """Return what the student should be told about a notebook.
 
     Args:
-        notebook: where it lies; beside it lies what its cells have written.
-        lab: that it answers.
-        packed: the copy of it that is handed in.
+        notebook: the path of the notebook. The folder of the files that its cells have written is beside it.
+        lab: the lab of the notebook.
+        packed: the copy of the notebook that is handed in.
     """
     found = HandIn()
     submission = read_submission(packed, lab)
@@ -113,7 +113,10 @@ def _digest(source: str, file: CellFile) -> str:
 
 
 def _older_checks(lab: Lab, cells: dict[str, dict[str, Any]]) -> list[str]:
-    """Name the checks that were run before a cell that stands between them and the check above."""
+    """Return a sentence that names the checks that were run before a cell between them and the check above.
+
+    The list is empty if there are no such checks.
+    """
     older = []
     newest = 0
     checks = {check.grade_id: check.title for check in lab.checks}

@@ -1,6 +1,7 @@
-"""The IPython extension that every kernel of this environment has: it says so when a notebook's set-up cell is missing.
+"""An IPython extension that tells students to run the notebook's set-up cell if they have not done so.
 
-After a restart of the kernel a check would end in a bare `NameError: name 'launch' is not defined`.
+Every kernel of this environment loads it. Otherwise, a check after a restart of the kernel would end with only
+`NameError: name 'launch' is not defined`.
 """
 
 from __future__ import annotations
@@ -8,7 +9,7 @@ from __future__ import annotations
 from typing import Any
 
 NAMES = ("FULL_NAME", "NAME_OR_NONE", "Program", "answers", "build", "command_line", "launch", "launch_file", "vary")
-"""What the set-up cell brings: all names of `autograder.checks`, which this extension does not load."""
+"""The names that the set-up cell defines: all names of `autograder.checks`, which this extension does not load."""
 _SAY = (
     "Run the first code cell of the notebook, the one with `%load_ext autograder`. It is needed again after every "
     "restart of the kernel, and so are the cells of your programs."
@@ -16,7 +17,7 @@ _SAY = (
 
 
 def load_ipython_extension(shell: Any) -> None:
-    """Add a sentence to what fails because the set-up cell was not run."""
+    """Register magics and a hook that print a hint if something fails because the set-up cell was not run."""
     for magic in ("node", "file"):
         if magic not in shell.magics_manager.magics["cell"]:
             shell.register_magic_function(_not_yet(magic), magic_kind="cell", magic_name=magic)

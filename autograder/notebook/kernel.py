@@ -1,6 +1,6 @@
-"""The Jupyter kernel that the checks run in: its cells, its files, and where to show what happens.
+"""The Jupyter kernel in which the checks run: its cells, its files, and what it shows.
 
-To the checks it is their `autograder.core.front_end`.
+The checks use it as their `autograder.core.front_end`.
 """
 
 from __future__ import annotations
@@ -33,54 +33,54 @@ _NOT_DEFINED = (
     "A cell above this check defines `{name}`, and it has not been run since the kernel started. Choose "
     "Run > Run All Above Selected Cell in the menu, and then run this check again."
 )
-"""A check is locked, so a name that it does not know is not the student's mistake; it happens after a restart."""
+"""A check is locked, so an undefined name in it is not the student's mistake. It happens after a restart."""
 _EXPECTS = re.compile(r"\bscore\(|\.(expect|require)")
-"""How a cell that makes a check of something asks for a verdict."""
+"""The calls by which a cell requests a verdict."""
 _CELL_ID = re.compile(r"[A-Za-z0-9_-]{1,64}")
-"""A cell's id as notebooks save it (nbformat); Visual Studio Code tells the address of a document in its place."""
+"""The ID of a cell as notebooks save it (nbformat). Visual Studio Code sends the address of a document instead."""
 NO_VERDICT = "Interrupted: this check has no verdict. Run its cell again."
-"""What such a cell says that was interrupted, wherever that found it."""
+"""The message of an interrupted check, wherever it was interrupted."""
 
 _READY_POLL = 0.1
-"""Seconds between two looks whether somebody has interrupted the wait."""
+"""The seconds between two checks whether the wait was interrupted."""
 
 
 class Kernel:
-    """One IPython shell with the kit's extension.
+    """An IPython shell with the kit's extension.
 
     Args:
-        shell: IPython's.
+        shell: the shell of IPython.
     """
 
     def __init__(self, shell: Any) -> None:
-        """Find the notebook's folder, and load in the background what a first launch needs."""
+        """Find the notebook's folder, and prepare a thread that loads what a first launch needs."""
         self.shell = shell
         notebook = notebook_of(shell.user_ns, dict(os.environ))
         self.folder = ProgramFolder(notebook, notebook.parent if notebook else Path.cwd(), _cells_of(notebook))
         self.cell, self.cell_id = "", ""
         self._began = 0
         self.reports: dict[str, Report] = {}
-        """What the checks of this kernel said last, by `cell_digest`."""
+        """The last reports of the checks in this kernel, by `cell_digest`."""
         self._watch: Watch | None = None
         self._warmed = threading.Thread(target=_warm_up, name="warm-up")
 
     def start(self) -> None:
-        """Begin to load; apart from the rest, because this needs `active`."""
+        """Begin to load. This is separate from `__init__` because it needs `front_end.active`."""
         if self.updates_outputs:
             _hold_interrupts(self.shell)
         self._warmed.start()
         atexit.register(self.folder.close)
 
     def ready(self) -> None:
-        """Wait until the loading is done."""
+        """Wait until loading is complete."""
         while self._warmed.is_alive():
             self._warmed.join(_READY_POLL)
             interrupts.here()
 
-    # What runs.
+    # The running cell.
 
     def begin_cell(self, info: Any) -> None:
-        """Note the cell that begins, and forget what the last one found."""
+        """Note the cell that begins, and forget the findings of the last one."""
         self.cell = str(info.raw_cell or "")
         interrupts.say(NO_VERDICT if _EXPECTS.search(self.cell) else "")
         told = str(getattr(info, "cell_id", "") or "")
@@ -93,7 +93,7 @@ class Kernel:
             findings.reset()
 
     def end_cell(self, result: Any) -> None:
-        """Keep what a check said, and show what was expected in a cell that asked for no score."""
+        """Keep the report of a check, and show expectations that were checked in a cell without a score."""
         self._end_block()
         if result is None or isinstance(result.error_in_exec, KeyboardInterrupt):
             self._forget_verdict()
@@ -103,14 +103,14 @@ class Kernel:
                 print(_NOT_DEFINED.format(name=result.error_in_exec.name))
 
     def _end_block(self) -> None:
-        """No launch of a block outlives its cell, wherever that was left."""
+        """Stop the launch of a block, wherever its cell ended."""
         check = _current_check()
         block = check.block if check is not None else None
         if block is not None:
             block.stop()
 
     def _forget_verdict(self) -> None:
-        """What an interrupted check had found out says nothing, and neither does what it said before."""
+        """Forget the findings and the earlier report of a check that was interrupted."""
         if self.scored:
             self.reports[cell_digest(self.cell)] = Report(None, self._began)
         findings = _findings()
@@ -126,7 +126,7 @@ class Kernel:
             from autograder.checks.scoring import unscored
 
             report = unscored()
-            # Where nothing was expected, what went well on the way is no verdict: a goal may have been aborted.
+            # If the cell expected nothing, steps that succeeded are not a verdict: a goal may have been aborted.
             if report is not None and (_EXPECTS.search(self.cell) or report.result.status is not Status.PASSED):
                 from IPython.display import display
 
@@ -134,16 +134,16 @@ class Kernel:
 
     @property
     def scored(self) -> bool:
-        """Whether the cell that runs is a check: it asks for a score."""
+        """Whether the running cell is a check, which is a cell that requests a score."""
         return bool(_SCORED.search(self.cell))
 
     @property
     def programs(self) -> Path:
-        """The folder in which the programs and files of the cells lie."""
+        """The folder with the programs and files of the cells."""
         return self.folder.path
 
     def watch(self, observer: Observer, programs: Callable[[], Sequence[RunningProgram]]) -> Watch:
-        """Begin to show what goes on in a launch; what programs print is shown where no check is made of it."""
+        """Begin to show what happens in a launch. The programs' output is shown only if the cell is not a check."""
         from autograder.notebook.watch import Watch
 
         self._watch = Watch(observer, programs, streams=not self.scored, updates=self.updates_outputs)
@@ -151,29 +151,29 @@ class Kernel:
 
     @property
     def number(self) -> int:
-        """The number in the brackets beside the cell that runs."""
-        # The shell's own count is that of the next cell in some releases of IPython, and of this one in others.
+        """The number in the brackets beside the running cell."""
+        # The shell's own count is that of the next cell in some releases of IPython, and of this cell in others.
         return len(self.shell.history_manager.input_hist_parsed) - 1
 
     @property
     def updates_outputs(self) -> bool:
-        """Whether what a cell shows can change while it runs; a terminal can only add to it."""
+        """Whether the output of a cell can be updated while it runs; in a terminal, output can only be added."""
         return getattr(self.shell, "kernel", None) is not None
 
-    # What cells wrote.
+    # The files of the cells.
 
     def has(self, file_name: str) -> bool:
-        """Whether a cell wrote this file since the kernel began."""
+        """Whether a cell has written this file since the kernel started."""
         return file_name in self.folder.written and (self.folder.path / file_name).is_file()
 
     def saved(self) -> SavedNotebook | None:
-        """Return the notebook as it is on disk; None where nobody knows which it is."""
+        """Return the notebook as it is on disk; None if it is not known which one it is."""
         from autograder.notebook.saved_notebook import SavedNotebook
 
         return SavedNotebook(self.folder.notebook) if self.folder.notebook else None
 
     def why_missing(self, magic: str, name: str) -> tuple[str, str]:
-        """Why there is no such file, and what to do."""
+        """Return why there is no such file, and what to do."""
         first = f"%%{magic} {name}"
         saved = self.saved()
         file_name = f"{name}.py" if magic == "node" else name
@@ -189,7 +189,7 @@ class Kernel:
         return because, f"Run the cell `{first}` first, then this one."
 
     def used(self, file_names: set[str]) -> list[Written]:
-        """Return what cells wrote of these files, and of the modules among the cells' files that they import."""
+        """Return these files as cells wrote them, and the cells' modules that they import."""
         found: dict[str, Written] = {}
         front = sorted(file_names)
         while front:
@@ -202,7 +202,7 @@ class Kernel:
         return sorted(found.values(), key=lambda written: written.number)
 
     def blank(self, file_names: set[str]) -> dict[str, bool]:
-        """Return of each of these files that is an answer whether its cell is still as students receive it."""
+        """Return, for each of these files that is an answer, whether its cell is still as students receive it."""
         saved = self.saved()
         if saved is None:
             return {}
@@ -210,7 +210,7 @@ class Kernel:
         return {one.file.file_name: saved.is_blank(one) for one in written if saved.is_answer(one)}
 
     def origin(self, file_names: set[str]) -> str:
-        """Name the cells that these files came from: `heartbeat from cell [7], run at 14:03:12`."""
+        """Name the cells from which these files come: `heartbeat from cell [7], run at 14:03:12`."""
         saved = self.saved()
         return "; ".join(
             f"`{written.file.name}` from {written.origin}"
@@ -219,7 +219,7 @@ class Kernel:
         )
 
     def remarks(self, file_names: set[str]) -> list[str]:
-        """Say where what was run differs from what would be graded."""
+        """Return sentences that say where the files that were run differ from what would be graded."""
         saved = self.saved()
         used = self.used(file_names)
         if saved is not None and not saved.path.is_file():
@@ -251,12 +251,12 @@ def _imports(written: Written, file_name: str) -> bool:
 
 
 def _names(written: Written, file_name: str) -> bool:
-    """Whether a text has the name of a file in it, in quotes or at the end of a path."""
+    """Whether a text contains the name of a file, in quotes or at the end of a path in quotes."""
     return bool(re.search(rf"""["'/]{re.escape(file_name)}["']""", written.file.text))
 
 
 def _cells_of(notebook: Path | None) -> Callable[[str], bool]:
-    """Whether the saved notebook has a cell for a file; true where nobody knows."""
+    """Return a function that says whether the saved notebook has a cell for a file; it returns True if unknown."""
 
     def has(file_name: str) -> bool:
         from autograder.notebook.saved_notebook import SavedNotebook
@@ -268,7 +268,7 @@ def _cells_of(notebook: Path | None) -> Callable[[str], bool]:
 
 
 def _hold_interrupts(shell: Any) -> None:
-    """Let interrupts wait while the kit works; from the moment at which the kernel begins with what it is asked for."""
+    """Hold interrupts back while the kit works, from the moment at which the kernel begins to handle a request."""
     kernel = shell.kernel
     before, after = kernel.pre_handler_hook, kernel.post_handler_hook
 
@@ -285,23 +285,23 @@ def _hold_interrupts(shell: Any) -> None:
 
 
 def _current_check() -> Any:
-    """The check that runs; None before somebody has imported the checks, and while that is under way."""
+    """Return the running check; None if the checks have not been imported completely yet."""
     return getattr(sys.modules.get("autograder.checks.current"), "check", None)
 
 
 def _findings() -> Any:
-    """What the cell's checks have found so far, if there are any."""
+    """Return what the cell's checks have found so far; None if there is no check."""
     check = _current_check()
     return check.findings if check is not None else None
 
 
 def now() -> float:
-    """Seconds since 1970."""
+    """Return the seconds since 1970."""
     return time.time()
 
 
 def _warm_up() -> None:
-    """Load the launcher, the checks and the middleware, so that the first launch need not wait for them."""
+    """Load the launcher, the checks and the middleware, so that the first launch does not have to wait for them."""
     with contextlib.suppress(Exception):
         from autograder.checks import current
         from autograder.graph.domains import claim_domain

@@ -1,4 +1,4 @@
-"""How far a student has come with a lab: its checks, its texts, and what was predicted and what was measured."""
+"""A student's progress in a lab: its checks, its texts, and what was predicted and measured."""
 
 from __future__ import annotations
 
@@ -25,53 +25,53 @@ _FACT = re.compile(r"(^|_)(measured|seen)$")
 
 @dataclass(frozen=True)
 class Report:
-    """What the check of a cell said last."""
+    """The last result of the check of a cell."""
 
     result: CellResult | None
-    """None: it was interrupted."""
+    """The result; None if the check was interrupted."""
     number: int
-    """In the brackets beside the cell when it was run."""
+    """The number in the brackets beside the cell when it was run."""
 
 
 @dataclass(frozen=True)
 class Row:
-    """A check, or a text that a person reads."""
+    """A check, or a text that a person grades."""
 
     title: str
     verdict: Verdict | None
-    """None: it has not been run in this kernel, or is a text."""
+    """The verdict of a check; None for a text, and for a check without a current verdict from this kernel."""
     said: str
-    """What became of it, in words."""
+    """The state of the check or text, in words."""
     points: str
     done: bool
     sure: float = 0.0
     later: float = 0.0
-    """Points that grading may give as well."""
+    """The additional points that grading may give."""
     possible: float = 0.0
-    """Points that the check can give; a text is given them by a person, and has none here."""
+    """The points that the check can give; 0 for a text, whose points a person gives."""
 
 
 @dataclass(frozen=True)
 class Part:
-    """What stands below one of the lab's larger headings."""
+    """The tasks below one of the lab's larger headings."""
 
     title: str
     rows: list[Row] = field(default_factory=list)
 
     @property
     def heading(self) -> str:
-        """Its title, unless its only row has that very title."""
+        """The title, or an empty text if the only row has the same title."""
         return "" if [row.title for row in self.rows] == [self.title] else self.title
 
     @property
     def points(self) -> str:
-        """The points of its checks in words; empty if it has none."""
+        """The points of the checks in words; empty if there are no checks."""
         return _points(self.rows) if any(row.possible for row in self.rows) else ""
 
 
 @dataclass(frozen=True)
 class Guess:
-    """What was predicted, and what was measured; empty where the table says nothing yet."""
+    """A prediction and a measurement; each is empty if the student has not written it yet."""
 
     name: str
     predicted: str
@@ -79,7 +79,7 @@ class Guess:
 
     @property
     def said(self) -> str:
-        """Whether they agree, in a word."""
+        """Whether the two agree, in words."""
         if not self.predicted or not self.measured:
             return "open"
         return "as predicted" if self.predicted == self.measured else "otherwise"
@@ -87,22 +87,22 @@ class Guess:
 
 @dataclass
 class LabState:
-    """All that `%lab` shows."""
+    """Everything that `%lab` shows."""
 
     title: str = ""
     parts: list[Part] = field(default_factory=list)
     guesses: list[Guess] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
-    """Where what was run, or stands in the notebook, is not what would be graded."""
+    """Sentences about what was run, or is in the notebook, but would not be graded."""
 
     @property
     def rows(self) -> list[Row]:
-        """Those of all parts."""
+        """The rows of all parts."""
         return [row for part in self.parts for row in part.rows]
 
     @property
     def next(self) -> str:
-        """The first task that is open; empty if none is."""
+        """The first open task; empty if there is none."""
         for part in self.parts:
             for row in part.rows:
                 if not row.done:
@@ -111,7 +111,7 @@ class LabState:
 
     @property
     def summary(self) -> str:
-        """The points, and how much is done, in a sentence."""
+        """The number of tasks that are done, and the points, in words."""
         done = sum(row.done for row in self.rows)
         return f"{done} of {len(self.rows)} tasks done · {_points(self.rows)}"
 
@@ -126,13 +126,13 @@ def lab_state(notebook: Path, reports: Mapping[str, Report], runs: Mapping[str, 
     """Return the state of the lab in a notebook.
 
     Args:
-        notebook: as it was saved last.
-        reports: what the checks said in this kernel, by `cell_digest`.
-        runs: in which number a file was written in this kernel, by file name.
-        files: the folder that the cells write to.
+        notebook: the path of the notebook, which is read as it was last saved.
+        reports: the last reports of the checks in this kernel, by `cell_digest`.
+        runs: the number of the run that wrote each file in this kernel, by file name.
+        files: the folder to which the cells write.
 
     Raises:
-        UnreadableError: it is no notebook.
+        UnreadableError: the file is not a notebook.
     """
     state = LabState()
     cells = cells_of(notebook)
@@ -165,7 +165,7 @@ def lab_state(notebook: Path, reports: Mapping[str, Report], runs: Mapping[str, 
 
 
 def _texts(cells: Sequence[dict[str, Any]], files: Mapping[str, str]) -> tuple[dict[str, str], list[str]]:
-    """What the answers say, by their marks; and of which answers there is more than what counts."""
+    """Return the texts of the answers by their grade_id, and notes about answers that have several copies."""
     texts, notes = {}, []
     for answer in answers_in(cells, files):
         file = next((file for cell in answer.copies if (file := named_file(cell)) is not None), None)
@@ -210,7 +210,7 @@ def _guesses(folder: Path) -> list[Guess]:
         except Refused:
             continue
         for question, value in (table if isinstance(table, dict) else {}).items():
-            key = str(question)  # YAML also has numbers and truth values for keys
+            key = str(question)  # in YAML, a key can also be a number or a truth value
             for kind, suffix in (("predicted", _GUESS), ("measured", _FACT)):
                 if suffix.search(key) or suffix.search(path.stem):
                     where = (suffix.sub("", path.stem), suffix.sub("", key))
@@ -219,7 +219,7 @@ def _guesses(folder: Path) -> list[Guess]:
 
 
 def _shown(value: Any) -> str:
-    """A value as the student wrote it; empty while something in it is open."""
+    """Return a value as the student wrote it, or an empty text if a part of it is still open."""
     values = value if isinstance(value, list) else [value]
     if any(one in (None, "?") for one in values):
         return ""

@@ -1,4 +1,4 @@
-"""What a lab's notebook offers besides checks: `%ros2`, `%lab`, and the words that the tab key completes."""
+"""The features of a lab's notebook besides checks: `%ros2`, `%lab`, and completion with the tab key."""
 
 from __future__ import annotations
 
@@ -34,18 +34,18 @@ would run until Ctrl-C is stopped after 10 seconds. Afterwards, the exit status 
 """
 
 _ENDLESS = 10.0
-"""Seconds after which a verb is ended that goes on until Ctrl-C: a cell has to end."""
+"""The seconds after which a verb that would run until Ctrl-C is ended, because a cell has to end."""
 _LONGEST = {"service": 60.0, "action": 60.0}
-"""Seconds that the other verbs of a command may take: a call or a goal longer than a question about the graph."""
+"""The seconds that the other verbs of a command may take. A call or a goal takes longer than a query of the graph."""
 
 _ACTION = "/_action/send_goal"
-"""How the name of a service ends that takes an action's goals."""
+"""The end of the name of the service that accepts an action's goals."""
 
 _COUNTED = ("--once", "-n", "-t", "--times", "--timeout")
 
 
 def ros2_magic(kernel: Kernel) -> Any:
-    """Return the magic `%ros2`: the command line of ROS 2 in a cell, on the graph of the programs that run."""
+    """Return the magic `%ros2`: the command line of ROS 2 in a cell, on the graph of the running programs."""
 
     @no_var_expand  # type: ignore[untyped-decorator]
     def ros2(line: str) -> None:
@@ -78,7 +78,7 @@ def _run_ros2(kernel: Kernel, line: str) -> int:
     endless = _is_endless(words)
     seconds = _ENDLESS if endless else _LONGEST.get("".join(words[:1]), _ENDLESS)
     try:
-        with redirect_stderr(sys.stdout):  # what cannot be done is no alarm, and keeps its place
+        with redirect_stderr(sys.stdout):  # so that errors are not highlighted, and stay in the order of the output
             status = run(words, running.observer.domain_id, running.observer, seconds)
     except TimeIsUp:
         status = 2
@@ -91,7 +91,7 @@ def _run_ros2(kernel: Kernel, line: str) -> int:
 
 
 def _help_on(words: list[str], observer: Observer) -> None:
-    """Say which name was probably meant, and whether anybody publishes: the real tool says neither."""
+    """Print which name was probably meant, or that a topic has no publisher, because the real tool says neither."""
     topics, services = observer.topics(), observer.services()
     actions = [name.removesuffix(_ACTION) for name in services if name.endswith(_ACTION)]
     names = [*observer.nodes(), *topics, *services, *actions]
@@ -119,7 +119,7 @@ It runs nothing. It shows the last report of each check in this kernel, and says
 
 
 def lab_magic(kernel: Kernel) -> Any:
-    """Return the magic `%lab`: what of the lab is done and what is open, in one look."""
+    """Return the magic `%lab`, which shows which parts of the lab are done and which are open."""
 
     def lab(line: str) -> None:
         notebook = kernel.folder.notebook
@@ -133,7 +133,7 @@ def lab_magic(kernel: Kernel) -> Any:
             print(error.problem.because)
             return
         remarks = kernel.remarks(set(kernel.folder.written))
-        # A remark may begin with what is said of the notebook's copies anyway.
+        # A note about copies of cells is left out if a remark begins with the same text.
         state.notes = [note for note in state.notes if not any(one.startswith(note) for one in remarks)] + remarks
         from IPython.display import display
 
@@ -180,13 +180,13 @@ def _lab_text(state: LabState) -> str:
 
 
 _PROGRAM = re.compile(r"""\b(launch|Program|log|start)\((\s*["'][^"']*["']\s*,)*\s*["']\w*$|^%%node\s+\w*$""")
-"""How a line ends, up to the cursor, in which the name of a program is being written."""
+"""The end of a line up to the cursor if the name of a program is being typed there."""
 _ROS2 = re.compile(r"^\s*%ros2\s")
 _ABOUT_NODES = ("node", "param", "lifecycle")
 
 
 def register_completion(shell: Any, kernel: Kernel) -> None:
-    """Add to what a shell completes."""
+    """Add completions of the kit to a shell."""
     from IPython.core.completer import context_matcher
 
     @context_matcher()  # type: ignore[untyped-decorator]
@@ -202,7 +202,7 @@ def register_completion(shell: Any, kernel: Kernel) -> None:
 
 
 def _offered(words: Iterable[str], token: str, kind: str) -> dict[str, Any]:
-    """The words that begin so, and nothing of Python's; beside each of them stands what kind it is of."""
+    """Return the words that begin with the token as the only completions, each with its kind."""
     from IPython.core.completer import SimpleCompletion
 
     found = [SimpleCompletion(word, type=kind) for word in words if word.startswith(token)]
@@ -210,7 +210,7 @@ def _offered(words: Iterable[str], token: str, kind: str) -> dict[str, Any]:
 
 
 def _programs(kernel: Kernel) -> list[str]:
-    """The programs that cells of the saved notebook write, or have written in this kernel."""
+    """Return the programs that cells of the saved notebook write, or that cells have written in this kernel."""
     saved = kernel.saved()
     names = {cell.file_name for cell in saved.cells} if saved is not None else set()
     names |= kernel.folder.written.keys()
@@ -218,7 +218,7 @@ def _programs(kernel: Kernel) -> list[str]:
 
 
 def _ros2_words(before: list[str]) -> list[str]:
-    """The commands, the verbs of a command, and then what is on the graph of the programs that run."""
+    """Return the possible next words of a `%ros2` line: commands, verbs, or names on the running programs' graph."""
     from autograder.checks import current
     from autograder.ros2.main import COMMANDS, verbs_of
 

@@ -1,7 +1,7 @@
-"""The folder beside a notebook in which the programs and files of its cells lie, and what the kit wrote there.
+"""The folder beside a notebook with the programs and files of its cells, and a record of what the kit wrote there.
 
-Each notebook has a folder of its own below `nodes`, and a manifest in it. What stands in the manifest and is still as
-it was written is the kit's to replace and to remove; everything else is the student's, and is kept.
+Each notebook has its own folder below `nodes`, with a manifest in it. The kit may replace and remove a file only if the
+manifest lists it and it has not been changed since it was written. All other files are the student's, and are kept.
 """
 
 from __future__ import annotations
@@ -32,31 +32,31 @@ class Written:
 
     file: CellFile
     source: str
-    """The whole cell, its first line included."""
+    """The whole cell, including its first line."""
     cell_id: str
-    """The notebook's id of the cell; empty if the front end did not say."""
+    """The ID of the cell in the notebook; empty if the front end did not send it."""
     number: int
     """The number in the brackets beside the cell when it was run."""
     at: float
-    """When, in seconds since 1970."""
+    """When it was written, in seconds since 1970."""
 
     @property
     def origin(self) -> str:
-        """Where it came from, in words: `cell [7], run at 14:03:12`."""
+        """The origin of the file in words: `cell [7], run at 14:03:12`."""
         return f"cell [{self.number}], run at {time.strftime('%H:%M:%S', time.localtime(self.at))}"
 
 
 @dataclass(frozen=True)
 class Ran:
-    """What a manifest says of a file: which text a cell wrote, and when."""
+    """The entry of a file in a manifest: which text a cell wrote, and when."""
 
     sha256: str
     at: float
-    """In seconds since 1970."""
+    """When the cell wrote it, in seconds since 1970."""
 
 
 def read_runs(folder: Path) -> dict[str, Ran]:
-    """Return what the cells of a notebook wrote into its folder last, by file name."""
+    """Return what the cells of a notebook last wrote into its folder, by file name."""
     found = {}
     for name, entry in _manifest(folder).get("files", {}).items():
         with contextlib.suppress(ValueError, OverflowError):
@@ -69,18 +69,19 @@ class ProgramFolder:
     """The programs and files that the cells of this kernel wrote.
 
     Args:
-        notebook: the notebook, or None where the front end does not say which it is.
-        place: the folder beside it.
-        has_cell: whether the saved notebook has a cell for a file: if not, nothing else may hold its text.
+        notebook: the notebook, or None if the front end does not say which one it is.
+        place: the folder of the notebook.
+        has_cell: says whether the saved notebook has a cell for a file. Without a cell, the file may be the only copy
+            of its text.
     """
 
     def __init__(self, notebook: Path | None, place: Path, has_cell: Callable[[str], bool] = lambda _: True) -> None:
-        """Take the folder of this notebook, or one beside it if another kernel that still lives has that."""
+        """Use the folder of this notebook, or one beside it if another running kernel uses that folder."""
         self.notebook = notebook
         self.written: dict[str, Written] = {}
-        """By file name."""
+        """The files that cells wrote in this kernel, by file name."""
         self.kept: list[str] = []
-        """What to tell the student about files of their own that were in the way."""
+        """Sentences for the student about their own files that were in the way."""
         nodes = place / NODES
         for folder in nodes.glob(f"{_NAMELESS}*"):
             if _owner(_manifest(folder)) is None:
@@ -94,7 +95,7 @@ class ProgramFolder:
         self._forget_earlier(has_cell)
 
     def _forget_earlier(self, has_cell: Callable[[str], bool]) -> None:
-        """Programs of an earlier kernel do not count: a cell may have been renamed or deleted since."""
+        """Remove the programs of an earlier kernel, because their cells may have been renamed or deleted since then."""
         files = _manifest(self.path).get("files", {})
         for name, entry in files.items():
             path = self.path / name
@@ -110,10 +111,10 @@ class ProgramFolder:
             self._note()
 
     def write(self, written: Written) -> list[str]:
-        """Write a cell's file, whole or not at all; gives what to tell the student about a file that was in the way.
+        """Write a cell's file, completely or not at all, and return sentences about a file that was in the way.
 
         Raises:
-            OSError: it cannot be written.
+            OSError: the file cannot be written.
         """
         name = written.file.file_name
         path = self.path / name
@@ -124,7 +125,7 @@ class ProgramFolder:
             told.append(self._move_aside(path))
         nodes = self.path.parent
         if not nodes.is_dir():
-            nodes.mkdir(parents=True, mode=0o700)  # answers are nobody else's, on a machine with others' homes beside
+            nodes.mkdir(parents=True, mode=0o700)  # on a shared machine, other users must not read the answers
         path.parent.mkdir(parents=True, exist_ok=True)
         write_beside(path, text.decode("utf-8"))
         self.written[name] = written
@@ -132,22 +133,25 @@ class ProgramFolder:
         return told
 
     def changed_by_hand(self, name: str) -> bool:
-        """Whether a file is no longer what its cell wrote."""
+        """Whether a file differs from what its cell wrote."""
         path = self.path / name
         text = self.written[name].file.text.encode("utf-8", "replace")
         return path.is_file() and _digest(path) != hashlib.sha256(text).hexdigest()
 
     def foreign(self) -> list[str]:
-        """Files in the folder that no cell wrote: programs can import and open them here, but not when graded."""
+        """Return the files in the folder that no cell wrote.
+
+        Programs can import and open them here, but not when they are graded.
+        """
         return sorted(path.name for path in self.path.glob("[!.]*.*") if path.name not in self.written)
 
     def close(self) -> None:
-        """At the kernel's end: a folder that no notebook gives a name to would never be found again."""
+        """Clear the folder at the kernel's end if it has no notebook's name, because it would never be found again."""
         if self.notebook is None and self.written:
             _clear(self.path)
 
     def _move_aside(self, path: Path, why: str = "was not what a cell had written") -> str:
-        """Move a student's own file out of the way, and say so."""
+        """Move a student's own file out of the way, and return a sentence that says so."""
         number = 1
         while (kept := path.with_name(f"{path.name}.mine{number if number > 1 else ''}")).exists():
             number += 1
@@ -172,14 +176,14 @@ class ProgramFolder:
 
 
 def shown(path: Path) -> str:
-    """Return a path as a student finds it, from where the notebook is."""
+    """Return a path as shown to a student, relative to the working directory, which is that of the notebook."""
     with contextlib.suppress(ValueError):
         return str(path.relative_to(Path.cwd()))
     return str(path)
 
 
 def notebook_of(variables: dict[str, Any], environment: dict[str, str]) -> Path | None:
-    """Return the notebook that a kernel serves, as the front end tells it: VS Code or a Jupyter server; else None."""
+    """Return the notebook of a kernel, if the front end (VS Code or a Jupyter server) names it; otherwise None."""
     for told in (variables.get("__vsc_ipynb_file__"), environment.get("JPY_SESSION_NAME")):
         if isinstance(told, str) and re.search(r"[^/]\.ipynb$", told):
             path = Path(told).absolute()
@@ -200,7 +204,7 @@ def _manifest(folder: Path) -> dict[str, Any]:
 
 
 def _is_of_a_cell(name: str) -> bool:
-    """Whether a cell can have written a file of this name: a manifest may have been changed by hand."""
+    """Whether a cell can have written a file with this name. It is checked because a manifest can be edited by hand."""
     try:
         check_name("file", name)
     except BadNameError:
@@ -209,7 +213,7 @@ def _is_of_a_cell(name: str) -> bool:
 
 
 def _owner(manifest: dict[str, Any]) -> int | None:
-    """The kernel that a manifest is of, if it still lives."""
+    """Return the process ID of the kernel that wrote a manifest, if it is still running."""
     kernel = manifest.get("kernel")
     if not isinstance(kernel, dict) or not isinstance(kernel.get("pid"), int):
         return None
@@ -217,7 +221,10 @@ def _owner(manifest: dict[str, Any]) -> int | None:
 
 
 def _start_of(pid: int) -> str | None:
-    """When a process began, in the kernel's ticks: with its id it names a process for good. None: there is none."""
+    """Return when a process began, in ticks of the system, or None if there is no such process.
+
+    The begin and the process ID together identify a process uniquely.
+    """
     with contextlib.suppress(OSError):
         return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[19]
     return None
@@ -228,7 +235,7 @@ def _digest(path: Path) -> str:
 
 
 def _clear(folder: Path) -> None:
-    """Remove what the kit wrote into a folder, and the folder if nothing is left in it."""
+    """Remove the files that the kit wrote into a folder, and the folder if it is empty then."""
     with contextlib.suppress(OSError):
         for name, entry in _manifest(folder).get("files", {}).items():
             if (folder / name).is_file() and _digest(folder / name) == entry.get("sha256"):

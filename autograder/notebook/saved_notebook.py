@@ -1,4 +1,4 @@
-"""The notebook on disk, as grading would get it, held against what a cell wrote in the kernel."""
+"""Compares the notebook on disk, which is what grading would get, with what cells wrote in the kernel."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class _Cell:
     source: str
     file_name: str
     altered: bool
-    """Whether it is the lab's own, and no longer as students receive it."""
+    """Whether the cell belongs to the lab and is no longer as students receive it."""
 
     @property
     def cell_id(self) -> str:
@@ -31,22 +31,22 @@ class _Cell:
 
     @property
     def given(self) -> str:
-        """The grade_id of a file of the lab's own; empty for every other cell."""
+        """The grade_id of a cell with one of the lab's own files; empty for every other cell."""
         marks = nbgrader_of(self.raw)
         return grade_id_of(self.raw) if marks.get("locked") and not marks.get("solution") else ""
 
 
 class SavedNotebook:
-    """The code cells of a notebook that name files, as saved last."""
+    """The code cells that name files in a notebook, as it was last saved."""
 
     def __init__(self, path: Path) -> None:
-        """Read it; a notebook that cannot be read has no cells, and so there is nothing to say."""
+        """Read the notebook. If it cannot be read, it has no cells, so that there are no remarks."""
         self.path = path
         self.cells: list[_Cell] = []
         self._ids: set[str] = set()
-        """Of all cells."""
+        """The IDs of all cells."""
         self._answers: dict[str, AnswerCells] = {}
-        """By the names of their files."""
+        """The cells of each answer, by the name of its file."""
         self.saved_at = 0.0
         self.readable = False
         try:
@@ -69,7 +69,7 @@ class SavedNotebook:
         return any(cell.file_name == file_name for cell in self.cells)
 
     def _graded(self, file_name: str) -> _Cell | None:
-        """The cell that grading takes this file from."""
+        """Return the cell from which grading takes this file."""
         naming = [cell for cell in self.cells if cell.file_name == file_name]
         answer = self._answers.get(file_name)
         if answer is not None:
@@ -77,7 +77,7 @@ class SavedNotebook:
         return next((cell for cell in reversed(naming) if cell.given), naming[-1] if naming else None)
 
     def _copied(self, graded: _Cell, first: str) -> str:
-        """Say that there are copies of a cell, and which of them counts; empty if there are none."""
+        """Say that there are copies of a cell, and which of them counts; the text is empty if there are none."""
         answer = self._answers.get(graded.file_name)
         if answer is not None:
             return answer.told(first)
@@ -85,7 +85,7 @@ class SavedNotebook:
         return f"{told_of_given_copies(graded.given, count)} {DELETE_COPIES}" if count > 1 else ""
 
     def is_answer(self, written: Written) -> bool:
-        """Whether a student's answer is in this file."""
+        """Whether this file contains a student's answer."""
         cell = self._graded(written.file.file_name)
         return cell is not None and bool(cell.blank)
 
@@ -95,7 +95,10 @@ class SavedNotebook:
         return cell is not None and bool(cell.blank) and cell.blank == cell_digest(written.source)
 
     def remark(self, written: Written) -> str:
-        """Say why what was run is not what would be graded; empty if it is, or will be once it is saved."""
+        """Say why what was run is not what would be graded.
+
+        The text is empty if it is, or will be after the notebook is saved.
+        """
         graded = self._graded(written.file.file_name)
         answer = self._answers.get(written.file.file_name)
         first = f"%%{written.file.magic} {written.file.name}"
@@ -133,7 +136,7 @@ class SavedNotebook:
         return ""
 
     def _why_ungraded(self, written: Written, answer: AnswerCells | None, first: str) -> str:
-        """Say why grading finds no cell for what was run."""
+        """Say why grading finds no cell for a file that was written."""
         none = f"so grading has no `{written.file.name}`."
         if answer is None:
             unnamed = f"No cell of the saved notebook begins with `{first}`, {none}"
@@ -149,26 +152,26 @@ class SavedNotebook:
                 " make it a code cell again (key Y)."
             )
         if self.saved_at <= written.at and written.cell_id in {cell.get("id") for cell in answer.copies}:
-            return ""  # it has its first line again, and is not saved yet
+            return ""  # the cell has its first line again, but is not saved yet
         return (
             f"The cell for this answer, `{answer.grade_id}`, no longer begins with `{first}`, {none} Grading ignores"
             f" all other cells. Begin the cell `{answer.grade_id}` with this line again, and put your text below it."
         )
 
     def lacks(self, written: Written) -> bool:
-        """Whether what was run is not in the saved notebook, because nothing has been saved since."""
+        """Whether what was run is missing in the saved notebook because it has not been saved since."""
         name = written.file.file_name
         saved = any(cell.file_name == name and _same(cell.source, written.source) for cell in self.cells)
         return not saved and self.readable and self.saved_at <= written.at
 
 
 def _altered(source: str, cell: dict[str, Any]) -> bool:
-    """Whether a locked cell's text is another one than nbgrader's checksum in its metadata was made of."""
+    """Whether a locked cell's text does not match nbgrader's checksum in the cell's metadata."""
     marks = nbgrader_of(cell)
     if not marks.get("locked") or marks.get("solution") or marks.get("grade") or not marks.get("checksum"):
         return False
-    # As nbgrader computes it for a cell that is locked and nothing else. Importing nbgrader takes a second, for which
-    # nobody should wait after a check; a test holds this against every released lab.
+    # nbgrader computes it like this for a cell that is only locked. It is computed here because importing nbgrader
+    # takes a second, which is too long after a check. A test compares this with every released lab.
     made = f"{source}codeFalseFalseTrue{grade_id_of(cell)}".encode()
     return hashlib.md5(made, usedforsecurity=False).hexdigest() != str(marks["checksum"])
 

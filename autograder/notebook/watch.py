@@ -1,4 +1,4 @@
-"""What a student sees in the notebook while a launch runs: what is waited for, and what the programs print."""
+"""Shows in the notebook, while a launch runs, what the check waits for and what the programs print."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from autograder.graph.observer import Observer
 from autograder.sandbox.running_program import RunningProgram
 
 LINES = 100
-"""Lines of one program that are shown while it runs; `ros.log()` has more."""
+"""The number of lines of one program that are shown while it runs; `ros.log()` has more."""
 _MORE = "[more is in ros.log()]"
 _LEVEL = re.compile(r"\[(WARN|ERROR|FATAL)\]")
 _COLOUR = {"WARN": "#b35900", "ERROR": "#d55e00", "FATAL": "#d55e00"}
@@ -23,22 +23,22 @@ _STYLE = (
 
 
 class Stream:
-    """The lines of one program in one cell.
+    """The output of one program in one cell.
 
     Args:
-        program: its name.
-        updates: whether what a cell shows can change while it runs; if not, each line is printed once.
+        program: the name of the program.
+        updates: whether the output of a cell can be updated while it runs; if not, each line is printed once.
     """
 
     def __init__(self, program: str, updates: bool) -> None:
-        """Nothing is shown yet."""
+        """Begin without output."""
         self._program, self._updates = program, updates
         self._lines: list[str] = []
         self._count = 0
         self._handle: Any = None
 
     def add(self, text: str) -> None:
-        """Show more of what it printed."""
+        """Show more output of the program."""
         new = []
         for line in tidy(text).splitlines():
             self._count += 1
@@ -72,7 +72,7 @@ def _html(program: str, lines: Sequence[str]) -> str:
 
 
 def _coloured(line: str) -> str:
-    """A line of the log says its level in words, too."""
+    """Return a line as HTML, coloured by its log level. The level is also in the text of the line."""
     level = _LEVEL.match(line)
     if level is None:
         return escape(line)
@@ -81,19 +81,19 @@ def _coloured(line: str) -> str:
 
 
 _MUTE = 0.7
-"""Seconds of waiting after which a line says what for: most waits are over by then."""
+"""The seconds of waiting after which a line says what the check waits for. Most waits are shorter."""
 _LOOK_EVERY = 0.25
-"""Seconds between two looks at what the programs have printed."""
+"""The seconds between two looks at what the programs have printed."""
 
 
 class Watch:
-    """Shows what goes on in one launch, from the thread of the cell that waits.
+    """Shows what happens in one launch, from the thread of the waiting cell.
 
     Args:
-        observer: whose waiting gives the occasions to look.
-        programs: gives the programs that run.
+        observer: the observer of the launch, which calls `look` while it waits.
+        programs: returns the running programs.
         streams: whether their output is shown as it comes.
-        updates: whether what a cell shows can change while it runs.
+        updates: whether the output of a cell can be updated while it runs.
     """
 
     def __init__(
@@ -110,31 +110,31 @@ class Watch:
         observer.meanwhile = self.look
 
     def begin(self, sentence: str) -> bool:
-        """Something is waited for from now on; whether nothing else was."""
+        """Note what the check waits for from now on. Return False if it already waits for something else."""
         if self._sentence:
             return False
         self._sentence, self._since = sentence, time.monotonic()
         return True
 
     def end(self) -> None:
-        """It is there, or will not come."""
+        """Note that the wait is over, and remove its line."""
         self._sentence = self._said = ""
         if self._line is not None:
             self._line.update({"text/plain": ""}, raw=True)
 
     def new_cell(self) -> None:
-        """A new cell has begun: it says what is waited for, and shows what is printed from now on."""
+        """Show what happens from now on in the new cell that has begun."""
         self._line, self._said = None, ""
         self._shown = {number: len(program.output()) for number, program in enumerate(self._programs())}
         self._blocks.clear()
 
     def close(self) -> None:
-        """The programs have ended: show the rest of what they printed."""
+        """Show the rest of what the programs printed, because they have ended."""
         if self._streams:
             self.print_new(rest=True)
 
     def look(self) -> None:
-        """Show what is new."""
+        """Show new output, and what the check waits for."""
         now = time.monotonic()
         if now - self._looked < _LOOK_EVERY:
             return
@@ -158,7 +158,10 @@ class Watch:
             self._line.update(data, raw=True)
 
     def print_new(self, rest: bool = False) -> None:
-        """Show the lines that the programs have printed since; with `rest` also one that has no end yet."""
+        """Show the lines that the programs have printed since the last call.
+
+        With `rest`, an incomplete last line is shown, too.
+        """
         for number, program in enumerate(self._programs()):
             if program.truncated():
                 continue
@@ -172,7 +175,7 @@ class Watch:
                 block.add(whole)
 
     def _label(self, number: int) -> str:
-        """The name of a program; of one that was started more than once, which one it is."""
+        """Return the name of a program, with a number if it is not the first with this name."""
         names = [program.name for program in self._programs()[: number + 1]]
         before = names[:number].count(names[number])
         return f"{names[number]} ({before + 1})" if before else names[number]

@@ -1,1 +1,1 @@
-"""ROS packages that students write: where their files lie, how they are built, and why a build fails."""
+"""ROS packages that students write: where their files are, how they are built, and why a build fails."""

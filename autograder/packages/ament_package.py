@@ -1,9 +1,9 @@
 """Writes a lab's programs and launch files as an ament_python package, to be built and launched by an installed ROS 2.
 
-The programs stay as they are: each is started as a script, with the package's folder first on Python's path, as the
-kit starts it. Launch files and the parameter files beside them are installed into `share/PACKAGE/launch`, where
-`$(dirname)` finds them; other files go to `share/PACKAGE/config`. What a lab has below `src/` are packages already, and
-stay as they are, beside that one.
+The programs are not changed: each is started as a script, with the package's folder first on Python's path, as the kit
+starts it. Launch files and the parameter files beside them are installed into `share/PACKAGE/launch`, where
+`$(dirname)` finds them; other files go to `share/PACKAGE/config`. The folders that a lab has below `src/` are packages
+already, so they are written unchanged beside this one.
 """
 
 from __future__ import annotations
@@ -87,17 +87,18 @@ def _start(name: str) -> None:
 
 
 def package_name(lab: Lab) -> str:
-    """The package that the lab's launch files name; the lab's own name if they name none but the student's own."""
+    """Return the package that the check cells name, or the lab's name if they name only the student's own packages."""
     own = packages_in(lab_files(lab, None))
     named = (match[1] for cell in lab.cells for match in _PACKAGE_OF_CHECKS.finditer(cell.source))
     return next((name for name in named if name not in own), lab.name)
 
 
 def packages_of(lab: Lab, files: Mapping[str, str]) -> dict[str, dict[str, str]]:
-    """The packages that a lab's launch files name, with the files of each; the first one holds what no other does.
+    """Return the packages that a lab's launch files name, with the files of each.
 
-    A launch file belongs to the package with which the lab starts it, or else to that of its nodes. Programs and
-    parameter files are in each package: its launch files may name any of them.
+    The first package also holds all files that belong to no other package. A launch file belongs to the package from
+    which the lab starts it, or otherwise to the package of its nodes. Programs and parameter files are in every
+    package, because its launch files may name any of them.
     """
     first, own = package_name(lab), packages_in(files)
     text = "\n".join(cell.source for cell in lab.cells)
@@ -122,12 +123,20 @@ def _has_parameters(file: str, text: str) -> bool:
 
 
 def packages_in(files: Iterable[str]) -> list[str]:
-    """The packages that a lab has below `src/`, by the names of all its files."""
+    """Return the names of the packages that a lab has below `src/`.
+
+    Args:
+        files: the names of all files of the lab.
+    """
     return sorted({file.split("/")[1] for file in files if file.startswith(f"{SOURCES}/")})
 
 
 def lab_files(lab: Lab, notebook: Path | None) -> dict[str, str]:
-    """The programs and files of a lab by their names: as students receive it, or as a student's notebook has them.
+    """Return the programs and files of a lab by their names.
+
+    Args:
+        lab: the lab.
+        notebook: the student's notebook to read them from; None for the files as students receive them.
 
     Raises:
         KitError: the notebook cannot be read.
@@ -142,10 +151,15 @@ def lab_files(lab: Lab, notebook: Path | None) -> dict[str, str]:
 
 
 def write_packages(lab: Lab, files: Mapping[str, str], folder: Path) -> dict[str, Path]:
-    """Write the packages of a lab with the files of these names; returns their folders, by their names.
+    """Write the packages of a lab, and return their folders by the names of the packages.
+
+    Args:
+        lab: the lab.
+        files: the lab's programs and files by their names.
+        folder: where the packages' folders are created.
 
     Raises:
-        KitError: see `write_package`; nothing is written then.
+        KitError: as for `write_package`. If a package exists already, nothing is written.
     """
     found = packages_of(lab, files)
     _refuse_what_is_there(folder, [*found, *packages_in(files)])
@@ -162,16 +176,16 @@ def _refuse_what_is_there(folder: Path, names: Iterable[str]) -> None:
 
 
 def write_package(name: str, title: str, files: Mapping[str, str], folder: Path) -> Path:
-    """Write a package, and beside it those that are complete already; returns its folder.
+    """Write a package, and beside it the packages that are complete already. Return the folder of the first.
 
     Args:
-        name: of the package.
+        name: the name of the package.
         title: one line for its description.
-        files: programs (`NAME.py`) and other files by their names; those below `src/` are packages already.
-        folder: where the packages' folders are made, such as the `src` of a workspace.
+        files: programs (`NAME.py`) and other files by their names; those below `src/` belong to complete packages.
+        folder: where the packages' folders are created, such as the `src` of a workspace.
 
     Raises:
-        KitError: something is there already, which is left as it is; or there are no programs.
+        KitError: one of the packages exists already, and is left as it is; or there are no programs.
     """
     _refuse_what_is_there(folder, [name, *packages_in(files)])
     complete = {
@@ -201,7 +215,7 @@ def write_package(name: str, title: str, files: Mapping[str, str], folder: Path)
 
 
 def _place(file: str, text: str, name: str) -> str:
-    """The folder in the package that a file belongs into."""
+    """Return the folder in the package to which a file belongs."""
     if file.endswith(".py"):
         return name
     return "launch" if _LAUNCH_FILE.search(file) or node_keys(text) else "config"

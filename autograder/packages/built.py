@@ -1,4 +1,4 @@
-"""What came of building a package: what it installs, its executables and interfaces, and those that it imports."""
+"""The result of building a package: what it installs, its executables and interfaces, and those that it imports."""
 
 from __future__ import annotations
 
@@ -14,33 +14,36 @@ from autograder.reasons import Group, Kind, Reason
 
 @dataclass(frozen=True)
 class Built:
-    """What came of building a package."""
+    """The result of building a package."""
 
     name: str
     status: int
-    """Of colcon."""
+    """The exit status of colcon."""
     log: str
     over: str = ""
-    """What it took too much of, and was ended for, such as `memory`."""
+    """The resource of which the build used too much, such as `memory`, so that it was ended; otherwise empty."""
     files: frozenset[str] = field(default_factory=frozenset)
-    """What is installed, as paths below the package's folder in `install`."""
+    """The installed files, as paths below the package's folder in `install`."""
     folder: Path = Path()
-    """That folder."""
+    """The package's folder in `install`."""
 
     @property
     def executables(self) -> list[str]:
-        """Names that `ros2 run` finds: it looks for files in `lib/PACKAGE`."""
+        """The names that `ros2 run` finds, which are those of the files in `lib/PACKAGE`."""
         where = f"lib/{self.name}"
         return sorted(Path(path).name for path in self.files if str(Path(path).parent) == where)
 
     def shared(self, name: str) -> str:
-        """Where below `share/PACKAGE` a file of this name is, as `ros2 launch` looks for it; the name if nowhere."""
+        """Return the path below `share/PACKAGE` at which `ros2 launch` finds a file of this name.
+
+        If there is no such file, return the name.
+        """
         where = f"share/{self.name}/"
         found = sorted(path for path in self.files if path.startswith(where) and Path(path).name == name)
         return found[0].removeprefix(where) if found else name
 
     def text(self, path: str) -> str:
-        """Return an installed file as text; empty if there is none."""
+        """Return the text of an installed file, or an empty text if there is no such file."""
         return (self.folder / path).read_text("utf-8", "replace") if path in self.files else ""
 
 
@@ -51,11 +54,12 @@ ENTRY_POINT_TARGET = Kind(
 EXECUTABLE_PLACE = Kind("executable-place", "the executable is installed, and not where `ros2 run` looks", Group.BUILT)
 
 _MISSPELT = 0.85
-"""How alike two names of programs have to be for one to be the other misspelt: `speed_sensor` is no `speed_monitor`."""
+"""The similarity from which one name is taken for a misspelling of another; `speed_sensor` and `speed_monitor` are
+less similar than this."""
 
 
 def why_no_executable(built: Built, name: str) -> Reason | None:
-    """Why `ros2 run` finds no executable of a name; None if it does."""
+    """Return why `ros2 run` finds no executable of a name; None if it finds one."""
     if name in built.executables:
         return None
     places = (path.rpartition("/")[0] for path in sorted(built.files) if path.endswith(f"/{name}"))
@@ -73,12 +77,12 @@ def why_no_executable(built: Built, name: str) -> Reason | None:
 
 
 def why_other_target(built: Built, name: str, wanted: str = "") -> Reason | None:
-    """Why an executable does not lead to its function; None if it does, or to something that is made at run time.
+    """Return why an executable's entry point does not lead to its function; None if it does, or may do so.
 
     Args:
         built: the package.
-        name: of the executable.
-        wanted: as `module:function`; without it, any function that is there will do.
+        name: the name of the executable.
+        wanted: the function, as `module:function`; without it, any existing function is accepted.
     """
     target = re.sub(r"\s|\[.*", "", _entry_points(built).get(name, ""))
     module, _, function = target.partition(":")
@@ -101,7 +105,7 @@ def why_other_target(built: Built, name: str, wanted: str = "") -> Reason | None
 
 
 def _entry_points(built: Built) -> dict[str, str]:
-    """The console scripts that setup.py names, as `module:function` by name."""
+    """Return the console scripts that setup.py names: for each name, `module:function`."""
     for path in built.files:
         if path.endswith("/entry_points.txt"):
             section = built.text(path).partition("[console_scripts]")[2].partition("\n[")[0]
@@ -111,10 +115,10 @@ def _entry_points(built: Built) -> dict[str, str]:
 
 
 def imported_interfaces(sources: Path) -> dict[str, str]:
-    """Return the packages whose messages, services or actions are imported, each with the first module that does.
+    """Return the packages whose messages, services or actions are imported, each with the first file that does so.
 
     Args:
-        sources: the package's folder below `src`. What is no Python in it imports nothing.
+        sources: the package's folder below `src`. Files in it that are not valid Python are skipped.
     """
     found: dict[str, str] = {}
     for path in sorted(sources.rglob("*.py")):
@@ -138,19 +142,19 @@ def _imported(node: ast.AST) -> list[str]:
 
 
 class InterfaceError(ValueError):
-    """An interface file cannot be read; the message says why."""
+    """Raised if an interface file cannot be read; the message says why."""
 
 
 def interface_parts(package: str, name: str, text: str) -> list[dict[str, str]]:
     """Return the fields of a message, of a service's request and response, or of an action's goal, result and feedback.
 
     Args:
-        package: that the interface is of; its own messages are named without it.
-        name: such as `msg/DetectedObject`.
-        text: of the file.
+        package: the package of the interface; types of its own messages are returned without the package's name.
+        name: the name of the interface, such as `msg/DetectedObject`.
+        text: the text of the file.
 
     Raises:
-        InterfaceError: it cannot be read.
+        InterfaceError: the file cannot be read.
     """
     from rosidl_adapter import parser
 
@@ -164,11 +168,11 @@ def interface_parts(package: str, name: str, text: str) -> list[dict[str, str]]:
         else:
             action = parser.parse_action_string(package, base, text)
             found = [action.goal, action.result, action.feedback]
-    except Exception as error:  # the parser has a dozen kinds, some of them Python's own
+    except Exception as error:  # the parser raises a dozen kinds of exceptions, some of them Python's own
         raise InterfaceError(f"`{name}` cannot be read: {error}.") from error
     return [{field.name: _type(field.type, package) for field in part.fields} for part in found]
 
 
 def _type(kind: Any, package: str) -> str:
-    """A field's type as it is written in a file: `DetectedObject[]`, `std_msgs/Header`."""
+    """Return a field's type as it is written in a file: `DetectedObject[]`, `std_msgs/Header`."""
     return str(kind).removeprefix(f"{package}/")

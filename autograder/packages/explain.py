@@ -1,7 +1,7 @@
-"""Why a package was not built: read from its files where they say so, and else from what the build printed.
+"""Finds why a package was not built: from its files if they show the reason, otherwise from what the build printed.
 
-Each reason needs words of the tool that only this mistake brings about; where none of them is found, the reason is the
-first error that the build printed, word for word.
+Each reason needs words in the tool's output that only this mistake causes. If none of these words are found, the reason
+quotes the first error that the build printed.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from autograder.packages.built import Built
 from autograder.reasons import Group, Kind, Reason
 
 INTERFACE_LINE = Kind(
-    "interface-line", "a line of an interface file is no field, or its name or type is not allowed", Group.BUILDING
+    "interface-line", "a line of an interface file is not a field, or its name or type is not allowed", Group.BUILDING
 )
 INTERFACE_TYPE = Kind(
     "interface-type", "an interface file uses a message type that the package does not have", Group.BUILDING
@@ -25,7 +25,7 @@ BUILD_LIMIT = Kind(
     "build-limit", "the build went over one of the limits of builds, which is named, and was ended", Group.BUILDING
 )
 PACKAGE_XML = Kind(
-    "package-xml", "package.xml is missing, or is no package description that ROS's tools accept", Group.BUILDING
+    "package-xml", "package.xml is missing, or is not a package description that ROS's tools accept", Group.BUILDING
 )
 PACKAGE_NAME = Kind("package-name", "package.xml gives the package another name than its folder has", Group.BUILDING)
 BUILD_TYPE = Kind(
@@ -64,7 +64,7 @@ def why_not_built(built: Built, sources: Path) -> Reason | None:
     """Return why a build failed; None if it did not.
 
     Args:
-        built: what came of it.
+        built: the result of the build.
         sources: the package's folder below `src`.
     """
     wrong = not_described(sources, built.name)
@@ -82,10 +82,10 @@ def why_not_built(built: Built, sources: Path) -> Reason | None:
 
 
 def said_of_files(log: str) -> Reason | None:
-    """Return what the tools have said of the package's own files, in words that nothing else brings about; or None.
+    """Return the mistake in the package's own files that the tools report, in words that have no other cause; or None.
 
     Args:
-        log: all that a build that failed has printed.
+        log: the whole output of a build that failed.
     """
     text = " ".join(log.split())
     for pattern, reason in _REASONS:
@@ -96,7 +96,12 @@ def said_of_files(log: str) -> Reason | None:
 
 
 def needed_packages(sources: Path, to_build: bool = False) -> list[str]:
-    """The packages that package.xml names as needed at run time, or to build; it has to be one that can be read."""
+    """Return the packages that package.xml names as needed at run time, or to build.
+
+    Args:
+        sources: the package's folder, with a package.xml that can be read.
+        to_build: return the packages that are needed to build it, not those that are needed at run time.
+    """
     from catkin_pkg.package import parse_package
 
     package = parse_package(str(sources / "package.xml"))
@@ -105,7 +110,7 @@ def needed_packages(sources: Path, to_build: bool = False) -> list[str]:
 
 
 def not_described(sources: Path, name: str) -> Reason | None:
-    """What in package.xml keeps colcon from building the package, or from building it under its name."""
+    """Return what in package.xml prevents colcon from building the package, or from building it under its name."""
     from catkin_pkg.package import InvalidPackage, parse_package
 
     path = sources / "package.xml"
@@ -118,7 +123,7 @@ def not_described(sources: Path, name: str) -> Reason | None:
         lines = [line.removeprefix("- ") for line in words if line and not line.startswith("Error(s)")]
         said = "; ".join(lines[:2]).rstrip(".")
         return PACKAGE_XML(f"`src/{name}/package.xml` is not accepted: {said}.")
-    except Exception as error:  # what it cannot parse comes as errors of several libraries
+    except Exception as error:  # a file that cannot be parsed causes exceptions of several libraries
         return PACKAGE_XML(f"`src/{name}/package.xml` cannot be read as XML: {error}.")
     if package.name != name:
         because = f"package.xml names the package `{package.name}`; its folder, and this task, name it `{name}`."
@@ -135,7 +140,7 @@ def not_described(sources: Path, name: str) -> Reason | None:
 
 def _interface_line(match: re.Match[str]) -> Reason:
     line, name, said = match.groups()
-    said = said.strip() + "'" * (said.count("'") % 2)  # the pattern leaves the last one out
+    said = said.strip() + "'" * (said.count("'") % 2)  # the pattern does not include a quotation mark at the end
     if line.startswith(" "):
         because = f"The line `{line.strip()}` of the interface `{name}` begins with a blank, so no type is read there."
         return INTERFACE_LINE(because, "Each line begins with the type, at the very left.")
@@ -210,7 +215,7 @@ _REASONS: list[tuple[str, _Reason]] = [
     (
         r"include_map\[pkg\].{0,2000}?KeyError: '([^']{1,200})'",
         lambda m: INTERFACE_DEPENDENCY(
-            f"An interface uses a message of `{m[1]}`, which rosidl_generate_interfaces is not told of.",
+            f"An interface uses a message of `{m[1]}`, but rosidl_generate_interfaces does not name this package.",
             f"Its last line names the packages whose messages are used: `DEPENDENCIES {m[1]}`.",
         ),
     ),
@@ -222,21 +227,21 @@ _REASONS: list[tuple[str, _Reason]] = [
         r"the passed dependency '([^']+)' has not been found before",
         lambda m: CMAKE_PACKAGE(
             f"CMakeLists.txt uses `{m[1]}` before it has looked it up.",
-            f"`find_package({m[1]} REQUIRED)` has to stand above.",
+            f"Put `find_package({m[1]} REQUIRED)` above the line that uses it.",
         ),
     ),
     (
         r'Unknown CMake command "rosidl_generate_interfaces"',
         lambda m: CMAKE_PACKAGE(
             "CMake does not know `rosidl_generate_interfaces`: the package that brings it was not looked up.",
-            "`find_package(rosidl_default_generators REQUIRED)` has to stand above.",
+            "Put `find_package(rosidl_default_generators REQUIRED)` above the line that uses it.",
         ),
     ),
     (
         r'Unknown CMake command "ament_(\w+)"',
         lambda m: CMAKE_PACKAGE(
             f"CMake does not know `ament_{m[1]}`: the package that brings it was not looked up.",
-            "`find_package(ament_cmake REQUIRED)` has to stand above.",
+            "Put `find_package(ament_cmake REQUIRED)` above the line that uses it.",
         ),
     ),
     (
@@ -250,7 +255,7 @@ _REASONS: list[tuple[str, _Reason]] = [
 
 
 def _quoted(log: str) -> Reason:
-    """The first error that the build printed, as the reason."""
+    """Return a reason that quotes the first error that the build printed."""
     error = re.search(r"CMake Error at (\S+):(\d+) \((\w+)\):\n((?:  .*\n?)+)(Call Stack.*\n(?:  .*\n?)*)?", log)
     if error:
         own = re.search(r"CMakeLists\.txt:(\d+) \((\w+)\)", f"{error[1]}:{error[2]} ({error[3]}) {error[5] or ''}")
@@ -265,14 +270,20 @@ def _quoted(log: str) -> Reason:
 
 
 def first_error(log: str) -> str:
-    """The first line of a build's log that speaks of an error, or else the last one; empty if there is none."""
+    """Return the first line of a build's log that mentions an error, or the last line if none does.
+
+    The text is empty if the log is.
+    """
     lines = [line.strip() for line in log.splitlines() if line.strip()]
     error = next((line for line in lines if re.search(r"\berror\b|Error", line)), "")
     return (error or "".join(lines[-1:]))[:300]
 
 
 def _python_error(log: str) -> str:
-    """The last line of the first traceback, with the line of setup.py where one is named; empty if there is none."""
+    """Return the last line of the first traceback, and the number of the line of setup.py if it is named.
+
+    The text is empty if there is no traceback.
+    """
     match = re.search(r"^(\w+(?:Error|Exception)): (.+)$", log, re.MULTILINE)
     if match is None:
         return ""

@@ -1,11 +1,11 @@
 """Builds a package so that a failure counts against the student only if the package is known to have caused it.
 
-A build also fails where the machine does: its disk or its memory is full, a compiler is being replaced, a process is
-killed. The log of such a failure may look like any other, or be empty. So a failure is believed if the tools have said
-something of the package's own files that nothing else brings about, or if the build went over one of its limits. Any
-other one is put to the test: a package that is known to be good is built in the same way. If that fails, too, nothing
-is known of the student's package; otherwise it is built once more, and then its failure stands, unless it looks like
-one of a machine that lacks memory or disk.
+A build also fails because of the machine: its disk or its memory is full, a compiler is being replaced, or a process is
+killed. The log of such a failure may look like any other log, or be empty. Therefore a failure is accepted at once only
+if the tools reported a mistake in the package's own files that has no other cause, or if the build went over one of its
+limits. After any other failure, a package that is known to be good is built in the same way. If that fails, too,
+nothing is known about the student's package. Otherwise the student's package is built once more, and a second failure
+counts, unless it looks like that of a machine without enough memory or disk space.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ _BY_THE_SYSTEM = re.compile(
     r"Killed signal terminated program \w+|died with <Signals.SIGKILL: 9>|\bError 137\b|exited with code (?:-9|137)\b"
     r"|No space left on device|Cannot allocate memory"
 )
-"""What tools print where the system kills a process for want of memory, or refuses memory or disk. A build file can
-print it, too, so a person has to look."""
+"""What tools print if the system kills a process because memory is short, or refuses memory or disk space. A build file
+can print these words, too, so a person has to look at it."""
 _NAME = "known_good"
 _PACKAGE_XML = f"""<?xml version="1.0"?>
 <package format="3">
@@ -72,15 +72,16 @@ ament_package()
 
 
 def build(sources: Path, package: str, isolation: Isolation) -> BuildRun:
-    """Build a package of a student's.
+    """Build one of the student's packages.
 
     Args:
-        sources: the folder that holds the package's folder.
-        package: its name.
-        isolation: as for programs.
+        sources: the folder that contains the package's folder.
+        package: the package's name.
+        isolation: the isolation of the build, as for programs.
 
     Raises:
-        KitError: it failed, and this machine cannot build a package that is known to be good either.
+        KitError: it failed because of this machine: a package that is known to be good cannot be built either, or the
+            system ended the build or had no room for it.
     """
     run = _run(sources, package, isolation)
     if _known(run, sources / package):
@@ -97,7 +98,7 @@ def build(sources: Path, package: str, isolation: Isolation) -> BuildRun:
 
 
 def _known(run: BuildRun, folder: Path) -> bool:
-    """Whether nobody needs to ask whose failure it is, or whether it is one."""
+    """Whether the build succeeded, or failed in a way for which only the package can be the cause."""
     if run.status == 0 or run.over or not_described(folder, folder.name) is not None:
         return True
     return said_of_files(run.log) is not None
@@ -105,7 +106,7 @@ def _known(run: BuildRun, folder: Path) -> bool:
 
 def _trial(with_interfaces: bool, isolation: Isolation) -> BuildRun:
     with Scratch() as scratch:
-        scratch.chmod(0o755)  # the sandbox runs as somebody else
+        scratch.chmod(0o755)  # the sandbox runs as another user
         for path, text in (_INTERFACES if with_interfaces else _PYTHON).items():
             place = scratch / _NAME / path
             place.parent.mkdir(parents=True, exist_ok=True)
@@ -121,7 +122,7 @@ def _run(sources: Path, package: str, isolation: Isolation) -> BuildRun:
 
 
 def _end(run: BuildRun) -> str:
-    """What a build that failed said, or how it ended."""
+    """Return what a build that failed printed as its error, or how it ended."""
     by_the_system = _BY_THE_SYSTEM.search(run.log)
     said = by_the_system[0] if by_the_system else first_error(run.log)
     return said or f"it ended with status {run.status} and said nothing"

@@ -1,4 +1,4 @@
-"""A colcon workspace: the packages below `src`, and what building them puts below `install`."""
+"""A colcon workspace: the packages below `src`, and the files that building them installs below `install`."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ from autograder.sandbox.build import BuildRun
 
 SOURCES, INSTALLED = "src", "install"
 INSTALL = "Debian, Ubuntu: sudo apt-get install g++ cmake make python3-dev"
-"""How to get what interfaces are built with."""
+"""How to install the tools that build interfaces."""
 
 
 class Workspace:
-    """The packages of one folder. What has been built is built again only after a change of its sources.
+    """The packages of one folder. A package is built again only after its sources have changed.
 
     Args:
-        folder: with the folder `src` in it.
-        isolation: for what the packages' own build files run.
-        known: what builds came to before, by `digest_of` what was built.
+        folder: the folder that contains `src`.
+        isolation: the isolation of builds, because the packages' build files run the student's code.
+        known: the results of earlier builds, by the `digest_of` the package that was built.
     """
 
     def __init__(self, folder: Path, isolation: Isolation, known: Mapping[str, BuildRun] | None = None) -> None:
@@ -36,15 +36,16 @@ class Workspace:
         self._built: dict[str, tuple[str, Built]] = {}
 
     def source(self, package: str) -> Path:
-        """The folder of a package's sources."""
+        """Return the folder of a package's sources."""
         return self._folder / SOURCES / package
 
     def build(self, package: str) -> Built:
-        """Build a package, alone.
+        """Build a single package, if it has changed since it was built.
 
         Raises:
-            KitError: this machine cannot build it, such as for want of a compiler; that says nothing about the package.
-            OSError: what was built cannot be written.
+            KitError: this machine cannot build it, for example because it has no compiler. This says nothing about the
+                package.
+            OSError: the installed files cannot be written.
         """
         lacking = missing_tools()
         if lacking and (self.source(package) / "CMakeLists.txt").is_file():
@@ -60,7 +61,7 @@ class Workspace:
         return built
 
     def _install(self, package: str, run: BuildRun) -> Built:
-        """Write what a build has installed, in place of what an earlier one had."""
+        """Write the files that a build has installed, in place of those of an earlier build."""
         place = self._folder / INSTALLED / package
         shutil.rmtree(place, ignore_errors=True)
         prefix = f"{package}/"
@@ -72,7 +73,7 @@ class Workspace:
 
 
 def missing_tools() -> list[str]:
-    """What a package with interfaces is built with and this machine does not have."""
+    """Return what this machine lacks to build a package with interfaces."""
     programs = {"a C compiler": "cc", "a C++ compiler": "c++", "CMake": "cmake", "make": "make"}
     lacking = [what for what, program in programs.items() if shutil.which(program) is None]
     headers = Path(sysconfig.get_path("include")) / "Python.h"
@@ -80,16 +81,16 @@ def missing_tools() -> list[str]:
 
 
 def _contents(folder: Path) -> dict[str, bytes]:
-    """All files of a package, by their path in it."""
+    """Return the contents of all files of a package, by their paths in the package."""
     return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
 def digest_of(package: str, files: Mapping[str, bytes]) -> str:
-    """A word for a package and all that its files hold.
+    """Return a digest of a package's name and files.
 
     Args:
-        package: its name.
-        files: content by path in the package.
+        package: the package's name.
+        files: the contents of its files, by their paths in the package.
     """
     found = hashlib.sha256(f"{package}\0".encode())
     for path, content in sorted(files.items()):

@@ -1,7 +1,7 @@
-"""Pictures of what ROS programs did: who ran when, who talks to whom, which state, which match, which arrival.
+"""Pictures of what ROS programs did: runs of callbacks, the graph, lifecycle states, QoS matches, arriving messages.
 
-They are drawn from plain data, as SVG with text that can be read in black and white, and each says in words what it
-shows. A check cell, a lecture and the report under a failed check draw the same ones.
+They are drawn from plain data, as SVG that is also readable in black and white, and each has a description in words of
+what it shows. Check cells, lectures and the reports of failed checks use the same pictures.
 """
 
 from autograder.core.results import Picture

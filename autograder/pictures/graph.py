@@ -1,4 +1,4 @@
-"""Pictures of the ROS graph: who talks to whom, and whether the QoS profiles of two ends match."""
+"""Draws the ROS graph, and whether the QoS profiles of publishers and subscriptions match."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ class Endpoint:
     topic: str
     publishes: bool
     policies: Mapping[str, str | float | None] = field(default_factory=dict)
-    """What the graph shows of its quality of service: words, and seconds; None: no such limit."""
+    """The QoS policies that the graph shows, as words or seconds; None means that there is no such limit."""
 
     def words(self) -> str:
-        """Its policies in a few words; volatile, and limits that are none, are left out."""
+        """Describe its policies in a few words, without the durability volatile and without limits that are not set."""
         return ", ".join(filter(None, [str(self.policies.get("reliability") or "").replace("_", " "), *self.unusual()]))
 
     def unusual(self) -> list[str]:
-        """What its policies are besides their reliability, in a few words each."""
+        """Describe in a few words each policy, except the reliability, that differs from the default."""
         said = []
         if self.policies.get("durability") == "transient_local":
             said.append("transient local")
@@ -38,7 +38,7 @@ class Endpoint:
 
 
 _ROW, _LOW_ROW, _FEW = 84.0, 62.0, 4
-"""Height of a row; of one where there are more than a few."""
+"""The height of a row, its height if there are many rows, and the number from which they count as many."""
 Mismatch = Callable[[Endpoint, Endpoint], str | None]
 
 
@@ -47,13 +47,13 @@ def graph(
 ) -> Picture:
     """Draw nodes (ovals), topics (boxes), and an arrow for each publisher and each subscription.
 
-    An arrow without words is reliable and volatile, without limits; a broken line is best effort.
+    An arrow without words means reliable and volatile, without limits; a dashed line means best effort.
 
     Args:
-        nodes: full names of all nodes, those without a topic too.
-        endpoints: publishers and subscriptions.
-        mismatch: says over which policy a publisher and a subscription of one topic do not match; None if they do.
-            A subscription that matches no publisher of its topic is crossed out.
+        nodes: the full names of all nodes, including those without a topic.
+        endpoints: the publishers and subscriptions.
+        mismatch: returns the policy because of which a publisher and a subscription on one topic do not match, or None
+            if they match. A subscription that matches no publisher on its topic is crossed out.
     """
     everyone = list(endpoints)
     ends = list(dict.fromkeys((end.node, end.topic, end.publishes) for end in everyone))
@@ -79,9 +79,9 @@ def graph(
 
 
 def _layers(nodes: Sequence[str], ends: Sequence[tuple[str, str, bool]]) -> dict[tuple[str, str], int]:
-    """A column for each thing: what is published lies right of its publisher, who hears it right of that."""
+    """Return a column for each node and topic: a topic is right of its publishers, and its subscribers right of it."""
     layers = {("node", node): 0 for node in nodes} | {("topic", topic): 1 for _, topic, _ in ends}
-    for _ in range(len(nodes)):  # a circle of nodes would go on without an end
+    for _ in range(len(nodes)):  # this ends even if the nodes form a cycle
         before = dict(layers)
         for node, topic, publishes in ends:
             source, target = (("node", node), ("topic", topic)) if publishes else (("topic", topic), ("node", node))
@@ -95,7 +95,7 @@ def _layers(nodes: Sequence[str], ends: Sequence[tuple[str, str, bool]]) -> dict
 def _places(
     columns: Mapping[int, Sequence[tuple[str, str]]], height: float
 ) -> dict[tuple[str, str], tuple[float, float, float]]:
-    """Centre and width of each thing."""
+    """Return the centre and the width of each node and topic."""
     places = {}
     count = max(columns, default=0) + 1
     room = WIDTH / count
@@ -137,7 +137,7 @@ def _arrow(
 
 
 def _refused(end: Endpoint, everyone: Sequence[Endpoint], mismatch: Mismatch) -> str:
-    """The policy over which a subscription matches no publisher of its topic; empty if it matches one."""
+    """Return the policy because of which a subscription matches no publisher on its topic, or "" if it matches one."""
     if end.publishes:
         return ""
     offers = [other for other in everyone if other.publishes and other.topic == end.topic]
@@ -161,12 +161,13 @@ _MATCH_ROW = 62.0
 
 
 def qos(topic: str, endpoints: Sequence[Endpoint], mismatch: Mismatch) -> Picture:
-    """Draw a table of pairs: publishers at the left with what they offer, subscriptions on top with what they request.
+    """Draw a table with the offers of publishers at the left and the requests of subscriptions at the top.
 
     Args:
-        topic: full name.
-        endpoints: of that topic.
-        mismatch: says over which policy a publisher and a subscription do not match; None if they do.
+        topic: the full name of the topic.
+        endpoints: the publishers and subscriptions on that topic.
+        mismatch: returns the policy because of which a publisher and a subscription do not match, or None if they
+            match.
     """
     offers = [end for end in endpoints if end.publishes]
     requests = [end for end in endpoints if not end.publishes]

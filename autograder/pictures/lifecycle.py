@@ -1,4 +1,4 @@
-"""The state machine of a lifecycle node, with the way that a node took through it."""
+"""Draws the state machine of a lifecycle node, with the transitions of one node."""
 
 from __future__ import annotations
 
@@ -44,22 +44,22 @@ _BADGES = {
 
 @dataclass(frozen=True)
 class Step:
-    """One requested transition and where it led."""
+    """One requested transition and the state to which it led."""
 
     label: str
     start: str
     goal: str
     error: bool = False
-    """The callback ended in ERROR, or raised, and `on_error` was called."""
+    """Whether the callback returned ERROR or raised an exception, so that `on_error` was called."""
 
     @property
     def failed(self) -> bool:
-        """Whether the node did not get where the transition leads."""
+        """Whether the node did not reach the goal state of the transition."""
         return self.error or (self.start == self.goal)
 
 
 def steps(changes: Iterable[tuple[str, str]]) -> list[Step]:
-    """Return the transitions behind a node's state changes, each a pair of labels as `transition_event` tells them."""
+    """Return the transitions that caused a node's state changes, which are pairs of labels as in `transition_event`."""
     found: list[Step] = []
     start, label, error = "", "", False
     for before, after in changes:
@@ -74,12 +74,12 @@ def steps(changes: Iterable[tuple[str, str]]) -> list[Step]:
 
 
 def lifecycle(node: str, way: Sequence[Step], state: str = "") -> Picture:
-    """Draw the four primary states and the transitions between them, the way of a node numbered.
+    """Draw the four primary states and the transitions between them, with numbers for the transitions of a node.
 
     Args:
-        node: full name; empty: only the state machine is drawn.
-        way: what `steps` made of its changes.
-        state: in which it is now; by default where its way ends.
+        node: the full name of the node; if it is empty, only the state machine is drawn.
+        way: the node's transitions, as returned by `steps`.
+        state: the state in which the node is now; by default, the one to which its last transition led.
     """
     now = state or (way[-1].goal if way else "")
     lines = [_sentence(number, step) for number, step in enumerate(way, 1)]

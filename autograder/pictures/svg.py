@@ -1,4 +1,4 @@
-"""A small canvas that writes SVG: boxes, lines, arrows, words, and hatching for those who print in black and white."""
+"""A small canvas that writes SVG: boxes, lines, arrows, text, and hatching for printing in black and white."""
 
 from __future__ import annotations
 
@@ -8,14 +8,16 @@ from html import escape
 from autograder.core.results import Picture
 
 TEXT = 18
-"""Size of words, in units of a canvas that is WIDTH wide: still 2.5 % of the height of a slide that it fills."""
+"""The size of text in the units of a canvas. On a canvas that is WIDTH wide and fills a slide, text has at least 2.5 %
+of the slide's height."""
 SMALL = 16
 WIDTH = 900.0
 LETTER = 0.58
-"""Width of a letter beside its height, about: an `<img>` cannot ask for the font that it gets."""
+"""The approximate ratio of a letter's width to its height. It is not exact because an `<img>` cannot choose its
+font."""
 
 FILLS = ("#9bd3f5", "#f7c873", "#8fd6bf", "#e6bfd5", "#f4ee9c", "#d9d9d9", "#f2b091")
-"""Okabe and Ito's colours, lightened so that black words can stand on them."""
+"""The colours of Okabe and Ito, lightened so that black text on them is readable."""
 
 _HATCHES = (
     "",
@@ -29,17 +31,20 @@ _HATCHES = (
 
 
 def width_of(text: str, size: float = TEXT) -> float:
-    """Return about how wide a text is."""
+    """Return the approximate width of a text."""
     return len(text) * size * LETTER
 
 
 def _printable(text: str) -> str:
-    """A text as XML and JSON can hold it: names may come from a program that forges them."""
+    """Return a text without unprintable characters, which XML or JSON may not allow.
+
+    They can occur because a program can forge names.
+    """
     return "".join(letter for letter in text if letter.isprintable())
 
 
 def shortened(text: str, room: float, size: float = TEXT) -> str:
-    """Return a text that fits into `room`; what is too long loses its middle."""
+    """Return a text that fits into `room`. If it is too long, its middle is left out."""
     most = max(3, int(room / (size * LETTER)))
     if len(text) <= most:
         return text
@@ -48,7 +53,7 @@ def shortened(text: str, room: float, size: float = TEXT) -> str:
 
 
 class Canvas:
-    """What is drawn comes in order, the later above the earlier."""
+    """A sheet on which shapes are drawn in order, the later ones above the earlier ones."""
 
     def __init__(self, height: float, width: float = WIDTH) -> None:
         """Begin with an empty sheet."""
@@ -68,7 +73,7 @@ class Canvas:
         round: float = 0,
         dashed: bool = False,
     ) -> None:
-        """Draw a rectangle; `look` chooses a colour together with a hatching."""
+        """Draw a rectangle; `look` is the number of a colour and a hatching."""
         if look is not None:
             fill = FILLS[look % len(FILLS)]
         shape = f'x="{x:.1f}" y="{y:.1f}" width="{max(width, 0.1):.1f}" height="{height:.1f}" rx="{round:g}"'
@@ -99,7 +104,7 @@ class Canvas:
         fill: str = "#000000",
         halo: bool = False,
     ) -> None:
-        """Write a text whose baseline begins, ends or is centred at a point; `halo` keeps lines away from it."""
+        """Write a text whose baseline begins, ends or is centred at a point; `halo` draws a white border around it."""
         style = (' font-weight="bold"' if bold else "") + (' font-style="italic"' if italic else "")
         style += ' paint-order="stroke" stroke="#fff" stroke-width="5" stroke-linejoin="round"' if halo else ""
         self._parts.append(
@@ -122,7 +127,7 @@ class Canvas:
         arrow: bool = False,
         grey: bool = False,
     ) -> None:
-        """Draw a line through points, with an arrow at its end if wanted."""
+        """Draw a line through points, with an arrowhead at its end if `arrow` is true."""
         path = "M" + "L".join(f"{x:.1f} {y:.1f}" for x, y in points)
         self.path(path, line=line, dashed=dashed, arrow=arrow, grey=grey)
 
@@ -135,7 +140,7 @@ class Canvas:
         self._parts.append(f'<path d="{path}" fill="none" stroke="{colour}" stroke-width="{line:g}"{more}/>')
 
     def picture(self, alt: str) -> Picture:
-        """Return what has been drawn, with its words."""
+        """Return the picture of everything that has been drawn, with its description in words."""
         body = "".join(self._parts)
         hatches = "".join(
             f'<pattern id="h{number}" width="10" height="10" patternUnits="userSpaceOnUse">'
@@ -160,7 +165,7 @@ class Canvas:
 
 
 def seconds_axis(canvas: Canvas, left: float, top: float, bottom: float, seconds: float) -> float:
-    """Draw the grid of a time axis from 0 to `seconds`, with its numbers; return the units for one second."""
+    """Draw the grid of a time axis from 0 to `seconds`, with its numbers, and return the units for one second."""
     right = canvas.width - 24
     per_second = (right - left) / seconds
     steps = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 30.0, 60.0, 600.0, 3600.0)

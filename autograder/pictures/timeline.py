@@ -1,4 +1,4 @@
-"""Pictures along time: which callback ran when on which thread, and when messages arrived."""
+"""Draws timelines: when each callback ran on which thread, and when messages arrived."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from autograder.pictures.svg import SMALL, TEXT, WIDTH, Canvas, seconds_axis, sh
 
 @dataclass(frozen=True)
 class Run:
-    """One run of a callback. Times are seconds, from any common beginning."""
+    """One run of a callback. Times are in seconds, from any common starting point."""
 
     callback: str
     begin: float
@@ -24,18 +24,18 @@ class Run:
     """The callback group in words, such as `default group, exclusive`."""
     node: str = ""
     ended: bool = True
-    """False: it was still under way when it was last seen."""
+    """Whether it had ended; False if it was still running when it was last seen."""
 
 
 class Runs(Sequence[Run]):
-    """Runs of the callbacks of one launch, in the order in which they began.
+    """The runs of the callbacks of one launch, in the order in which they began.
 
     Args:
-        runs: in any order.
+        runs: the runs in any order.
     """
 
     def __init__(self, runs: Iterable[Run]) -> None:
-        """Put them in order."""
+        """Sort the runs."""
         self._runs = tuple(sorted(runs, key=lambda run: (run.begin, run.end, run.callback)))
 
     def __len__(self) -> int:
@@ -52,61 +52,64 @@ class Runs(Sequence[Run]):
         return f"runs of callbacks: {counts or 'none'}"
 
     def callbacks(self) -> list[str]:
-        """Names of the callbacks, in the order in which they first ran."""
+        """Return the names of the callbacks, in the order in which they first ran."""
         return list(dict.fromkeys(run.callback for run in self._runs))
 
     def of(self, *callbacks: str) -> Runs:
-        """Return the runs of these callbacks; of all of them if none is named."""
+        """Return the runs of these callbacks, or of all callbacks if none is named."""
         return self._chosen(lambda run: not callbacks or run.callback in callbacks)
 
     def of_node(self, node: str) -> Runs:
-        """Return the runs of the callbacks of one node, by its full name."""
+        """Return the runs of the callbacks of the node with this full name."""
         return self._chosen(lambda run: run.node == node)
 
     def between(self, begin: float, end: float) -> Runs:
-        """Return the runs that were under way at some time from `begin` to `end`."""
+        """Return the runs that were active at some time between `begin` and `end`."""
         return self._chosen(lambda run: run.begin < end and run.end >= begin)
 
     def _chosen(self, wanted: Callable[[Run], bool]) -> Runs:
         return Runs(run for run in self._runs if wanted(run))
 
     def count(self, *callbacks: str) -> int:
-        """How many runs of these callbacks began."""
+        """Return how many runs of these callbacks began."""
         return len(self.of(*callbacks))
 
     def threads(self, *callbacks: str) -> set[int]:
-        """The threads on which these callbacks ran."""
+        """Return the threads on which these callbacks ran."""
         return {run.thread for run in self.of(*callbacks)}
 
     def overlap(self, *callbacks: str) -> int:
-        """How many runs of these callbacks were under way at once, at the most."""
+        """Return the largest number of runs of these callbacks at the same time."""
         changes = sorted(change for run in self.of(*callbacks) for change in ((run.begin, 1), (run.end, -1)))
         return max(itertools.accumulate(change for _, change in changes), default=0)
 
     def longest_pause(self, callback: str) -> float:
-        """The longest time from one begin of a callback to its next, in seconds; infinite if there is no next one."""
+        """Return the longest time between two successive begins of a callback, in seconds.
+
+        It is infinite if there are fewer than two runs.
+        """
         begins = [run.begin for run in self.of(callback)]
         return max((later - earlier for earlier, later in itertools.pairwise(begins)), default=float("inf"))
 
     def longest(self, callback: str) -> float:
-        """The longest time that one run of a callback took, in seconds."""
+        """Return the longest time that one run of a callback took, in seconds."""
         return max((run.end - run.begin for run in self.of(callback)), default=0.0)
 
 
 _LANE = 30.0
-"""Height of one row of bars."""
+"""The height of one row of bars."""
 _HEAD = 26.0
-"""Height of a heading above rows."""
+"""The height of a heading above rows."""
 _MOST_LABEL = 270.0
 _MOST_LANES = 16
-"""Rows of bars for one callback: more runs at once than that are drawn above each other."""
+"""The number of rows of bars for one callback. If more runs overlap, the bars of the others cover each other."""
 _MOST_RUNS = 600
-"""Bars of one picture."""
+"""The largest number of bars in one panel of a picture."""
 
 
 @dataclass(frozen=True)
 class _Row:
-    """What one label stands for."""
+    """The bars of one label."""
 
     label: str
     below: str
@@ -119,10 +122,11 @@ def timeline(
     """Draw when callbacks ran.
 
     Args:
-        runs: of one launch, or of several, each with a title; they get panels below each other on one axis.
-        seconds: how much to draw; by default all of it, and not more than 4 s.
-        by: `callback`, a row for each callback under its group, or `thread`, a row for each thread.
-        start: where to begin, in the time of the runs; by default each panel begins with its first run.
+        runs: the runs of one launch, or those of several launches by their titles. The launches get panels below each
+            other with a common time axis.
+        seconds: the time to draw; by default, all of it, but not more than 4 s.
+        by: `callback` for a row for each callback below its group, or `thread` for a row for each thread.
+        start: the time at which to begin, in the time of the runs; by default, each panel begins with its first run.
 
     Raises:
         ValueError: `by` is neither of the two.
@@ -175,7 +179,7 @@ def _moved(run: Run, zero: float) -> Run:
 
 
 def _sections(runs: Sequence[Run], by: str) -> list[tuple[str, list[_Row]]]:
-    """The rows, by the heading above them."""
+    """Return the headings, each with the rows below it."""
     if by == "thread":
         threads = sorted({run.thread for run in runs})
         rows = [_Row(f"thread {number}", "", [[run for run in runs if run.thread == number]]) for number in threads]
@@ -200,7 +204,7 @@ def _listed(numbers: Sequence[int]) -> str:
 
 
 def _lanes(runs: Sequence[Run]) -> list[list[Run]]:
-    """Runs that overlap lie below each other."""
+    """Distribute runs to lanes, so that runs that overlap are drawn below each other."""
     lanes: list[list[Run]] = []
     for run in runs:
         free = next((lane for lane in lanes if lane[-1].end <= run.begin), None)
@@ -227,7 +231,7 @@ def _height(title: str, sections: Sequence[tuple[str, Sequence[_Row]]]) -> float
 
 
 def _grid(canvas: Canvas, left: float, top: float, bottom: float, seconds: float) -> float:
-    """The grid without numbers, for panels above the last."""
+    """Draw the grid without numbers, for panels above the last one, and return the units for one second."""
     per_second = (canvas.width - 24 - left) / seconds
     canvas.line([(left, top), (left, bottom), (canvas.width - 24, bottom)], line=1, grey=True)
     return per_second
@@ -244,7 +248,7 @@ def _draw_section(
     looks: Mapping[str, int],
     by: str,
 ) -> float:
-    """Draw a heading and its rows from `y` down; return where the next one begins."""
+    """Draw a heading and its rows from `y` downwards, and return where the next heading begins."""
     if heading:
         canvas.band(8, y + 2, canvas.width - 16, _HEAD - 4)
         canvas.words(14, y + TEXT, heading, size=SMALL, italic=True)
@@ -309,22 +313,22 @@ _TOPIC_ROW = 58.0
 
 @dataclass(frozen=True)
 class Traffic:
-    """The messages of one end of a topic. Times are seconds, from any common beginning."""
+    """The messages of one end of a topic. Times are in seconds, from any common starting point."""
 
     who: str
-    """`/camera publishes`, `/viewer takes`."""
+    """The label of the end, such as `/camera publishes` or `/viewer takes`."""
     times: Sequence[float]
     since: float | None = None
-    """When its node was made; None: nobody knows."""
+    """When its node was created; None if that is not known."""
 
 
 def arrivals(topic: str, traffic: Sequence[Traffic], *, seconds: float | None = None) -> Picture:
     """Draw a row for each end of a topic, and a stroke for each message.
 
     Args:
-        topic: full name.
-        traffic: of the publishers first, then of those who take the messages.
-        seconds: how much to draw from the first event on; by default all of it.
+        topic: the full name of the topic.
+        traffic: the messages of the publishers first, then those of the subscriptions.
+        seconds: the time to draw from the first event on; by default, all of it.
     """
     every = [time for row in traffic for time in (*row.times, *([row.since] if row.since is not None else []))]
     zero = min(every, default=0.0)

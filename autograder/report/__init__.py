@@ -1,1 +1,1 @@
-"""The views of a result: HTML, terminal and JUnit; JSON is the result itself."""
+"""Show a result as HTML, on the terminal or in other formats. The JSON form is the result itself."""

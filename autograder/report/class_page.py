@@ -1,6 +1,6 @@
-"""The class page: one file for a lab, for whoever teaches it. It shows hidden checks, so it is not for students.
+"""Write the class page of a lab for its instructors. The page shows hidden checks, so it is not for students.
 
-Points are those of the gradebook; where the gradebook does not have a submission, those that its checks gave.
+The points come from the gradebook. If the gradebook does not have a submission, they come from its checks.
 """
 
 from __future__ import annotations
@@ -28,15 +28,15 @@ from autograder.report.terminal import class_status, why_lost
 from autograder.report.words import Verdict
 
 _BINS = 10
-"""Bars of the distribution, each of as many percent as the others."""
+"""The number of bars in the distribution. All of them have the same width in points."""
 _FEWEST = 5
-"""Of fewer students a discrimination says nothing."""
+"""The number of students that is needed to compute a discrimination."""
 _SCRIPT = Path(__file__).with_name("templates") / "class.js"
 
 
 @dataclass(frozen=True)
 class _Person:
-    """What a person has to look at."""
+    """Something that a person has to look at."""
 
     student: str
     what: str
@@ -44,7 +44,7 @@ class _Person:
 
 
 def _together(persons: Sequence[_Person]) -> list[dict[str, object]]:
-    """What is the same for several students stands once."""
+    """Combine entries that are the same for several students."""
     students: dict[tuple[str, str], list[str]] = {}
     for person in persons:
         students.setdefault((person.what, person.why), []).append(person.student)
@@ -58,9 +58,9 @@ def write_class_page(path: Path, entries: Sequence[Entry], written: datetime.dat
     """Write the page of one lab and return its path.
 
     Args:
-        path: of the page.
+        path: the file for the page.
         entries: the lab's submissions.
-        written: the day that stands on the page.
+        written: the date that is shown on the page.
     """
     scores = [_earned(entry) for entry in entries]
     top = max((_top(entry) for entry in entries), default=0.0)
@@ -123,10 +123,10 @@ def _persons(entries: Sequence[Entry]) -> list[_Person]:
                 found.append(_Person(entry.student, what, "An answer in words, which nobody has graded yet."))
         for cell in entry.grade.stale if entry.grade is not None else ():
             what = f"{cell.grade_id}: {points(cell.points or 0.0)} points by hand"
-            found.append(_Person(entry.student, what, "What you graded has changed since: look at it again."))
+            found.append(_Person(entry.student, what, "The work has changed since you graded it, so look at it again."))
         found += [_Person(entry.student, "look at this; the points stay", flag) for flag in entry.result.flags]
         if entry.grade is None:
-            found.append(_Person(entry.student, "not in the gradebook", "Grade the class once more."))
+            found.append(_Person(entry.student, "not in the gradebook", "Grade the class again."))
     return found
 
 
@@ -135,7 +135,7 @@ def _title(check: CheckResult) -> str:
 
 
 def _checks(entries: Sequence[Entry]) -> list[dict[str, object]]:
-    """What became of each check, in the lab's order."""
+    """Return a row of statistics for each check, in the lab's order."""
     order = list(dict.fromkeys(check.grade_id for entry in entries for check in entry.result.checks))
     rows = []
     for grade_id in order:
@@ -163,25 +163,25 @@ def _checks(entries: Sequence[Entry]) -> list[dict[str, object]]:
 
 
 def _share(entry: Entry, check: CheckResult) -> float:
-    """How much of a check's points somebody has, from 0 to 1."""
+    """Return the share of a check's points that a student has, from 0 to 1."""
     cells = entry.grade.cells if entry.grade is not None else ()
     earned = next((cell.points for cell in cells if cell.grade_id == check.grade_id), check.points)
     return (earned or 0.0) / check.max_points if check.max_points else 0.0
 
 
 def _discrimination(found: Sequence[tuple[Entry, CheckResult]], shares: Sequence[float]) -> str:
-    """The correlation of a check's points with those of all others, from -1 to 1; a word where there is none."""
+    """Return the correlation of a check's points with those of all other checks, or a word if there is none."""
     rest = [_earned(entry) - share * check.max_points for (entry, check), share in zip(found, shares, strict=True)]
     if len(found) < _FEWEST:
         return "too few"
     try:
         return f"{statistics.correlation(shares, rest):.2f}"
-    except statistics.StatisticsError:  # all have the same
+    except statistics.StatisticsError:  # all students have the same points
         return "all alike"
 
 
 def _reasons(checks: Sequence[CheckResult]) -> list[dict[str, object]]:
-    """Why points were lost, each reason once a student, the most frequent first."""
+    """Return the reasons why points were lost, the most frequent first. A reason counts once for each student."""
     counts: Counter[str] = Counter()
     example: dict[str, str] = {}
     for check in checks:

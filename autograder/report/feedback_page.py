@@ -1,4 +1,4 @@
-"""The page that a student gets to read: what it came to, what to repair first, then each task, all in one file."""
+"""Make a student's feedback page: the points, what to repair first, and then each task, all in one file."""
 
 from __future__ import annotations
 
@@ -19,56 +19,56 @@ from autograder.report.html import check_html, render
 from autograder.report.words import Verdict
 
 _FIRST = 3
-"""Reasons that are named under "repair this first"."""
+"""The number of reasons that are listed under "What to repair first"."""
 
 
 @dataclass
 class Task:
-    """One task of the lab: what stands between two headings that has points."""
+    """A task of the lab: a section under one heading that has points."""
 
     title: str
     graded: list[str] = field(default_factory=list)
     """The grade_ids of its graded cells, in order."""
     answers: dict[str, str] = field(default_factory=dict)
-    """What the student wrote, by grade_id."""
+    """The student's answers, by grade_id."""
     part: str = ""
-    """The part of the lab that it belongs to; its own title, if the lab has no smaller ones."""
+    """The part of the lab to which the task belongs; the task's own title if that part has no smaller sections."""
 
 
 @dataclass(frozen=True)
 class Heading:
-    """What stands at the top of the page."""
+    """The top of the page."""
 
     lab: str
     student: str
     name: str = ""
     handed_in: str = ""
-    """Date and time; empty if nothing says so."""
+    """The date and time of the submission; empty if they are not known."""
 
 
 @dataclass
 class _Repair:
-    """One thing to repair, and what it cost."""
+    """A reason why points were lost, with the tasks that it concerns."""
 
     why: str
     hint: str
     lost: float = 0.0
     tasks: dict[str, str] = field(default_factory=dict)
-    """Titles, by anchor."""
+    """The titles of the tasks, by their anchor on the page."""
     checks: set[str] = field(default_factory=set)
     begun: bool = False
-    """Whether any of these tasks was worked on."""
+    """Whether the student has begun any of these tasks."""
 
     @property
     def points(self) -> str:
-        """Such as `1 point`."""
+        """The lost points in words, such as `1 point`."""
         number = _number(self.lost)
         return f"{number} {'point' if number == '1' else 'points'}"
 
 
 @dataclass(frozen=True)
 class _Graded:
-    """A graded cell, ready to be shown."""
+    """A graded cell in the form that the page shows."""
 
     points: str
     verdict: str
@@ -83,14 +83,14 @@ class _Graded:
 def feedback_html(
     heading: Heading, tasks: Sequence[Task], result: SubmissionResult | None, grade: Grade, written: datetime.date
 ) -> str:
-    """Return the page.
+    """Return the page as HTML.
 
     Args:
-        heading: for whom, and of which lab.
-        tasks: in the lab's order.
-        result: what checking found out; None: it is not stored any more.
-        grade: as the gradebook has it.
-        written: the day that stands on the page.
+        heading: the top of the page.
+        tasks: the tasks in the lab's order.
+        result: the result of the checks; None if it is no longer stored.
+        grade: the grade in the gradebook.
+        written: the date that is shown on the page.
     """
     shown = result_for(result, "student") if result is not None else None
     checks = {check.grade_id: check for check in shown.checks} if shown is not None else {}
@@ -135,7 +135,7 @@ def feedback_html(
 def _parts(
     tasks: Sequence[Task], cells: Mapping[str, CellGrade], sections: Sequence[Mapping[str, object]]
 ) -> list[dict[str, object]]:
-    """The sections by part of the lab; a part of one section of that very name needs no line of its own."""
+    """Group the sections by part of the lab. A part with only one section of the same name gets no title."""
     parts = []
     pairs = zip(tasks, sections, strict=True)
     for title, group in groupby(pairs, key=lambda pair: pair[0].part):
@@ -205,9 +205,9 @@ def _graded(cell: CellGrade, check: CheckResult | None, task: Task, fold: bool) 
 
 
 def _repairs(tasks: Sequence[Task], cells: Mapping[str, CellGrade], checks: Mapping[str, CheckResult]) -> list[_Repair]:
-    """What to repair first: the reasons that cost the most, each with the tasks that it is the first reason of.
+    """Return the reasons that cost the most points, each with the tasks for which it is the first reason.
 
-    What was begun comes before what is still untouched: only the former is there to be repaired.
+    Tasks that the student has begun come before tasks that are still untouched, because only those can be repaired.
     """
     repairs: dict[str, _Repair] = {}
     for number, task in enumerate(tasks, start=1):

@@ -1,6 +1,6 @@
-"""What GitHub Actions shows of a check: a line in the log for each finding, and a summary of the step in Markdown.
+"""Write a result for GitHub Actions: a line in the log for each finding, and a summary of the step in Markdown.
 
-Source of both forms: GitHub's documentation, "Workflow commands for GitHub Actions".
+Source: GitHub's documentation, "Workflow commands for GitHub Actions".
 """
 
 from __future__ import annotations
@@ -13,11 +13,11 @@ from autograder.report.audience import reason
 
 
 def commands(result: SubmissionResult, notebook: Path) -> str:
-    """Return the workflow commands that become annotations: errors for failures, warnings for what nobody found out.
+    """Return the workflow commands that become annotations: errors for failures, and warnings for undecided checks.
 
     Args:
-        result: as its reader may see it.
-        notebook: that was checked; findings belong to the file as a whole.
+        result: the result as its reader may see it.
+        notebook: the notebook that was checked. All findings belong to the file as a whole.
     """
     lines = [_line("error", notebook, problem.title, problem) for problem in result.problems]
     for check in result.checks:
@@ -29,10 +29,10 @@ def commands(result: SubmissionResult, notebook: Path) -> str:
 
 
 def summary(result: SubmissionResult) -> str:
-    """Return the step's summary: a table of the checks, and what is wrong below it.
+    """Return the summary of the step in Markdown: a table of the checks, and below it the findings.
 
     Args:
-        result: as its reader may see it.
+        result: the result as its reader may see it.
     """
     rows = [
         f"| {words.SYMBOL[words.verdict(check)]} | {_cell(check.title or check.grade_id)} | {words.points(check)} |"
@@ -54,7 +54,7 @@ def summary(result: SubmissionResult) -> str:
 
 
 def _line(kind: str, notebook: Path, title: str, outcome: Outcome) -> str:
-    """A workflow command; what could end it early is written with its code."""
+    """Return a workflow command in which characters that could end it early are escaped."""
     said = "\n".join(text for text in (reason(outcome), outcome.hint) if text)
     names = {"file": str(notebook), "title": title}
     properties = ",".join(f"{key}={_escaped(value, ':,')}" for key, value in names.items())
@@ -68,6 +68,6 @@ def _escaped(text: str, more: str = "") -> str:
 
 
 def _cell(text: str) -> str:
-    """Text in a line of Markdown: nothing in it opens a tag, a link, a picture or a cell of a table."""
+    """Escape a text for a line of Markdown, so that it cannot begin a tag, a link, a picture or a cell of a table."""
     plain = " ".join(text.split()).replace("&", "&amp;").replace("<", "&lt;")
     return "".join(f"\\{character}" if character in "\\|[]!*_~" else character for character in plain)

@@ -1,7 +1,7 @@
-"""The HTML view, for the notebook and the feedback: inline styles only, everything of a student's escaped.
+"""Show a result as HTML, for notebooks and feedback pages, with inline styles only and with all values escaped.
 
-Each verdict is a word, a symbol and a colour at once, so that it can be read in print, on a dark page and with any
-colour vision. Only symbols and borders are coloured, with Okabe and Ito's colours; text has the colour of the page.
+Each verdict is shown as a word, a symbol and a colour, so that it can be read in print, on a dark page and with any
+colour vision. Only symbols and borders have colours, which are those of Okabe and Ito. Text has the colour of the page.
 """
 
 from __future__ import annotations
@@ -27,15 +27,15 @@ _PIECE = re.compile(r";\s+|(?<=[.?!])\s+(?=[A-Z`])")
 
 @dataclass(frozen=True)
 class Hint:
-    """One hint; the next one tells more."""
+    """A hint. The hint after it tells more."""
 
     text: str
     section: Section | None = None
-    """Where to read on."""
+    """The section of a lecture in which to read more."""
 
 
 def hints(outcome: Outcome, book: Book) -> list[Hint]:
-    """Return an outcome's hints, the one that tells least first: where to read on, then what to look at or to do."""
+    """Return an outcome's hints. The first ones tell least: where to read more. Then follows what to look at or do."""
     pieces = [piece.strip() for piece in _PIECE.split(outcome.hint) if piece.strip()]
     pointing = [(piece, book.named_in(piece)) for piece in pieces]
     read = [Hint(_sentence(text), section) for text, section in pointing if section is not None]
@@ -61,18 +61,18 @@ _LOOK = {
 }
 _VERDICT = {Status.FAILED: Verdict.FAILED, Status.UNKNOWN: Verdict.UNKNOWN, Status.PASSED: Verdict.PASSED}
 
-# JupyterLab's own colours, so that a dark theme stays dark; the second of each is for pages without a theme.
+# JupyterLab's own colours, so that a dark theme stays dark. The second colour of each is for pages without a theme.
 _INK = "var(--jp-content-font-color1, #1a1a1a)"
 _FAINT = "var(--jp-content-font-color2, #555555)"
 _LINE = "var(--jp-border-color1, #bdbdbd)"
 _CODE_STYLE = "white-space:pre-wrap; color:inherit; background:var(--jp-layout-color2, #eeeeee); padding:0 3px"
 
 LOG_LINES = 40
-"""Lines of a program's output that stand under a failed check."""
+"""The number of lines of a program's output that are shown under a failed check."""
 
 
 def _code(text: str) -> Markup:
-    """Escape, and set what stands between backticks in code type."""
+    """Escape a text, and set the parts between backticks in code type."""
     pieces = plain(text).split("`")
     if len(pieces) % 2 == 0:
         return escape(plain(text))
@@ -84,7 +84,7 @@ def _code(text: str) -> Markup:
 
 
 def _shown(value: Any) -> Any:
-    """A value of a page: names of files and people, too, may hold what turns the direction of the whole page."""
+    """Make a value safe for a page, because even names may contain characters that change the direction of text."""
     return plain(value) if type(value) is str else value
 
 
@@ -106,7 +106,7 @@ def _environment() -> Environment:
 
 
 def render(template: str, **values: Any) -> str:
-    """Fill in a template of this package; every value is escaped."""
+    """Fill in a template of this package. Every value is escaped."""
     return _environment().get_template(template).render(**values)
 
 
@@ -121,17 +121,17 @@ def check_html(
     on_demand: bool = False,
     book: Book = NO_BOOK,
 ) -> str:
-    """Return one check's report as an HTML fragment: what was found first, then what holds, folded.
+    """Return a check's report as an HTML fragment: first the findings, then the collapsed list of what holds.
 
     Args:
-        check: to show.
-        audience: a student does not see what hidden tests look at.
-        title: of the check, where no heading stands above it.
+        check: the result to show.
+        audience: the reader. A student does not see what hidden tests check.
+        title: the title of the check; empty if there is a heading above the report.
         remarks: what the student should know about the cells that the programs came from.
-        origin: those cells, in words.
-        fold_pictures: where there are many checks, and others matter more.
-        on_demand: whether hints open one after the other, for a student who still works on it.
-        book: the course's lectures, to which hints on demand lead.
+        origin: the cells that the programs came from, in words.
+        fold_pictures: whether pictures are collapsed, because other checks on the page are more important.
+        on_demand: whether hints open one after the other, for a student who still works on the lab.
+        book: the course's lectures, to which hints on demand link.
     """
     shown = _each_thing_once(check_for(check, audience))
     verdict, found = words.verdict(shown), words.findings(shown)
@@ -167,7 +167,7 @@ def check_html(
 
 
 def _each_thing_once(check: CellResult) -> CellResult:
-    """Leave out a picture or a hint that a finding above has: several expectations may look at one run."""
+    """Leave out a picture or hint that an earlier finding has, because several expectations may check the same run."""
     seen: set[str] = set()
     outcomes = []
     for outcome in check.outcomes:

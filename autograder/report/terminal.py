@@ -1,4 +1,4 @@
-"""The terminal's view: one submission in full, a class as a table, and each verdict as soon as it is there."""
+"""Show results on the terminal: a submission in full, a class as a table, and each verdict as soon as it is known."""
 
 from __future__ import annotations
 
@@ -24,16 +24,16 @@ from autograder.submission.similar import Pair
 SYMBOL = {Status.PASSED: "✓", Status.FAILED: "✗", Status.NOT_CHECKED: "-", Status.UNKNOWN: "?"}
 STYLE = {Status.PASSED: "blue", Status.FAILED: "bold red", Status.NOT_CHECKED: "dim", Status.UNKNOWN: "bold magenta"}
 _JOINERS = "\u200c\u200d"
-"""Invisible, but part of how some scripts and emoji are written."""
+"""Invisible characters that are part of the spelling of some scripts and emoji."""
 _LOG_LINES = 20
 
 
 class _Shown(dict[int, int | str]):
-    """What stands on the terminal for each character; worked out once for each that occurs."""
+    """Maps each character to what the terminal shows for it. Each character is looked up only once."""
 
     def __missing__(self, code: int) -> int | str:
         character = chr(code)
-        # Control and format characters (which turn the direction of writing), other ends of lines, half characters.
+        # Control characters, format characters (which change the text direction), line separators, surrogates.
         hidden = unicodedata.category(character) in ("Cc", "Cf", "Zl", "Zp", "Cs") and character not in "\n" + _JOINERS
         self[code] = "�" if hidden else code
         return self[code]
@@ -43,19 +43,19 @@ _SHOWN = _Shown()
 
 
 def plain(text: str) -> str:
-    """Take out what cannot be seen: a student's output must not drive the terminal, nor seem to say something else."""
+    """Replace invisible characters, so that a student's text can neither control the terminal nor mislead a reader."""
     return text.replace("\t", "    ").translate(_SHOWN)
 
 
 def submission_view(result: SubmissionResult, audience: Audience = "student", book: Book = NO_BOOK) -> RenderableType:
-    """Return everything that this audience may know of one submission."""
+    """Return everything that this audience may see of a submission's result."""
     seen = result_for(result, audience)
     checks = [check_view(check, title=check.title or check.grade_id, book=book) for check in seen.checks]
     return Group(*problems_view(seen.problems, book), *checks, total_view(seen))
 
 
 def problems_view(problems: Sequence[Outcome], book: Book) -> list[RenderableType]:
-    """Return what is wrong with a submission as a whole."""
+    """Return the problems of a submission as a whole."""
     lines = [line for problem in problems for line in (_outcome_line(problem), *_details(problem, book))]
     return [*lines, Text()] if lines else []
 
@@ -71,7 +71,7 @@ def _total(result: SubmissionResult) -> Text:
 
 
 def summary_view(result: SubmissionResult) -> RenderableType:
-    """Return a line for each check, as students may know it, and the points."""
+    """Return a line for each check, as students may see it, and the total points."""
     table = Table.grid(padding=(0, 1))
     for check in result_for(result, "student").checks:
         verdict = words.verdict(check)
@@ -87,7 +87,7 @@ def check_view(
     title: str = "",
     book: Book = NO_BOOK,
 ) -> RenderableType:
-    """Return one check's report: what was found first, then what holds. Of a check that passed, a line."""
+    """Return a check's report: first the findings, then what holds. A check that passed gets only one line."""
     verdict, found = words.verdict(check), words.findings(check)
     style = _VERDICT_STYLE[verdict]
     head = Text.assemble((f"{words.SYMBOL[verdict]} ", style), (verdict.value, style))
@@ -128,7 +128,7 @@ def check_text(check: CellResult, remarks: Sequence[str], origin: str, book: Boo
 
 
 def evidence_view(check: CheckResult, book: Book) -> RenderableType:
-    """Return all that is known of a check, for an instructor: what passed, too, and all that its programs printed."""
+    """Return everything about a check for an instructor, including what passed and all output of its programs."""
     lines: list[RenderableType] = [
         check_view(check, title=check.title or check.grade_id, book=book),
         Text(),
@@ -186,7 +186,7 @@ def _details(outcome: Outcome, book: Book) -> list[RenderableType]:
 
 
 def why_lost(result: SubmissionResult) -> str:
-    """Why a submission lost points, in one line: the first check that did not pass, and its first failure."""
+    """Say in one line why a submission lost points: the first check that did not pass, and its first failure."""
     for number, check in enumerate(result.checks, start=1):
         if check.status is not Status.PASSED:
             failure = check.first_failure
@@ -198,8 +198,8 @@ def class_view(results: Sequence[SubmissionResult], by_hand: Mapping[str, str]) 
     """Return a class as a table: a row for each student, a symbol for each check, and why points were lost.
 
     Args:
-        results: of the class.
-        by_hand: by student, what people gave and what waits for them.
+        results: the results of the class.
+        by_hand: for each student, the points that people gave and what waits for them, in words.
     """
     checks = results[0].checks if results else []
     table = Table(box=None, header_style="bold", padding=(0, 1), pad_edge=False, expand=True)
@@ -225,7 +225,7 @@ def class_view(results: Sequence[SubmissionResult], by_hand: Mapping[str, str]) 
 
 
 def _marks(checks: Sequence[CheckResult]) -> Text:
-    """A symbol for each check, in groups of five that can be counted."""
+    """Return a symbol for each check, in groups of five so that they can be counted."""
     marks = Text()
     for number, check in enumerate(checks):
         marks.append(" " if number and number % 5 == 0 else "")
@@ -243,7 +243,7 @@ _WORD = {
 
 
 def class_status(result: SubmissionResult) -> Status:
-    """The worst status of a submission's checks."""
+    """Return the worst status of a submission's checks."""
     statuses = {check.status for check in result.checks}
     return next((s for s in (Status.UNKNOWN, Status.FAILED) if s in statuses), Status.PASSED)
 
@@ -253,7 +253,7 @@ def _legend(checks: Sequence[CheckResult]) -> list[str]:
 
 
 def undecided_view(results: Sequence[SubmissionResult]) -> RenderableType | None:
-    """Return what an instructor has to decide by hand or to look at, with the cause; None if there is nothing."""
+    """Return the checks that an instructor has to decide or look at, with the reasons; None if there are none."""
     lines = [Text(f"  {plain(line)}") for result in results for line in _undecided(result)]
     flagged = [Text(f"  {plain(result.student)}: {plain(flag)}") for result in results for flag in result.flags]
     found = []
@@ -266,7 +266,7 @@ def undecided_view(results: Sequence[SubmissionResult]) -> RenderableType | None
 
 
 def _undecided(result: SubmissionResult) -> list[str]:
-    """A line for each cause that left checks of a submission undecided, with all of these checks."""
+    """Return a line for each reason why checks of a submission are undecided, with the names of these checks."""
     by_cause: dict[str, list[str]] = {}
     for check in result.checks:
         if check.status is Status.UNKNOWN:
@@ -280,15 +280,15 @@ def _undecided(result: SubmissionResult) -> list[str]:
 
 
 _LINES = 3
-"""Equal lines of a pair that are shown."""
+"""The number of equal lines that are shown for a pair."""
 
 
 def similar_view(pairs: Sequence[Pair], count: int) -> RenderableType:
-    """Return pairs of submissions that are alike, with what a person should look at first.
+    """Return a view of pairs of similar submissions, with what a person should look at first.
 
     Args:
-        pairs: the most alike first.
-        count: of all submissions that were compared.
+        pairs: the pairs, the most similar first.
+        count: the number of submissions that were compared.
     """
     lines: list[RenderableType] = [Text(f"{count} submissions were compared.", "dim")]
     for pair in pairs:
@@ -297,15 +297,15 @@ def similar_view(pairs: Sequence[Pair], count: int) -> RenderableType:
         lines.append(Text(f"       in {', '.join(map(plain, pair.answers))}"))
         if pair.lines:
             number = f"{len(pair.lines)} line{'' if len(pair.lines) == 1 else 's'}"
-            lines.append(Text(f"       {number} that only these two have, letter for letter:"))
+            lines.append(Text(f"       {number} that are identical in these two and occur in no other submission:"))
             lines += [Text(f"         {plain(line[:90])}", "dim") for line in pair.lines[:_LINES]]
-    end = "A task has few solutions, and people may work together: read both before you ask anybody."
+    end = "A task has few solutions, and people may work together, so read both submissions before you ask anybody."
     lines.append(Text(end if pairs else "No pair reaches the smallest similarity that is shown (--at-least).", "dim"))
     return Group(*lines)
 
 
 def console() -> Console:
-    """Return a console for standard output; in a pipe or a log it is 120 columns wide."""
+    """Return a console for standard output. In a pipe or a log it is 120 columns wide."""
     made = Console(highlight=False)
     if not made.is_terminal:
         made.width = 120
@@ -313,19 +313,19 @@ def console() -> Console:
 
 
 class LiveReport:
-    """A report on one submission that is printed while its checks still run, in the lab's order.
+    """A report on one submission that is printed in the lab's order while its checks still run.
 
-    A verdict is printed once it is known and those above it are. On a terminal a line below says what is waited for; a
-    pipe or a log gets nothing of that.
+    A verdict is printed as soon as it and all verdicts before it are known. On a terminal, a line below the report says
+    what is running. In a pipe or a log, this line is not printed.
 
     Args:
         checks: the grade_ids of the lab's checks, in order.
-        audience: who reads it; None prints no report, only the line.
+        audience: the reader; None prints only the line and no report.
         book: the course's lectures.
     """
 
     def __init__(self, checks: Sequence[str], audience: Audience | None, book: Book) -> None:
-        """Nothing is known yet."""
+        """Prepare the report without printing anything."""
         self._book = book
         self._audience = audience
         self._screen = console()
@@ -337,27 +337,27 @@ class LiveReport:
         self._task = self._line.add_task(self._says(), total=None)
 
     def __enter__(self) -> LiveReport:
-        """Begin to show the line."""
+        """Show the line below the report."""
         self._line.start()
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Take it away."""
+        """Remove the line below the report."""
         self._line.stop()
 
     def begun(self, problems: Sequence[Outcome]) -> None:
-        """The submission has been read: this is wrong with it as a whole."""
+        """Print the problems of the submission as a whole, after it has been read."""
         if self._audience:
             for part in problems_view(problems, self._book):
                 self._screen.print(part)
 
     def at(self, worker: int, what: str) -> None:
-        """A worker is at this check now; empty: it has nothing more to do."""
+        """Show which check a worker is running; an empty text means that it has nothing more to do."""
         self._at[worker] = what
         self._line.update(self._task, description=self._says())
 
     def decided(self, check: CheckResult) -> None:
-        """A check came to this."""
+        """Take the result of a check, and print it if the results of all checks before it are known."""
         if check.grade_id in self._known:
             return
         self._known[check.grade_id] = check
@@ -365,7 +365,7 @@ class LiveReport:
             self._print(self._known[self._left.pop(0)])
 
     def finish(self, result: SubmissionResult) -> None:
-        """Print what nobody has told so far, and the points."""
+        """Print the results that have not been printed yet, and the points."""
         for check in result.checks:
             self.decided(check)
         self._line.stop()
@@ -385,17 +385,17 @@ class LiveReport:
 
 @contextlib.contextmanager
 def working(sentence: str) -> Iterator[None]:
-    """Say on the terminal what takes so long, and for how long; a pipe or a log gets nothing of it."""
+    """Show on the terminal what is being done and for how long. In a pipe or a log, nothing is printed."""
     with _line(Console(stderr=True)) as line:
         line.add_task(plain(sentence), total=None)
         yield
 
 
 class _Sentence(ProgressColumn):
-    """A task's description in one line, cut where the terminal ends."""
+    """A column with a task's description in one line, which is cut off at the edge of the terminal."""
 
     def render(self, task: Task) -> Text:
-        """Return it."""
+        """Return the description."""
         return Text(task.description, no_wrap=True, overflow="ellipsis")
 
 

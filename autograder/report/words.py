@@ -1,4 +1,4 @@
-"""What a check's result says, in words that every view uses."""
+"""Describe the result of a check in words that all views use."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from autograder.core.results import CellResult, Outcome, Part, Status, Submissio
 
 
 class Verdict(StrEnum):
-    """What became of a check, as its heading says it."""
+    """The verdict on a check, as its heading shows it."""
 
     PASSED = "passed"
     HOLDS = "holds so far"
-    """What is visible holds; the points are decided at grading."""
+    """The visible tests passed, and the points are decided at grading."""
     PARTLY = "partly passed"
     FAILED = "failed"
     NOT_ATTEMPTED = "not attempted yet"
@@ -32,7 +32,7 @@ SYMBOL = {
 
 
 def verdict(check: CellResult) -> Verdict:
-    """Return what became of a check."""
+    """Return the verdict on a check."""
     if check.status is Status.UNKNOWN:
         return Verdict.UNKNOWN
     if check.not_attempted and not check.points:
@@ -43,7 +43,7 @@ def verdict(check: CellResult) -> Verdict:
 
 
 def points(check: CellResult) -> str:
-    """Return a check's points in words, and never more than grading gives."""
+    """Return a check's points in words. They are never more than grading will give."""
     full = f"{check.max_points:g} point{'' if check.max_points == 1 else 's'}"
     if check.points is None:
         return f"points: your instructor decides (of {check.max_points:g})"
@@ -75,14 +75,14 @@ def part_points(part: Part) -> str:
 
 
 def part_verdict(part: Part) -> Verdict:
-    """Return what became of a part."""
+    """Return the verdict on a part."""
     if part.more_at_grading:
         return Verdict.HOLDS
     return Verdict.PASSED if part.points == part.max_points else Verdict.FAILED
 
 
 def not_attempted(check: CellResult) -> str:
-    """Say which answers are still untouched; empty if none is, or if it did not matter."""
+    """Say which answers are still as students receive them; empty if there are none."""
     files = [f"`%%node {name[:-3]}`" if name.endswith(".py") else f"`%%file {name}`" for name in check.not_attempted]
     if not files:
         return ""
@@ -94,7 +94,7 @@ def not_attempted(check: CellResult) -> str:
 
 @dataclass(frozen=True)
 class PartFindings:
-    """A part of a check, and what failed in it or could not be found out."""
+    """A part of a check, and its outcomes that failed or are unknown."""
 
     title: str
     verdict: Verdict
@@ -107,17 +107,17 @@ class Findings:
     """A check's outcomes in the order in which they matter."""
 
     bad: list[Outcome]
-    """What failed or could not be found out, outside of any part."""
+    """The outcomes that failed or are unknown and belong to no part."""
     lost: list[PartFindings]
-    """The parts in which something failed, or could not be found out."""
+    """The parts in which an outcome failed or is unknown, or which did not give all of their points."""
     held: list[PartFindings]
     passed: list[Outcome]
     not_looked_at: str
-    """How many were not looked at, as a sentence; empty if none."""
+    """A sentence that says how many expectations were not checked; empty if there are none."""
 
 
 def findings(check: CellResult) -> Findings:
-    """Sort a check's outcomes."""
+    """Sort a check's outcomes by their importance for the reader."""
     by_status = {status: [o for o in check.outcomes if o.status is status] for status in Status}
     left = len(by_status[Status.NOT_CHECKED])
     sentence = (
@@ -135,7 +135,7 @@ def findings(check: CellResult) -> Findings:
 
 
 def said_once(found: Findings) -> tuple[list[PartFindings], list[PartFindings]]:
-    """Split the lost parts: those that say something new, and those of which all reasons and hints stand above."""
+    """Split the lost parts into those that say something new, and those whose reasons and hints are all given above."""
     said = [(one.because, one.hint) for one in found.bad]
     new: list[PartFindings] = []
     again: list[PartFindings] = []
@@ -147,14 +147,14 @@ def said_once(found: Findings) -> tuple[list[PartFindings], list[PartFindings]]:
 
 
 def holding(found: Findings) -> str:
-    """Say how many parts and expectations hold; empty if none."""
+    """Say how many parts and expectations hold; empty if there are none."""
     counts = [(len(found.held), "part"), (len(found.passed), "expectation")]
     told = [f"{count} {what}{'' if count == 1 else 's'}" for count, what in counts if count]
     return f"{' and '.join(told)} {'holds' if sum(count for count, _ in counts) == 1 else 'hold'}" if told else ""
 
 
 def plain_title(markdown: str) -> str:
-    """Return a heading's text without Markdown's links and emphasis, and without saying that it is about a check."""
+    """Return a heading's text without links and emphasis of Markdown, and without `Check:` at its beginning."""
     text = re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", markdown)
     text = re.sub(r"(\*\*|__)(.+?)\1", r"\2", text)
     about = text.removeprefix("Check: ")

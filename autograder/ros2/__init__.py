@@ -1,1 +1,1 @@
-"""The verbs of ROS 2's command line, with the real tool's words, output and exit status, on rclpy alone."""
+"""The verbs of ROS 2's command line, with the same arguments, output and exit status, implemented with rclpy alone."""

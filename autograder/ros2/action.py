@@ -1,4 +1,4 @@
-"""`ros2 action`."""
+"""The verbs of `ros2 action`."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ _STATUS = {
     GoalStatus.STATUS_ABORTED: "ABORTED",
 }
 _CANCELED_WITHIN = 5.0
-"""Seconds that a server may take to answer that it cancels."""
+"""The seconds that a server may take to respond to a request to cancel."""
 
 
 def add_verbs(verbs: Any) -> None:
-    """Add them to the parser."""
+    """Add the verbs of `ros2 action` to the parser."""
     parser = add_graph_options(verbs.add_parser("list", help="Output a list of action names"))
     parser.add_argument("-t", "--show-types", action="store_true", help="Additionally show the action type")
     parser.add_argument("-c", "--count-actions", action="store_true", help="Only display the number of actions")
@@ -104,7 +104,7 @@ def _send_goal(session: Session, options: Any) -> None:
     if not handle.accepted:
         print("Goal was rejected.")
         return
-    try:  # from here on, printing included: Ctrl-C may come as soon as the goal is seen to be accepted
+    try:  # this includes the printing, because Ctrl-C may come as soon as the user sees that the goal is accepted
         print(f"Goal accepted with ID: {bytes(handle.goal_id.uuid).hex()}\n", flush=True)
         ended = session.answer(handle.get_result_async())
     except BaseException:
@@ -119,7 +119,10 @@ def _feedback(message: Any) -> None:
 
 
 def _cancel(session: Session, handle: Any) -> None:
-    """Whoever goes away takes the goal back. (The real tool tries to, and fails: it has left the graph by then.)"""
+    """Cancel the goal, because the verb is ended.
+
+    The real tool tries to do so as well, but fails, because it has already left the graph by then.
+    """
     print("Canceling goal...", flush=True)
     session.give_more_time(_CANCELED_WITHIN)
     answer = session.answer(handle.cancel_goal_async(), _CANCELED_WITHIN)

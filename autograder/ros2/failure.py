@@ -1,11 +1,14 @@
-"""How a verb ends that cannot do what it was asked to."""
+"""Exceptions that end a verb if it cannot do what was requested."""
 
 from __future__ import annotations
 
 
 class Failure(Exception):
-    """The user's mistake, or something that is not there: one sentence, in the real tool's words; exit status 1."""
+    """A mistake of the user, or something that does not exist. The message is a sentence of the real tool.
+
+    The exit status is 1 then.
+    """
 
 
 class TimeIsUp(Exception):
-    """The verb would go on, and was given only so many seconds."""
+    """The verb would continue, but its time limit is over."""

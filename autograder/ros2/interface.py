@@ -1,4 +1,4 @@
-"""`ros2 interface`: these verbs look at files, and join no graph."""
+"""The verbs of `ros2 interface`, which read files and do not join a graph."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _SEPARATOR = "---"
 
 
 def add_verbs(verbs: Any) -> None:
-    """Add them to the parser."""
+    """Add the verbs of `ros2 interface` to the parser."""
     parser = verbs.add_parser("show", help="Output the interface definition")
     comments = parser.add_mutually_exclusive_group()
     comments.add_argument("--all-comments", action="store_true", help="Show all comments, nested ones too")
@@ -69,7 +69,7 @@ def _print(name: str, comments: bool, nested_comments: bool, indent: str) -> Non
             if not text or parsed.annotations["comment"]:
                 continue
             if field and field.annotations["comment"]:
-                # Of a comment behind a field only its text is left out: so does the real tool.
+                # If a comment follows a field, only the text of the comment is left out, as in the real tool.
                 shown = text[: text.find(field.annotations["comment"][0]) - 1].strip()
         print(f"{indent}{shown}" if shown else "")
         kind = str(field.type).partition("[")[0] if field else ""

@@ -1,4 +1,4 @@
-"""Interfaces that are installed: their classes, and the files that describe them."""
+"""Finds installed interfaces: their classes, and the files that define them."""
 
 from __future__ import annotations
 
@@ -12,14 +12,15 @@ KINDS = ("msg", "srv", "action")
 
 
 def interface(name: str, kind: str = "") -> Any:
-    """The class of `std_msgs/msg/String`.
+    """Return the class of an interface, such as `std_msgs/msg/String`.
 
     Args:
-        name: of the interface.
-        kind: `msg`, `srv` or `action`, if it must be one; the name may leave it out then, as `std_msgs/String`.
+        name: the name of the interface.
+        kind: `msg`, `srv` or `action` if the interface must be of this kind; the name may leave it out then, as in
+            `std_msgs/String`.
 
     Raises:
-        LookupError: it is not installed, is of another kind, or has no such name.
+        LookupError: the interface is not installed or is of another kind, or the name is not valid.
     """
     parts = name.split("/")
     if kind and len(parts) == 2:
@@ -33,13 +34,13 @@ def interface(name: str, kind: str = "") -> Any:
 
 
 def prefixes() -> list[Path]:
-    """Where packages are installed: the environment's own folder, and those of a workspace that was sourced."""
+    """Return the folders in which packages are installed: those of a sourced workspace, and the environment's own."""
     sourced = [Path(one) for one in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep) if one]
     return [*dict.fromkeys([*sourced, Path(sys.prefix)])]
 
 
 def packages() -> dict[str, list[str]]:
-    """Packages with interfaces, and their interfaces as `srv/SetBool`, in the order of the package."""
+    """Return the packages with interfaces, each with its interfaces in their order there, written as `srv/SetBool`."""
     found: dict[str, list[str]] = {}
     for prefix in reversed(prefixes()):
         for index in (prefix / "share/ament_index/resource_index/rosidl_interfaces").glob("*"):
@@ -51,10 +52,10 @@ def packages() -> dict[str, list[str]]:
 
 
 def source_of(name: str) -> str:
-    """The text that defines an interface, as its author wrote it.
+    """Return the text that defines an interface, as its author wrote it.
 
     Raises:
-        LookupError: there is none; says which part of the name is wrong, in the real tool's words.
+        LookupError: there is none. The message, which is that of the real tool, says which part of the name is wrong.
     """
     parts = name.split("/")
     if len(parts) != 3:

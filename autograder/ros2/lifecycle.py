@@ -1,4 +1,4 @@
-"""`ros2 lifecycle`."""
+"""The verbs of `ros2 lifecycle`."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from autograder.ros2.session import Session, ask
 
 
 def add_verbs(verbs: Any) -> None:
-    """Add them to the parser."""
+    """Add the verbs of `ros2 lifecycle` to the parser."""
     parser = add_graph_options(verbs.add_parser("nodes", help="Output a list of nodes with lifecycle"))
     parser.add_argument("-a", "--all", action="store_true", help="Display all nodes even hidden ones")
     parser.add_argument("-c", "--count-nodes", action="store_true", help="Only display the number of nodes")
@@ -38,7 +38,7 @@ def _with_hidden(parser: Any) -> Any:
 
 
 def _lifecycle_nodes(session: Session, hidden: bool) -> list[str]:
-    """Nodes with a service that tells their state."""
+    """Return the nodes with a service that returns their state."""
     services = dict(session.services(hidden=True))
     return [
         name

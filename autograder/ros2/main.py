@@ -1,4 +1,4 @@
-"""One command of the real tool's, from its words to its exit status."""
+"""Runs one `ros2` command, from its words to its exit status."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from autograder.graph.observer import Observer
 
 PROFILE = Path(__file__).resolve().parent / "fastdds.xml"
-"""How a command in a terminal finds other programs; `FASTRTPS_DEFAULT_PROFILES_FILE` tells the middleware."""
+"""The profile by which a command in a terminal discovers other programs. `FASTRTPS_DEFAULT_PROFILES_FILE` names it."""
 
 COMMANDS = {
     "action": "Various action related sub-commands",
@@ -43,7 +43,7 @@ ELSEWHERE = {
     "extensions": "The kit's commands are fixed: nothing extends them.",
     "pkg": "Packages are made by `autograder package`; their interfaces are shown by `ros2 interface packages`.",
 }
-"""What the real tool has besides, and what there is here."""
+"""The other commands of the real tool, and what the kit has in place of them."""
 
 
 def run(
@@ -52,19 +52,19 @@ def run(
     observer: Observer | None = None,
     seconds: float | None = None,
 ) -> int:
-    """Run `ros2 WORDS`, printing what it says, and return its exit status.
+    """Run `ros2 WORDS`, print its output, and return its exit status.
 
     Args:
         words: the command, its verb and their arguments.
         domain_id: ROS_DOMAIN_ID, or None for that of the environment.
-        observer: has been on this graph for long: the verb need not wait for the graph to settle.
-        seconds: after which a verb that would go on is ended.
+        observer: an observer that has already discovered this graph, so that the verb knows when it sees all of it.
+        seconds: the time limit after which a verb that would continue is ended.
 
     Raises:
-        TimeIsUp: it was.
+        TimeIsUp: the verb was ended because of the time limit.
     """
     if words and words[0] in ELSEWHERE:
-        print(f"`ros2 {words[0]}` is no part of this kit. {ELSEWHERE[words[0]]}", file=sys.stderr)
+        print(f"`ros2 {words[0]}` is not part of this kit. {ELSEWHERE[words[0]]}", file=sys.stderr)
         return 1
     try:
         options = _parser(words).parse_args(list(words))
@@ -84,7 +84,7 @@ def run(
             print(failure, file=sys.stderr)
         return 1
     except KeyboardInterrupt:
-        if interrupts.held():  # the rest of the cell is not to run
+        if interrupts.held():  # the rest of the cell must not run
             raise
         return int(signal.SIGINT)
     finally:
@@ -94,7 +94,7 @@ def run(
 
 
 def verbs_of(command: str) -> list[str]:
-    """Return the verbs of a command; empty if there is no such command."""
+    """Return the verbs of a command; the list is empty if there is no such command."""
     if command not in COMMANDS:
         return []
     verbs = argparse.ArgumentParser().add_subparsers()
@@ -103,7 +103,10 @@ def verbs_of(command: str) -> list[str]:
 
 
 def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
-    """The parser of these words: of the other commands it knows the names."""
+    """Return a parser for these words.
+
+    It has the verbs of the command in them, and only the names of other commands.
+    """
     parser = argparse.ArgumentParser(prog="ros2", description="ros2 is an extensible command-line tool for ROS 2.")
     commands = parser.add_subparsers(title="Commands", metavar="<command>", required=False)
     parser.set_defaults(run=lambda *_: parser.print_help())

@@ -1,4 +1,4 @@
-"""Messages as YAML and as comma-separated values, and messages filled from YAML."""
+"""Writes messages as YAML and as comma-separated values, and fills messages from YAML."""
 
 from __future__ import annotations
 
@@ -27,21 +27,24 @@ _SEQUENCES = (list, tuple, array.array, numpy.ndarray)
 
 
 class Shape:
-    """How much of a message is written.
+    """Settings for how much of a message is written.
 
     Args:
-        longest: elements and characters of one value after which it is cut, or None.
-        arrays: whether arrays are written out, or only what they are.
-        strings: whether strings are.
+        longest: the number of elements or characters after which a value is cut, or None for no limit.
+        arrays: whether the elements of arrays are written, or only the type and the length.
+        strings: whether the text of strings is written, or only the length.
     """
 
     def __init__(self, longest: int | None = None, arrays: bool = True, strings: bool = True) -> None:
-        """Keep them."""
+        """Keep the arguments."""
         self.longest, self.arrays, self.strings = longest, arrays, strings
 
 
 class _Dumper(yaml.SafeDumper):
-    """YAML's own, which repeats what occurs twice and names nothing. The flow style is that of lists alone."""
+    """A dumper without aliases and tags, so that an object that occurs twice is written twice.
+
+    The flow style applies to lists only.
+    """
 
     def ignore_aliases(self, data: object) -> bool:
         return True
@@ -55,19 +58,19 @@ _Dumper.add_representer(dict, _Dumper.represent_message)
 
 
 def is_message(value: object) -> bool:
-    """Whether it is a message, and no plain value."""
+    """Whether a value is a message, not a plain value."""
     return hasattr(value, "get_fields_and_field_types")
 
 
 def to_yaml(message: Any, shape: Shape | None = None, flow: bool = False) -> str:
-    """A message as a YAML mapping, its fields in the order of their definition."""
+    """Return a message as a YAML mapping with its fields in the order of their definition."""
     plain = _plain(message, None, shape or Shape())
-    # Python's float knows inf and nan, and so does YAML.
+    # Both Python's float and YAML have inf and nan.
     return yaml.dump(plain, Dumper=_Dumper, width=sys.maxsize, default_flow_style=flow, allow_unicode=True)
 
 
 def to_csv(value: Any, shape: Shape, kind: Any = None) -> str:
-    """All plain values of a message, separated by commas. What is empty at the beginning has none behind it."""
+    """Return all plain values of a message, separated by commas. No comma follows empty values at the beginning."""
     if is_message(value):
         kinds = dict(zip(value.get_fields_and_field_types(), value.SLOT_TYPES, strict=False))
         return _joined(to_csv(getattr(value, name), shape, of) for name, of in kinds.items())
@@ -92,7 +95,7 @@ def _joined(texts: Iterable[str]) -> str:
 
 
 def _plain(value: Any, kind: Any, shape: Shape) -> Any:
-    """What YAML can write of a value, cut to the shape."""
+    """Convert a value to one that YAML can write, reduced to the shape."""
     if is_message(value):
         kinds = dict(zip(value.get_fields_and_field_types(), value.SLOT_TYPES, strict=False))
         return {name: _plain(getattr(value, name), kind, shape) for name, kind in kinds.items()}
@@ -135,16 +138,16 @@ def fill(message: Any, values: Any, stamps: list[Any] | None = None) -> None:
     """Set the fields that a YAML mapping names.
 
     Args:
-        message: to fill.
-        values: by field name; nested as the message is.
-        stamps: takes the time stamps that are to be set anew before each sending: `header: auto`, `stamp: now`.
+        message: the message to fill.
+        values: the values by field name, nested like the message.
+        stamps: a list that gets the time stamps to set before each message is sent (`header: auto`, `stamp: now`).
 
     Raises:
-        Exception: of the kind that Python gives, where a field is missing or a value does not fit.
+        Exception: Python's own exception if a field does not exist or a value does not fit.
     """
     _fill(message, values, stamps)
     try:
-        serialize_message(message)  # what a field takes is not asked before
+        serialize_message(message)  # only this checks whether the values fit their fields
     except Exception:
         raise ValueError("a value is out of the range of its field, or of another type") from None
 
@@ -177,7 +180,7 @@ def _check_length(name: str, value: Any, kind: Any) -> None:
 
 
 def _made(now: Any, given: Any, kind: Any, stamps: list[Any] | None) -> Any:
-    """The value of a field, of the type that it has now."""
+    """Return a given value, converted to the type of the field's current value."""
     if isinstance(now, array.array):
         return array.array(now.typecode, given)
     if isinstance(now, numpy.ndarray):

@@ -1,4 +1,4 @@
-"""`ros2 node`."""
+"""The verbs of `ros2 node`."""
 
 from __future__ import annotations
 
@@ -15,17 +15,24 @@ from autograder.ros2.session import Session, is_hidden
 
 
 def absolute(name: str) -> str:
-    """A node's name as the graph has it: a leading slash may be left out."""
+    """Return a node's name as on the graph, with the leading slash, which the user may leave out."""
     return name if name.startswith("/") else f"/{name}"
 
 
 def find_node(
     session: Session, name: str, hidden: bool, otherwise: str, within: float | None = None
 ) -> tuple[str, str]:
-    """Namespace and name of a node with this full name; `within` are seconds in which it may yet appear.
+    """Return the namespace and name of the node with this full name.
+
+    Args:
+        session: the session of the verb.
+        name: the full name of the node.
+        hidden: whether hidden nodes are considered.
+        otherwise: the message of the failure.
+        within: the seconds to wait for the node to appear.
 
     Raises:
-        Failure: there is none; says `otherwise`.
+        Failure: there is no such node.
     """
     found = session.look_for(
         lambda: next((one for one in session.nodes(hidden) if full_name(*one) == name), None), within
@@ -36,7 +43,7 @@ def find_node(
 
 
 def add_verbs(verbs: Any) -> None:
-    """Add them to the parser."""
+    """Add the verbs of `ros2 node` to the parser."""
     parser = add_graph_options(verbs.add_parser("list", help="Output a list of available nodes"))
     parser.add_argument("-a", "--all", action="store_true", help="Display all nodes even hidden ones")
     parser.add_argument("-c", "--count-nodes", action="store_true", help="Only display the number of nodes discovered")

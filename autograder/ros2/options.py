@@ -1,4 +1,4 @@
-"""Options that several verbs have, and the QoS that they ask for."""
+"""Options that several verbs have, and the QoS profiles that they describe."""
 
 from __future__ import annotations
 
@@ -21,18 +21,18 @@ Parser = argparse.ArgumentParser
 
 
 def add_graph_options(parser: Parser) -> Parser:
-    """Add what every verb has that looks at the graph."""
+    """Add the options of every verb that looks at the graph."""
     parser.add_argument("--spin-time", type=float, help="seconds to listen before the graph is believed")
     parser.add_argument("-s", "--use-sim-time", action="store_true", help="take the time from /clock")
-    parser.add_argument("--no-daemon", action="store_true", help="there is none: nothing changes")
+    parser.add_argument("--no-daemon", action="store_true", help="has no effect, because there is no daemon")
     return parser
 
 
 def positive(text: str) -> int:
-    """A number that is at least 1.
+    """Parse an integer that is at least 1.
 
     Raises:
-        argparse.ArgumentTypeError: it is not.
+        argparse.ArgumentTypeError: the text is not such a number.
     """
     number = unsigned(text)
     if number == 0:
@@ -41,10 +41,10 @@ def positive(text: str) -> int:
 
 
 def unsigned(text: str) -> int:
-    """A number that is not negative.
+    """Parse an integer that is not negative.
 
     Raises:
-        argparse.ArgumentTypeError: it is.
+        argparse.ArgumentTypeError: the text is not such a number.
     """
     if not text.isdecimal():
         raise argparse.ArgumentTypeError("value must be non-negative integer")
@@ -52,10 +52,10 @@ def unsigned(text: str) -> int:
 
 
 def above_zero(text: str) -> float:
-    """A number greater than 0.
+    """Parse a number greater than 0.
 
     Raises:
-        ValueError: it is not.
+        ValueError: the text is not such a number.
     """
     if (number := float(text)) <= 0:
         raise ValueError(text)
@@ -63,14 +63,14 @@ def above_zero(text: str) -> float:
 
 
 def values(parser: Parser, name: str, text: str) -> None:
-    """Add a YAML mapping, as an argument or on standard input; `yaml_text` gives it."""
+    """Add options for a YAML mapping, which is an argument or comes from standard input; `yaml_text` returns it."""
     given = parser.add_mutually_exclusive_group()
     given.add_argument(name, nargs="?", default="{}", help=text)
     given.add_argument("--stdin", action="store_true", help="Read values from standard input")
 
 
 def yaml_text(options: Any, name: str) -> str:
-    """The text of what `values` added."""
+    """Return the text of the YAML mapping for which `values` added the options."""
     return sys.stdin.read() if options.stdin else str(getattr(options, name))
 
 
@@ -91,7 +91,7 @@ def _words(policy: Any) -> list[str]:
 
 
 def profile(options: Any, default: QoSProfile) -> QoSProfile:
-    """The profile that the options describe, on top of a default one."""
+    """Return the profile that the options describe; policies without an option are those of the default profile."""
     start = default
     if options.qos_profile:
         start = QoSPresetProfiles.get_from_short_key(options.qos_profile)
@@ -123,9 +123,10 @@ def profile(options: Any, default: QoSProfile) -> QoSProfile:
 
 
 def to_match(publishers: list[TopicEndpointInfo]) -> QoSProfile:
-    """What hears all of these publishers: reliable, or transient local, where every one of them is.
+    """Return a profile for a subscription that matches all of these publishers.
 
-    The real tool does the same if no option says otherwise.
+    It is reliable if all of them are, and transient local if all of them are. The real tool uses the same profile if no
+    option specifies another one.
     """
     offered = [end.qos_profile for end in publishers]
     made = QoSProfile(depth=10)

@@ -1,4 +1,4 @@
-"""`ros2 param`."""
+"""The verbs of `ros2 param`."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from autograder.ros2.options import add_graph_options
 from autograder.ros2.session import Session, ask
 
 _ANSWER_WITHIN = 5.0
-"""Seconds that a node may take to list its parameters; the real tool gives it one."""
+"""The seconds that a node may take to list its parameters; the real tool waits only one second."""
 
 _KINDS = {
     ParameterType.PARAMETER_NOT_SET: "not set",
@@ -36,7 +36,7 @@ _KINDS = {
 
 
 def add_verbs(verbs: Any) -> None:
-    """Add them to the parser."""
+    """Add the verbs of `ros2 param` to the parser."""
     parser = _verb(verbs, "list", "Output a list of available parameters", _list, node=False)
     parser.add_argument("node_name", nargs="?", help="Name of the ROS node")
     parser.add_argument("--param-prefixes", nargs="+", default=[], help="Only list parameters with these prefixes")
@@ -72,7 +72,7 @@ def _regex(text: str) -> re.Pattern[str]:
     try:
         return re.compile(text)
     except re.error as error:
-        raise argparse.ArgumentTypeError(f"'{text}' is no regular expression: {error}") from None
+        raise argparse.ArgumentTypeError(f"'{text}' is not a regular expression: {error}") from None
 
 
 def _found(session: Session, options: Any) -> str:
@@ -122,7 +122,7 @@ def _list(session: Session, options: Any) -> None:
 
 
 def _plain(value: ParameterValue) -> Any:
-    """The value as Python's own, arrays as lists."""
+    """Convert a value to a Python value, in which arrays are lists."""
     found = parameter_value_to_python(value)
     return list(found) if value.type >= ParameterType.PARAMETER_BYTE_ARRAY else found
 
@@ -131,7 +131,7 @@ def _get(session: Session, options: Any) -> None:
     values = _values(session, _found(session, options), [options.parameter_name])
     if not values:
         raise Failure("Parameter not set")
-    if values[0].type == ParameterType.PARAMETER_NOT_SET:  # it is declared, and has no value yet
+    if values[0].type == ParameterType.PARAMETER_NOT_SET:  # the parameter is declared, but has no value yet
         print(None if options.hide_type else "Parameter not set.")
         return
     kind = _KINDS[values[0].type].capitalize()

@@ -1,4 +1,4 @@
-"""`ros2 service`."""
+"""The verbs of `ros2 service`."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from autograder.ros2.session import Session
 
 
 def add_verbs(verbs: Any) -> None:
-    """Add them to the parser."""
+    """Add the verbs of `ros2 service` to the parser."""
     parser = add_graph_options(verbs.add_parser("list", help="Output a list of available services"))
     parser.add_argument("-t", "--show-types", action="store_true", help="Additionally show the service type")
     parser.add_argument("-c", "--count-services", action="store_true", help="Only display the number of services")
@@ -90,7 +90,7 @@ def _call(session: Session, options: Any) -> None:
         messages.fill(request, yaml.safe_load(yaml_text(options, "values")))
     except Exception as error:
         raise Failure(f"Failed to populate field: {error}") from None
-    _ = session.graph  # so that "waiting" is said where the server is missing, and not where nobody has looked yet
+    _ = session.graph  # "waiting" is printed only if the server is missing, not because it is not discovered yet
     client = session.node.create_client(service_type, options.service_name)
     if not client.service_is_ready():
         if not session.spin_until(client.service_is_ready, 0.1):

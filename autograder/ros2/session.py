@@ -1,7 +1,7 @@
-"""The node that a verb looks and speaks through, and its view of the graph.
+"""The node that a verb uses, and its view of the graph.
 
-The real tool asks a daemon that has been on the graph for long. A verb of the kit joins the graph itself, and looks at
-it when it has settled.
+The real tool asks a daemon that has already discovered the graph. A verb of the kit joins the graph itself, and waits
+until its view of the graph is complete.
 """
 
 from __future__ import annotations
@@ -33,17 +33,18 @@ from autograder.ros2.failure import Failure, TimeIsUp
 from autograder.sandbox.environment import FASTDDS_PROFILE
 
 PREFIX = "_ros2cli"
-"""How the real tool's nodes begin: the underscore hides them."""
+"""The beginning of the names of the real tool's nodes. They are hidden because of the underscore."""
 
 _OBSERVER = re.compile(rf"{OBSERVER_NAME}_[0-9a-f]{{6}}")
 _WHO_HAS_WHAT = "ros_discovery_info"
-"""The topic on which a participant says which of its readers and writers belong to which of its nodes."""
+"""The topic on which a participant publishes which of its readers and writers belong to which of its nodes."""
 _PARTICIPANT = 12
-"""The first bytes of an endpoint's GID; the next three number the endpoint in its participant, from 1 on."""
+"""The number of bytes of an endpoint's GID that identify its participant. The next three bytes are the number of the
+endpoint in its participant, from 1."""
 
 
 def is_observer(node_name: str) -> bool:
-    """Whether a node is one of the kit's own, which nobody is shown."""
+    """Whether a node is one of the kit's own observers, which are never shown."""
     return _OBSERVER.fullmatch(node_name) is not None
 
 
@@ -57,27 +58,27 @@ class _End:
 
 @dataclass(frozen=True)
 class GraphView:
-    """All that a node has heard of the graph; what the kit's own nodes have is left out.
+    """Everything that a node has discovered of the graph, without the kit's own nodes and their endpoints.
 
-    A node that has just joined hears of the others piece by piece. Each participant, which is one process with all its
-    nodes, sends the list of its writers and that of its readers, each in the order in which they were made, and apart
-    from both which node has which of them. The pieces come in any order, and on a busy machine seconds apart: that
-    nothing has changed for a while does not mean that nothing is missing.
+    A node that has just joined discovers the others gradually. Each participant, which is one process with all its
+    nodes, sends the list of its writers and the list of its readers, each in the order in which they were created.
+    Separately, it sends which node has which of them. These pieces arrive in any order, and on a busy machine seconds
+    apart. So even if nothing has changed for a while, something may still be missing.
     """
 
     nodes: list[str]
-    """Full names."""
+    """The full names of the nodes."""
     ends: dict[bytes, _End]
-    """By GID: every reader and writer, those of services too."""
+    """Every reader and writer by its GID, including those of services."""
     participants: int
-    """How many were heard of, the kit's own among them."""
+    """The number of discovered participants, including those of the kit."""
 
     def __bool__(self) -> bool:
-        """Whether anything was."""
+        """Whether a node or an endpoint has been discovered."""
         return bool(self.nodes or self.ends)
 
     def is_complete(self) -> bool:
-        """Whether nothing is known to be missing from any participant that was heard of."""
+        """Whether nothing is known to be missing from any discovered participant."""
         if not set(self.nodes) <= {end.node for end in self.ends.values()}:
             return False
         by_participant: dict[bytes, list[_End]] = {}
@@ -87,18 +88,18 @@ class GraphView:
 
 
 def _is_whole(ends: list[_End]) -> bool:
-    """Whether of one participant no reader and no writer is missing, and the node of each is known."""
+    """Whether no reader or writer of one participant is missing, and the node of each is known."""
     own = [end for end in ends if end.topic != _WHO_HAS_WHAT]
     if not own or any(end.node.endswith(UNKNOWN_NODE) for end in own):
         return False
-    # Writers arrive in order, and so do readers. A number that is missing below the last of both lists belongs to
-    # something destroyed; one above may not have been heard of yet.
+    # Writers arrive in order, and so do readers. A missing number that is lower than the last numbers of both lists
+    # belongs to a destroyed endpoint. A missing number above one of them may not have been discovered yet.
     last = [max((end.number for end in ends if end.writes == writes), default=0) for writes in (True, False)]
     return {end.number for end in ends} >= set(range(min(last) + 1, max(last)))
 
 
 def look(node: Node) -> GraphView:
-    """What a node has heard by now."""
+    """Return what a node has discovered so far."""
     found = dict(_ends(node))
     kits = {gid[:_PARTICIPANT] for gid, end in found.items() if _is_the_kits(end.node.rpartition("/")[2])}
     return GraphView(
@@ -124,11 +125,11 @@ def _ends(node: Node) -> Iterator[tuple[bytes, _End]]:
 
 
 def participants_here(domain_id: int) -> int:
-    """How many participants of a domain this machine has, by the ports that they listen on; 0 if that is not known.
+    """Return the number of a domain's participants on this machine, according to their ports; 0 if it is not known.
 
-    The ports are those of the RTPS specification: 250 for each domain, of which every second one from the tenth on is
-    where a participant hears of others. In the multicast group of a launch they begin 120 higher, after the two on
-    which the group is heard.
+    The ports are those of the RTPS specification: there are 250 for each domain, and on every second one from the tenth
+    on, a participant receives discovery messages. In the multicast group of a launch, they begin 120 higher, after the
+    two ports of the group.
     """
     in_group = os.environ.get("FASTRTPS_DEFAULT_PROFILES_FILE") == str(FASTDDS_PROFILE)
     first = 7400 + 250 * domain_id + (130 if in_group else 10)
@@ -141,36 +142,37 @@ def participants_here(domain_id: int) -> int:
 
 
 _POLL = 0.05
-"""Seconds between two looks at the graph. What follows counts looks: on a busy machine one takes longer, and so does
-what is waited for."""
+"""The seconds between two looks at the graph. The following values are numbers of looks, because on a busy machine a
+look takes longer, and so does discovery."""
 _LISTENED = 10
-"""Looks before what is seen is believed: half a second, as long as the real tool listens without its daemon."""
+"""The least number of looks: half a second, which is as long as the real tool listens without its daemon."""
 _STILL = 4
-"""Looks that have to be alike where nothing is known to be missing."""
+"""The number of equal looks in a row that are needed if nothing is known to be missing."""
 _REPEATED = 66
-"""Looks that have to be alike otherwise: the middleware repeats a lost packet of discovery after 3 seconds."""
+"""The number of equal looks in a row that are needed otherwise. They take longer than the 3 seconds after which the
+middleware repeats a lost discovery packet."""
 _MOST = 300
-"""Looks after which the graph is taken as it is, and this is said."""
+"""The number of looks after which the graph is used as it is, with a warning."""
 
 _Found = TypeVar("_Found")
 
 
 class Session:
-    """One verb's stay on the graph. Joins at the first use; `close` leaves.
+    """The time during which a verb is on the graph. It joins the graph at the first use and leaves it with `close`.
 
     Args:
         domain_id: ROS_DOMAIN_ID, or None for that of the environment.
-        observer: has been on this graph for long: what it sees is all there is to see.
-        seconds: after which the verb has to end, or None if only Ctrl-C ends it.
+        observer: an observer that has already discovered the whole graph.
+        seconds: the time limit of the verb, or None if only Ctrl-C ends it.
     """
 
     def __init__(self, domain_id: int | None, observer: Observer | None = None, seconds: float | None = None) -> None:
-        """Prepare it."""
+        """Prepare the session without joining the graph."""
         self._domain_id = domain_id
         self._observer = observer
         self._ends = None if seconds is None else time.monotonic() + seconds
         self.options: Any = None
-        """The verb's words, parsed."""
+        """The parsed words of the verb."""
         self.name = f"{PREFIX}_{os.getpid()}"
         self._joined: SingleThreadedExecutor | None = None
         self._leaving = contextlib.ExitStack()
@@ -178,10 +180,10 @@ class Session:
 
     @cached_property
     def node(self) -> Node:
-        """The node that the verb speaks through."""
+        """The node that the verb uses."""
         context = Context()
         sim_time = [Parameter("use_sim_time", value=True)] if getattr(self.options, "use_sim_time", False) else []
-        with contextlib.ExitStack() as leaving:  # nothing stays of what is interrupted
+        with contextlib.ExitStack() as leaving:  # nothing is left behind after an interruption
             rclpy.init(context=context, domain_id=self._domain_id, args=[])
             leaving.callback(context.try_shutdown)
             node = rclpy.create_node(
@@ -200,7 +202,7 @@ class Session:
 
     @cached_property
     def graph(self) -> Node:
-        """The same node, once the graph that it sees has settled."""
+        """The same node, after its view of the graph has settled."""
         node = self.node
         spin_time = getattr(self.options, "spin_time", None)
         if spin_time is not None:
@@ -214,7 +216,7 @@ class Session:
         return node
 
     def _listen(self, node: Node) -> None:
-        """Look at the graph until nothing more is to come."""
+        """Look at the graph until nothing more is expected."""
         domain = node.context.get_domain_id()
         before, looks, still, silent = None, 0, 0, False
 
@@ -236,7 +238,11 @@ class Session:
         self._looks_left = max(0, _REPEATED - looks)
 
     def look_for(self, find: Callable[[], _Found | None], within: float | None = None) -> _Found | None:
-        """What `find` gives: asked again as long as something may yet appear on the graph, or for so many seconds."""
+        """Return the result of `find`.
+
+        While it is None, `find` is called again as long as something may still appear on the graph, or for `within`
+        seconds.
+        """
         _ = self.graph
         deadline = time.monotonic() + (within or 0.0)
         while (found := find()) is None and (self._looks_left > 0 or time.monotonic() < deadline):
@@ -246,17 +252,17 @@ class Session:
         return found
 
     def nodes(self, hidden: bool = False) -> list[tuple[str, str]]:
-        """Namespace and name of every node but the kit's own observers; sorted by full name."""
+        """Return the namespace and name of every node except the kit's observers, sorted by full name."""
         found = [(space, name) for name, space in self.graph.get_node_names_and_namespaces()]
         shown = [one for one in found if not is_observer(one[1]) and (hidden or not one[1].startswith("_"))]
         return sorted(shown, key=lambda one: full_name(*one))
 
     def node_names(self, hidden: bool = False) -> list[str]:
-        """Full names of the nodes."""
+        """Return the full names of the nodes."""
         return [full_name(*one) for one in self.nodes(hidden)]
 
     def topics(self, hidden: bool = False) -> list[tuple[str, list[str]]]:
-        """Topics with their types; sorted. Those that only an observer of the kit uses are left out."""
+        """Return the sorted topics with their types, except topics that only an observer of the kit uses."""
         return sorted(
             (name, types)
             for name, types in self.graph.get_topic_names_and_types()
@@ -264,23 +270,23 @@ class Session:
         )
 
     def publishers(self, topic: str) -> list[TopicEndpointInfo]:
-        """Publishers of a topic, without those of the kit's observers."""
+        """Return the publishers on a topic, except those of the kit's observers."""
         return [end for end in self.graph.get_publishers_info_by_topic(topic) if not is_observer(end.node_name)]
 
     def subscriptions(self, topic: str) -> list[TopicEndpointInfo]:
-        """Subscriptions to a topic, without those of the kit's observers."""
+        """Return the subscriptions to a topic, except those of the kit's observers."""
         return [end for end in self.graph.get_subscriptions_info_by_topic(topic) if not is_observer(end.node_name)]
 
     def services(self, hidden: bool = False) -> list[tuple[str, list[str]]]:
-        """Services with their types; sorted."""
+        """Return the sorted services with their types."""
         found = self.graph.get_service_names_and_types()
         return sorted((name, types) for name, types in found if hidden or not is_hidden(name))
 
     def spin_until(self, done: Callable[[], object], within: float | None = None) -> bool:
-        """Let the node work until `done()`; whether it came within so many seconds.
+        """Spin the node until `done()` is true, and return whether that happened within `within` seconds.
 
         Raises:
-            TimeIsUp: the verb has to end.
+            TimeIsUp: the time limit of the verb is over.
         """
         deadline = None if within is None else time.monotonic() + within
         _ = self.node
@@ -296,10 +302,10 @@ class Session:
         return True
 
     def stay(self, seconds: float) -> None:
-        """Stay on the graph for so long, and do nothing.
+        """Stay on the graph for some seconds without doing anything.
 
         Raises:
-            TimeIsUp: the verb has to end.
+            TimeIsUp: the time limit of the verb is over.
         """
         deadline = time.monotonic() + seconds
         while (left := deadline - time.monotonic()) > 0:
@@ -307,16 +313,16 @@ class Session:
             time.sleep(min(left, _POLL))
 
     def answer(self, future: Any, within: float | None = None) -> Any:
-        """What a future gives, or None if nothing came in time."""
+        """Return the result of a future, or None if it did not come in time."""
         return future.result() if self.spin_until(future.done, within) else None
 
     def give_more_time(self, seconds: float) -> None:
-        """Let a verb that has to end, end properly."""
+        """Extend the time limit, so that a verb can end properly."""
         if self._ends is not None:
             self._ends = time.monotonic() + seconds
 
     def _look_until(self, done: Callable[[], bool], looks: int) -> bool:
-        """Let time go by until `done()`, which looks at the graph; whether it came within so many looks."""
+        """Wait until `done()`, which looks at the graph, is true, and return whether it was within so many looks."""
         for _ in range(looks):
             if done():
                 return True
@@ -330,7 +336,7 @@ class Session:
             raise TimeIsUp
 
     def close(self) -> None:
-        """Leave the graph. Can be called twice."""
+        """Leave the graph. This can be called twice."""
         with self._leaving:
             if self._joined is not None:
                 self._joined.shutdown(timeout_sec=1.0)
@@ -339,12 +345,12 @@ class Session:
 
 @contextlib.contextmanager
 def _whole_round() -> Iterator[None]:
-    """Let Ctrl-C wait until an executor's round is over.
+    """Delay Ctrl-C until an executor's round is over.
 
-    In the midst of one it would leave an answer half taken, or a callback group that is never free again; whoever then
-    asks for one thing more, as for a goal to be cancelled, would wait in vain.
+    In the middle of a round, Ctrl-C could leave a response half processed, or a callback group occupied forever. A
+    later request, such as that to cancel a goal, would then never get a response.
     """
-    # Signals come to the main thread only, and to nobody whom a shell has put into the background.
+    # Signals come only to the main thread, and not to programs that a shell has started in the background.
     elsewhere = threading.current_thread() is not threading.main_thread()
     if elsewhere or interrupts.held() or signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         yield
@@ -365,14 +371,14 @@ def is_hidden(name: str) -> bool:
 
 
 _READY_WITHIN = 5.0
-"""Seconds that a service of a node that is on the graph may take to show up, as with the real tool."""
+"""The seconds that a service of a node may take to appear after the node is on the graph, as in the real tool."""
 
 
 def ask(session: Session, node: str, service: str, srv_type: Any, request: Any, within: float | None = None) -> Any:
-    """The answer of a node's service, or None if it did not come within so many seconds.
+    """Return the response of a node's service, or None if it did not come within `within` seconds.
 
     Raises:
-        Failure: the service is not there.
+        Failure: the service does not exist.
     """
     client = session.node.create_client(srv_type, f"{node}/{service}")
     if not session.spin_until(client.service_is_ready, _READY_WITHIN):

@@ -1,4 +1,4 @@
-"""`ros2 topic`: which topics there are, listening to one, measuring it, and publishing on it."""
+"""The verbs of `ros2 topic`: they list topics, print and measure their messages, and publish messages."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ from autograder.ros2.session import Session
 
 
 def add_verbs(verbs: Any) -> None:
-    """Add them to the parser."""
+    """Add the verbs of `ros2 topic` to the parser."""
     parser = add_graph_options(verbs.add_parser("list", help="Output a list of available topics"))
     parser.add_argument("-t", "--show-types", action="store_true", help="Additionally show the topic type")
     parser.add_argument("-c", "--count-topics", action="store_true", help="Only display the number of topics")
@@ -115,11 +115,11 @@ def _find(session: Session, options: Any) -> None:
 
 
 LONGEST = 128
-"""Elements or characters of one value that are written by default."""
+"""The number of elements or characters of one value that are written by default."""
 
 
 def _add_echo(verbs: Any) -> None:
-    """Add it to the parser."""
+    """Add the verb `echo` to the parser."""
     parser = add_graph_options(verbs.add_parser("echo", help="Output messages from a topic"))
     parser.add_argument("topic_name", help="Name of the ROS topic to listen to (e.g. '/chatter')")
     parser.add_argument("message_type", nargs="?", help="Type of the ROS message (e.g. 'std_msgs/msg/String')")
@@ -147,10 +147,10 @@ def _add_echo(verbs: Any) -> None:
 
 
 def full_topic(session: Session, name: str) -> str:
-    """A topic's full name.
+    """Return a topic's full name.
 
     Raises:
-        Failure: it can be none.
+        Failure: the name is not valid.
     """
     try:
         full = expand_topic_name(name, session.node.get_name(), session.node.get_namespace())
@@ -161,10 +161,10 @@ def full_topic(session: Session, name: str) -> str:
 
 
 def type_of(session: Session, name: str) -> Any | None:
-    """The message class of a topic that is on the graph, or None.
+    """Return the message class of a topic, or None if the topic is not on the graph.
 
     Raises:
-        Failure: it has several types, or one that is not installed here.
+        Failure: the topic has several types, or its type is not installed here.
     """
     full = full_topic(session, name)
     types = session.look_for(lambda: dict(session.topics(hidden=True)).get(full))
@@ -179,7 +179,7 @@ def type_of(session: Session, name: str) -> Any | None:
 
 
 def matching(session: Session, name: str, options: Any) -> QoSProfile:
-    """The profile to listen with: the options' own, or what hears all publishers that there are."""
+    """Return the profile of the subscription: that of the options, or one that matches all existing publishers."""
     chosen = [value for option, value in vars(options).items() if option.startswith("qos_")]
     sensor = QoSPresetProfiles.SENSOR_DATA.value
     if any(value is not None for value in chosen):
@@ -202,10 +202,11 @@ def matching(session: Session, name: str, options: Any) -> QoSProfile:
 
 
 def wanted_messages(expression: str | None) -> Callable[[Any], bool]:
-    """What `--filter` asks for: whether a message, `m` in the expression, is one of those; without one, all are.
+    """Return a function that says whether a message passes `--filter`; without an expression, all messages pass.
 
     Raises:
-        Failure: it is no expression; or, when it is asked, it does not fit the message.
+        Failure: the text is not an expression. The returned function also raises it, if the expression, in which `m` is
+            the message, cannot be evaluated for a message.
     """
     if expression is None:
         return lambda _: True
@@ -275,7 +276,7 @@ def _lost(status: Any) -> None:
 
 
 def _print(value: Any, info: dict[str, Any] | None, options: Any) -> None:
-    """Print a message, or what a field of one holds, after what the middleware says of it."""
+    """Print a message or the value of one of its fields, after the middleware's information about the message."""
     if not messages.is_message(value):
         if info:
             print(f"---Got new message, message info:---\n{info}\n---Message data:---")
@@ -293,11 +294,11 @@ def _print(value: Any, info: dict[str, Any] | None, options: Any) -> None:
 
 
 _EVERY = 1.0
-"""Seconds between two reports."""
+"""The seconds between two reports."""
 
 
 def _add_measures(verbs: Any) -> None:
-    """Add them to the parser."""
+    """Add the verbs `hz`, `bw` and `delay` to the parser."""
     parser = add_graph_options(verbs.add_parser("hz", help="Print the average receiving rate to screen"))
     _common(parser, 10_000)
     parser.add_argument("--filter", dest="expression", metavar="EXPR", help="only measure messages that match")
@@ -319,7 +320,7 @@ def _common(parser: Any, window: int) -> None:
 
 
 def _listen(session: Session, options: Any, take: Callable[[Any], None], raw: bool) -> None:
-    """Subscribe to the topic, once it is there."""
+    """Wait until the topic exists, and subscribe to it."""
     found = type_of(session, options.topic_name)
     if found is None:
         print(f"WARNING: topic [{options.topic_name}] does not appear to be published yet", flush=True)
@@ -360,7 +361,7 @@ def _hz(session: Session, options: Any) -> None:
 
 
 def _spread(nanoseconds: deque[int]) -> str:
-    """The line below an average."""
+    """Return the line that is printed below an average."""
     return (
         f"min: {min(nanoseconds) * 1e-9:.3f}s max: {max(nanoseconds) * 1e-9:.3f}s "
         f"std dev: {statistics.pstdev(nanoseconds) * 1e-9:.5f}s window: {len(nanoseconds)}"
@@ -417,11 +418,11 @@ def _delay(session: Session, options: Any) -> None:
 
 
 _SAY_AGAIN = 1.0
-"""Seconds after which a line says once more what is waited for."""
+"""The seconds after which the line about what the verb waits for is printed again."""
 
 
 def _add_pub(verbs: Any) -> None:
-    """Add it to the parser."""
+    """Add the verb `pub` to the parser."""
     parser = add_graph_options(verbs.add_parser("pub", help="Publish a message to a topic"))
     parser.add_argument("topic_name", help="Name of the ROS topic to publish to (e.g. '/chatter')")
     parser.add_argument("message_type", help="Type of the ROS message (e.g. 'std_msgs/msg/String')")
@@ -474,7 +475,7 @@ def _pub(session: Session, options: Any) -> None:
 
     session.node.create_timer(1 / options.rate, publish)
     session.spin_until(lambda: times and count >= times)
-    session.stay(options.keep_alive)  # for the middleware to send what it still holds
+    session.stay(options.keep_alive)  # so that the middleware can send what it still has
 
 
 def _dictionary(text: str) -> dict[str, Any]:
@@ -488,7 +489,7 @@ def _dictionary(text: str) -> dict[str, Any]:
 
 
 def _wait(session: Session, publisher: Any, count: int, within: float | None) -> None:
-    """Wait for so many subscriptions that match."""
+    """Wait until the publisher has so many matching subscriptions."""
     began = time.monotonic()
     while publisher.get_subscription_count() < count:
         if within is not None and time.monotonic() - began >= within:

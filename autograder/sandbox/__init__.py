@@ -1,1 +1,1 @@
-"""The walls around a student's programs, and the launcher that starts them."""
+"""The sandboxes that isolate a student's programs, and the launcher that starts the programs."""

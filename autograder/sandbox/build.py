@@ -1,7 +1,7 @@
-"""Builds ROS packages of a student's in a sandbox of their own: setup.py and CMake run what a student wrote.
+"""Builds a student's ROS packages in a separate sandbox, because setup.py and CMake run what the student wrote.
 
-Unlike the node sandbox it lets programs start others (compilers), shows no network, and is gone when the build is over.
-What comes out of it is a tar, read here and taken as untrusted: plain files below the names that were asked for.
+Unlike the node sandbox, it lets programs start other programs (compilers), has no network, and ends with the build. Its
+output is a tar that is treated as untrusted: only regular files with harmless names are taken from it.
 """
 
 from __future__ import annotations
@@ -31,54 +31,59 @@ from autograder.sandbox.scratch import Scratch
 from autograder.sandbox.walls import bubblewrap, seccomp
 
 BUILD_SECONDS = 800.0
-"""Seconds that a build may take at all. Interfaces take 10 on a quiet machine, and many times that on a crowded one.
+"""The seconds that a build may take. Interfaces take 10 s on an idle machine, and many times as long on a busy one.
 
-One that takes longer has taken too long, unless others kept it from the CPUs for `_WITHHELD` of that time.
+A build that takes longer fails, unless other processes withheld the CPUs from it for the share `_WITHHELD` of that
+time.
 """
 _WITHHELD = 0.5
 _INSTALLED = 32 * MIB
-"""Bytes of all files together that a build may install."""
+"""The bytes of all files together that a build may install."""
 _FILES = 3000
 _WORK = "/tmp"
 _MEMORY = 1536 * MIB
-"""Bytes of all processes of a build together; two compilers take 400 MiB."""
+"""The bytes of memory of all processes of a build together; two compilers take 400 MiB."""
 _PROCESSES = 64
-"""Processes of a build at the same time; about 15 are usual."""
+"""The number of processes of a build at the same time; about 15 are usual."""
 _CPU = 300.0
-"""Seconds of CPU of all processes of a build together; interfaces take 13, and 50 on a machine four times slower."""
+"""The seconds of CPU time of all processes of a build together. Interfaces take 13, or 50 on a machine that is four
+times slower."""
 _IDLE = 60.0
-"""Seconds, in all, in which nothing of a build wants to compute: it waits for something that does not come."""
+"""The total seconds in which no process of a build wants to compute. A build that is idle for longer waits for
+something that does not happen."""
 _LOOK = 0.2
-"""Seconds between two looks at them."""
+"""The seconds between two looks at the processes."""
 
 
 class BuildRun(BaseModel):
-    """What came of a build."""
+    """The result of a build."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, ser_json_bytes="base64", val_json_bytes="base64")
 
     status: int
-    """Of colcon: 0 if every package was built."""
+    """The exit status of colcon, which is 0 if every package was built."""
     log: str
-    """All that colcon and what it started have printed."""
+    """Everything that colcon and the programs that it started have printed."""
     over: str = ""
-    """What it took too much of, and was ended for: `time` of its own, `processes`, `memory` or `output`."""
+    """The resource of which the build used too much, so that it was ended: `time`, `processes`, `memory` or
+    `output`."""
     installed: dict[str, bytes] = Field(default_factory=dict)
-    """Content by path, such as `car_sensors/lib/car_sensors/speed_sensor`."""
+    """The contents of the installed files by path, such as `car_sensors/lib/car_sensors/speed_sensor`."""
 
     @property
     def killed_from_outside(self) -> bool:
-        """Whether a signal that the kit did not send ended the sandbox itself, which nothing inside it can do."""
+        """Whether a signal that the kit did not send ended the sandbox itself. Nothing inside it can do that."""
         return self.status < 0 and not self.over
 
 
 def build_packages(source: Path, packages: Sequence[str], isolation: Isolation) -> BuildRun:
-    """Build packages with colcon and return what would be in the workspace's `install`.
+    """Build packages with colcon and return the files that it would install in the workspace's `install`.
 
     Args:
-        source: the folder that holds a folder for each package.
+        source: the folder that contains a folder for each package.
         packages: the names of those folders.
-        isolation: as for programs. Without isolation, in a student's own notebook, it is a plain process.
+        isolation: the isolation, as for programs. Only full isolation uses a sandbox; otherwise, as in a student's own
+            notebook, the build is an ordinary process.
 
     Raises:
         OSError: the sandbox cannot be started.
@@ -113,30 +118,31 @@ def _in_sandbox(source: Path, packages: Sequence[str]) -> BuildRun:
         try:
             return _finished(exchange(process, b"", BUILD_SECONDS), watched)
         finally:
-            process.kill()  # in a PID namespace, everything with it
+            process.kill()  # this ends everything in its PID namespace
             process.wait()
 
 
 @dataclass
 class _Watched:
-    """What is known of a build that runs, or has run."""
+    """What is known about a build that is running or has ended."""
 
     over: list[str] = field(default_factory=list)
-    """What it took too much of, filled before it is ended."""
+    """The resources of which it used too much; they are added before the build is ended."""
     withheld: Withheld = field(default_factory=Withheld)
-    """The time for which others kept it from the CPUs."""
+    """The time for which other processes withheld the CPUs from it."""
 
     @property
     def had_no_chance(self) -> bool:
-        """Whether it is the others' fault that it has not ended in time."""
+        """Whether the build has not ended in time because other processes withheld the CPUs from it."""
         return self.withheld.from_one(0.0) >= _WITHHELD * BUILD_SECONDS
 
 
 @contextlib.contextmanager
 def _watched(process: subprocess.Popen[bytes]) -> Iterator[_Watched]:
-    """Hold a build to what all its processes may use together, which no limit of a single one does.
+    """Enforce the limits for all processes of a build together, which limits of single processes cannot do.
 
-    Of time only its own counts: what it computes, and what it waits for while nobody keeps it from computing.
+    Only time that the build itself is responsible for counts: the time in which it computes, and the time in which it
+    waits although it could compute.
     """
     ended = threading.Event()
     watched = _Watched()
@@ -181,7 +187,7 @@ def _command(kit: Path, source: Path, work: str, packages: Sequence[str]) -> lis
 
 
 def _end_session(process: subprocess.Popen[bytes]) -> None:
-    """End a build that may still run, with the compilers that it has started."""
+    """End a build that may still be running, together with the compilers that it has started."""
     with contextlib.suppress(ProcessLookupError):
         os.killpg(process.pid, signal.SIGKILL)
     process.wait()
@@ -204,15 +210,15 @@ def _finished(run: SandboxRun, watched: _Watched) -> BuildRun:
 
 
 def _is_name(name: str) -> bool:
-    """Whether a file can have this name here, and a result can say it: Linux takes any bytes, and UTF-8 does not."""
+    """Whether the name is valid for a file here and can be written in a result as UTF-8; Linux accepts any bytes."""
     return "\0" not in name and name.encode("utf-8", "replace").decode("utf-8") == name
 
 
 def _files(archive: bytes) -> Iterator[tuple[str, bytes]]:
-    """The plain files in a tar whose author nobody trusts.
+    """Yield the regular files in an untrusted tar, each as its path and content.
 
     Raises:
-        ValueError: there are too many, or they are too large.
+        ValueError: there are too many files, or they are too large.
     """
     size = number = 0
     with tarfile.open(fileobj=io.BytesIO(archive), mode="r:") as tar:

@@ -1,4 +1,4 @@
-"""What the observer and every program of a student's find in their environment, and what they must be able to read."""
+"""The environment of the observer and of students' programs, and the files that they must be able to read."""
 
 from __future__ import annotations
 
@@ -17,16 +17,17 @@ from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
 INSIDE = HERE / "inside"
-"""What the launcher consists of, which stands alone: a sandbox shows it and nothing else of the kit."""
+"""The folder of the launcher, which does not depend on the rest of the kit. A sandbox shows only this part of the
+kit."""
 FASTDDS_PROFILE = INSIDE / "fastdds.xml"
 GROUP = "AUTOGRADER_GROUP"
-"""The variable from which the profile takes the multicast group in which participants find each other."""
+"""The variable from which the profile takes the multicast group in which participants discover each other."""
 
 
 def profile_environment() -> dict[str, str]:
-    """Return the variables that an observer and a program must share to see each other, and nothing else.
+    """Return only the variables that an observer and a program must share to discover each other.
 
-    `ROS_DOMAIN_ID` is not among them: each launch has its own.
+    `ROS_DOMAIN_ID` is not among them, because each launch has its own.
     """
     return {
         "RMW_IMPLEMENTATION": "rmw_fastrtps_cpp",
@@ -37,29 +38,34 @@ def profile_environment() -> dict[str, str]:
 
 
 def group_environment(group: str) -> dict[str, str]:
-    """Return the variables with which a program takes part in a multicast group, and in no other.
+    """Return the variables with which a program takes part in one multicast group, and in no other.
 
     Args:
-        group: its address.
+        group: the address of the group.
     """
     return {"FASTRTPS_DEFAULT_PROFILES_FILE": str(FASTDDS_PROFILE), GROUP: group}
 
 
 @functools.cache
 def _group() -> str:
-    """The multicast group of this process, drawn by lot: whoever takes the same domain id does not hear it.
+    """Return the multicast group of this process.
 
-    It is one of those that are for private use (RFC 2365). ROS itself uses 239.255.0.1.
+    It is chosen at random, so that other processes with the same domain ID do not hear this one.
+
+    It is in the range for private use (RFC 2365). ROS itself uses 239.255.0.1.
     """
     return f"239.{'.'.join(str(random.SystemRandom().randrange(1, 255)) for _ in range(3))}"
 
 
 @functools.cache
 def _log_folder() -> Path:
-    """Where ROS writes its logs: a folder that nobody but its owner can read, even if another user made it first."""
+    """Return the folder in which ROS writes its logs.
+
+    Only its owner can read it. If another user has created a folder with this name, a new folder is created.
+    """
     folder = Path(tempfile.gettempdir()) / f"autograder-log-{os.getuid()}"
-    with contextlib.suppress(OSError):  # where nothing can be written, ROS says so
-        with contextlib.suppress(FileExistsError):  # whatever it is
+    with contextlib.suppress(OSError):  # if nothing can be written, ROS reports it
+        with contextlib.suppress(FileExistsError):  # no matter whether it is a folder
             folder.mkdir(mode=0o700)
         found = folder.lstat()
         if not stat.S_ISDIR(found.st_mode) or found.st_uid != os.getuid():
@@ -69,11 +75,11 @@ def _log_folder() -> Path:
 
 
 def _own_log_folder(prefix: str) -> Path:
-    """A new folder for the logs of this process alone, which takes it away at its end."""
+    """Create a folder for the logs of this process only. The process removes it when it ends."""
     folder, made_by = Path(tempfile.mkdtemp(prefix=prefix)), os.getpid()
 
     def remove() -> None:
-        if os.getpid() == made_by:  # a fork of it ends earlier
+        if os.getpid() == made_by:  # a fork of this process may end earlier
             shutil.rmtree(folder, ignore_errors=True)
 
     atexit.register(remove)
@@ -81,7 +87,7 @@ def _own_log_folder(prefix: str) -> Path:
 
 
 def remove_logs() -> None:
-    """Remove the log files of this process and of those that have ended: ROS begins one each time it is initialized."""
+    """Remove the log files of this process and of ended processes, because ROS creates one at each initialization."""
     for path in _log_folder().glob("*_*_*.log"):
         pid = path.stem.split("_")[-2]
         if pid == str(os.getpid()) or not Path(f"/proc/{pid}").exists():
@@ -90,7 +96,7 @@ def remove_logs() -> None:
 
 
 def python_environment() -> dict[str, str]:
-    """Return the whole environment of a process of this virtual environment, whatever the caller's own looks like."""
+    """Return the whole environment of a process of this virtual environment, whatever the caller's environment is."""
     bin_folder = str(Path(sys.prefix) / "bin")
     return {
         "PATH": os.pathsep.join((bin_folder, "/usr/local/bin", "/usr/bin", "/bin")),
@@ -99,12 +105,13 @@ def python_environment() -> dict[str, str]:
         "USER": "student",
         "PYTHONDONTWRITEBYTECODE": "1",
         "PYTHONUNBUFFERED": "1",
-        # The wheels find their libraries by starting Python a second time, unless these two are set.
+        # Unless these two are set, the wheels start Python a second time to find their libraries.
         "_ROS_WHEELS_BOOTSTRAP_COMPLETE": "1",
         "LD_LIBRARY_PATH": os.pathsep.join(_library_folders()),
-        # Messages load numpy; the threads of its linear algebra, which nobody here uses, take as long as all the rest.
+        # Messages load numpy. To start the threads of its linear algebra, which is not used here, would take as long as
+        # to load everything else.
         "OPENBLAS_NUM_THREADS": "1",
-        # Fewer arenas: sixty threads would otherwise reserve gigabytes of address space.
+        # Without this limit, sixty threads would reserve gigabytes of address space.
         "MALLOC_ARENA_MAX": "2",
         **profile_environment(),
     }
@@ -120,24 +127,25 @@ def _library_folders() -> list[str]:
 
 @dataclass(frozen=True)
 class PythonPlaces:
-    """What of the disk this virtual environment and the Python below it consist of, and nothing beside them."""
+    """Exactly the files and folders that make up this virtual environment and the Python on which it is based."""
 
     paths: list[Path]
-    """Folders and files, without links on the way to them; none inside another."""
+    """The real paths of the folders and files. None of them is inside another one."""
     links: dict[Path, str]
-    """The links that lead to them, and what each says; those inside of `paths` left out."""
+    """The links that lead to `paths`, with the target of each. Links inside `paths` are left out."""
 
 
 def python_places() -> PythonPlaces:
-    """Return what a sandbox must show for this Python to start as it does here.
+    """Return the places that a sandbox must show so that this Python starts as it does here.
 
-    A virtual environment's interpreter is a chain of links, often through a version manager's folders or a home. What
-    lies beside a link is none of a program's business: the links are made anew, and only their ends are shown.
+    A virtual environment's interpreter is a chain of links, often through a version manager's folders or a home folder.
+    A student's program must not see the other files beside a link. Therefore the links are created anew in the sandbox,
+    and only their final targets are shown.
     """
     prefix, base = Path(sys.prefix), Path(sys.base_prefix)
     wanted = [prefix / name for name in ("pyvenv.cfg", "bin", "include", "lib", "lib64", "share") if prefix != base]
     wanted += [Path(sys.executable), Path(sysconfig.get_path("stdlib")), Path(sysconfig.get_path("platstdlib"))]
-    wanted += [Path(sysconfig.get_path("include"))]  # of Python itself: generated interfaces are extension modules
+    wanted += [Path(sysconfig.get_path("include"))]  # Python's headers, because generated interfaces are extensions
     wanted += sorted(library for folder in ("lib", "lib64") for library in (base / folder).glob("*.so*"))
     links: dict[Path, str] = {}
     found = {_real(path, links) for path in wanted if path.exists()}
@@ -148,7 +156,7 @@ def python_places() -> PythonPlaces:
 
 
 def _real(path: Path, links: dict[Path, str]) -> Path:
-    """Follow a path name by name to where it really is, and note every link on the way."""
+    """Resolve a path name by name, and add every link on the way to `links`."""
     done, names = Path("/"), list(path.parts[1:])
     while names:
         name = names.pop(0)
@@ -169,4 +177,5 @@ def _is_system(path: Path) -> bool:
 
 SYSTEM_FOLDERS = ("/usr", "/bin", "/sbin", "/lib", "/lib64", "/lib32")
 SYSTEM_FILES = ("/etc/ld.so.cache", "/etc/alternatives")
-"""Where libraries are, and which compiler is `cc`. Time zone and user are told by the environment."""
+"""The cache of library paths, and the links that say which compiler is `cc`. Files about the time zone and the user are
+not needed, because the environment sets both."""

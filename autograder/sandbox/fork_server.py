@@ -1,14 +1,15 @@
 """Forks the processes of the grading sandbox: one for each submission, with the kit and rclpy loaded already.
 
-Loading takes longer than many a check. What is loaded is the kit's own, the same for every submission: this process
-reads none of them, and hears of none but that one is to be forked. Each fork gets namespaces of its own before it reads
-anything, as if it had been started anew: users, processes, network, IPC, and mounts with an empty /tmp and /dev/shm.
+Loading takes longer than many checks do. Only the kit's own code is loaded, which is the same for every submission.
+This process reads no submission, and is only told that it should fork. Each fork gets its own namespaces before it
+reads anything, as if it had been newly started: users, processes, network, IPC, and mounts with an empty /tmp and
+/dev/shm.
 
-Usage: python -m autograder.sandbox.fork_server FD IDLE. FD is one end of a SOCK_SEQPACKET pair; after IDLE seconds
-without a request or a fork the server ends. A request is JSON, the module and its arguments, with descriptors beside
-it: a socket, and the standard input, output and error of the fork. That socket is its life line: when its other end is
-closed, the fork and all that it started are ended. It says when the fork has begun, and, once all that has ended, the
-exit status.
+Usage: python -m autograder.sandbox.fork_server FD IDLE. FD is one end of a SOCK_SEQPACKET pair. After IDLE seconds
+without a request or a running fork, the server ends. A request is JSON that contains the module and its arguments, and
+is sent with descriptors: a socket, and the standard input, output and error of the fork. That socket is the fork's
+lifeline: when its other end is closed, the fork and everything that it started are ended. On this socket, the server's
+child reports when the fork has begun, and its exit status after everything has ended.
 """
 
 from __future__ import annotations
@@ -48,14 +49,15 @@ from autograder.sandbox.inside.kernel import (
 from autograder.sandbox.inside.warm_up import keep_shared
 
 DISK = 1 << 30
-"""Bytes that may lie in a fork's /tmp, and again in its /dev/shm."""
+"""The bytes that may be stored in a fork's /tmp, and as many in its /dev/shm."""
 _SET_FLAGS, _UP_AND_RUNNING = 0x8914, 0x41  # netdevice(7)
 
 
 def main() -> int:
-    """Serve until the end of the channel."""
+    """Serve requests until the channel is closed. In a fork, run the requested module."""
     module, arguments = _serve(socket.socket(fileno=int(sys.argv[1])), float(sys.argv[2]))
-    # In a fork. The ROS libraries' tracer would crash in the C library's end of the process: its threads are not here.
+    # This code runs in a fork. It ends with `_exit`, because the ROS libraries' tracer has no threads in a fork and
+    # would crash in the C library's exit handlers.
     status = 1
     try:
         status = _run(module, arguments)
@@ -69,9 +71,9 @@ def main() -> int:
 
 
 def _run(module: str, arguments: list[str]) -> int:
-    """Run a module as `python -m` does; return the exit status."""
+    """Run a module as `python -m` does, and return the exit status."""
     sys.argv = [module, *arguments]
-    prctl(PR_SET_NAME, module.rpartition(".")[2].encode())  # its command line is still that of the server
+    prctl(PR_SET_NAME, module.rpartition(".")[2].encode())  # the command line is still that of the server
     try:
         if module in sys.modules:
             return int(sys.modules[module].main())
@@ -84,7 +86,7 @@ def _run(module: str, arguments: list[str]) -> int:
 
 
 def _serve(channel: socket.socket, idle: float) -> tuple[str, list[str]]:
-    """Fork for every request. Returns only in a fork: the module to run, and its arguments."""
+    """Fork for every request. This returns only in a fork, with the module to run and its arguments."""
     poll = select.poll()
     poll.register(channel, select.POLLIN)
     forks = 0
@@ -94,7 +96,7 @@ def _serve(channel: socket.socket, idle: float) -> tuple[str, list[str]]:
             while os.waitpid(-1, os.WNOHANG)[0]:
                 forks -= 1
         if not asked and forks == 0:
-            channel.shutdown(socket.SHUT_RD)  # what was asked for before this is still served
+            channel.shutdown(socket.SHUT_RD)  # earlier requests are still served
         if not asked:
             continue
         packet, descriptors, _, _ = socket.recv_fds(channel, 1 << 16, 4)
@@ -112,7 +114,7 @@ def _serve(channel: socket.socket, idle: float) -> tuple[str, list[str]]:
 
 
 def _end() -> NoReturn:
-    """End once the forks have; if nobody waits for them any more, their life lines end them at once."""
+    """End this process after all forks have ended. Forks that nobody waits for are ended by their lifelines."""
     with contextlib.suppress(ChildProcessError):
         while True:
             os.wait()
@@ -120,11 +122,11 @@ def _end() -> NoReturn:
 
 
 def _load(module: str) -> None:
-    """Load a module of the kit before the fork, and what it says that it needs, once."""
+    """Load a module of the kit once, before the fork, and call its `prepare` function to load what it needs."""
     if module in sys.modules or not module.startswith("autograder."):
         return
-    gc.disable()  # of what is loaded here nothing is garbage
-    with contextlib.suppress(Exception):  # the fork will say it
+    gc.disable()  # nothing that is loaded here is garbage
+    with contextlib.suppress(Exception):  # the fork will report the error
         prepare = getattr(importlib.import_module(module), "prepare", None)
         if prepare is not None:
             prepare()
@@ -132,7 +134,10 @@ def _load(module: str) -> None:
 
 
 def _become_first_process(life_line: socket.socket, streams: list[int]) -> None:
-    """Return in a process that has all to itself; this one waits for its end, and says how it ended."""
+    """Return only in a new process with its own namespaces.
+
+    This process waits for its end and reports its exit status.
+    """
     for number, descriptor in enumerate(streams):
         os.dup2(descriptor, number)
         os.close(descriptor)
@@ -162,7 +167,7 @@ def _become_first_process(life_line: socket.socket, streams: list[int]) -> None:
     poll.register(life_line, select.POLLIN)
     poll.register(handle, select.POLLIN)
     poll.poll()
-    os.kill(first, signal.SIGKILL)  # it has ended, or nobody waits for it any more; in the end all below it is gone
+    os.kill(first, signal.SIGKILL)  # it has ended, or nobody waits for it any more; this ends all its descendants, too
     _, status = os.waitpid(first, 0)
     with contextlib.suppress(OSError):
         life_line.send(str(os.waitstatus_to_exitcode(status)).encode())
@@ -170,7 +175,7 @@ def _become_first_process(life_line: socket.socket, streams: list[int]) -> None:
 
 
 def _furnish() -> None:
-    """Set up the new namespaces, and give up what that takes."""
+    """Set up the new namespaces, and give up the privileges that this needs."""
     try:
         own_mounts.make(DISK, 0)
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as any_socket:
@@ -183,7 +188,7 @@ def _furnish() -> None:
 
 
 def _fork_main_process() -> None:
-    """Return in a further process; this one, the first of its namespace, only buries those whose parents are gone."""
+    """Return only in a new process. This process, the first of its namespace, only reaps orphaned processes."""
     main_process = os.fork()
     if main_process == 0:
         os.setsid()

@@ -1,4 +1,4 @@
-"""Processes of the grading sandbox that a server forks, where it need not be started anew for each of them."""
+"""Processes of the grading sandbox that a server forks, so that no sandbox must be started anew for each of them."""
 
 from __future__ import annotations
 
@@ -13,38 +13,38 @@ import time
 from collections.abc import Callable
 
 ServerStart = Callable[[int, int], "subprocess.Popen[bytes]"]
-"""Starts the server, given its end of the channel and where its standard error goes."""
+"""The type of a function that starts the server, given its end of the channel and a descriptor for its stderr."""
 
 BEGUN = b"begun"
-"""What a life line says first; the exit status is the second thing."""
+"""The first message on a lifeline; the exit status is the second."""
 KILLED = -9
-"""The exit status of a fork of which nobody knows how it ended."""
+"""The exit status of a fork if it is not known how it ended."""
 
 
 class Fork:
-    """A forked process, to be used as one that `subprocess.Popen` started with three pipes."""
+    """A forked process that can be used like one that `subprocess.Popen` started with three pipes."""
 
     def __init__(self, life_line: socket.socket, stdin: int, stdout: int, stderr: int) -> None:
-        """Made by `ForkServer.fork`."""
+        """Keep the lifeline and open the pipes; `ForkServer.fork` creates the object."""
         self._life_line = life_line
         self._status: int | None = None
         self.begun = False
-        """Whether it has begun, as far as is known once it has ended."""
+        """Whether the process has begun; this is known only after `wait`."""
         self.lost = False
-        """Whether nobody says how it ended, as with all forks when their server is killed."""
+        """Whether it is not known how it ended, as for all forks after their server was killed."""
         self.stdin = os.fdopen(stdin, "wb", 0)
         self.stdout, self.stderr = os.fdopen(stdout, "rb", 0), os.fdopen(stderr, "rb", 0)
 
     def kill(self) -> None:
-        """End it and everything that it started."""
+        """End the process and everything that it started."""
         with contextlib.suppress(OSError):
             self._life_line.shutdown(socket.SHUT_WR)
 
     def wait(self, timeout: float | None = None) -> int:
-        """Wait until it and everything that it started has ended; return its exit status.
+        """Wait until the process and everything that it started has ended, and return its exit status.
 
         Raises:
-            subprocess.TimeoutExpired: it has not, after `timeout` seconds.
+            subprocess.TimeoutExpired: it has not ended after `timeout` seconds.
         """
         if self._status is not None:
             return self._status
@@ -66,21 +66,23 @@ class Fork:
 
 
 class ForkServer:
-    """The server of this process. It ends with this process, or after a while without work; then the next one begins.
+    """The fork server of this process. It ends with this process, or after some time without work.
+
+    If it has ended, the next request starts a new one.
 
     Args:
-        start: how to start it.
+        start: the function that starts it.
     """
 
     def __init__(self, start: ServerStart) -> None:
-        """Nothing is started before it is needed."""
+        """Begin without a server; it is started when it is needed."""
         self._start = start
         self._lock = threading.Lock()
         self._channel: socket.socket | None = None
         self._said = -1
 
     def fork(self, module_args: list[str]) -> Fork:
-        """Have a process forked that runs `python -m <module_args…>`.
+        """Let the server fork a process that runs `python -m <module_args…>`.
 
         Raises:
             OSError: the server cannot be started.
@@ -92,10 +94,10 @@ class ForkServer:
                     return fork
                 self._close()
             self._channel = self._begin()
-            return _ask(self._channel, module_args)[0]  # if that server has ended at once, so has the fork
+            return _ask(self._channel, module_args)[0]  # if this server has ended at once, the fork counts as ended
 
     def gone(self) -> str:
-        """Give up a server that has lost a fork; return what it has written on its standard error."""
+        """Give up a server that has lost a fork, and return what it has written to its standard error."""
         with self._lock:
             said = os.pread(self._said, 10_000, 0).decode("utf-8", "replace") if self._said >= 0 else ""
             self._close()
@@ -108,7 +110,11 @@ class ForkServer:
         self._channel, self._said = None, -1
 
     def _begin(self) -> socket.socket:
-        """Start the server from a thread that lives on: a bubblewrap sandbox ends with the thread that started it."""
+        """Start the server, and return the channel to it.
+
+        It is started by a thread that continues to run, because a bubblewrap sandbox ends with the thread that started
+        it.
+        """
         channel, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         self._said = os.memfd_create("fork server")
         tried = threading.Event()
@@ -135,7 +141,7 @@ class ForkServer:
 
 
 def _ask(channel: socket.socket, module_args: list[str]) -> tuple[Fork, bool]:
-    """Ask for a fork; return it, and whether there was anybody to ask."""
+    """Request a fork, and return it and whether the server has received the request."""
     ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     (their_in, our_in), (our_out, their_out), (our_err, their_err) = os.pipe(), os.pipe(), os.pipe()
     fork = Fork(ours, our_in, our_out, our_err)

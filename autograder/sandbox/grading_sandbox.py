@@ -1,4 +1,4 @@
-"""Runs a trusted module of this package in the grading sandbox: one process tree, input by stdin, output by stdout."""
+"""Runs a trusted module of this package in the grading sandbox, with input on stdin and output on stdout."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ from autograder.sandbox.limits import MIB
 from autograder.sandbox.walls import bubblewrap
 
 OUTPUT_LIMIT = 64 * MIB
-"""Bytes of stdout after which the run is ended."""
+"""The bytes on stdout after which the run is ended."""
 STDERR_KEPT = MIB
 _STOP_POLL = 0.2
-"""Seconds between two looks at whether a run is to be stopped."""
+"""The seconds between two checks whether a run should be stopped."""
 
 DROPPED_ID = 61771
-"""The user and group that root becomes for grading: one that owns nothing."""
+"""The ID of the user and group to which root changes for grading. They own nothing."""
 
 _GIVE_UP_ROOT = (
     f"import os,sys;n={DROPPED_ID};os.setgroups([]);os.setresgid(n,n,n);os.setresuid(n,n,n);"
@@ -41,22 +41,22 @@ _RUN_AND_END_WITH_PARENT = (
     "os.getppid()==int(sys.argv[1]) or sys.exit('nobody waits for this');sys.argv=sys.argv[2:];"
     "runpy.run_module(sys.argv[0],run_name='__main__',alter_sys=True)"
 )
-"""Without bwrap's `--die-with-parent`: `python -m` that is killed with the thread that started it."""
+"""A `python -m` that is killed when the thread that started it ends. It replaces bwrap's `--die-with-parent`."""
 
 
 @dataclass
 class SandboxRun:
-    """What came out of a run in the sandbox."""
+    """The result of a run in the sandbox."""
 
     stdout: bytes
     stderr: str
     status: int
-    """Exit status; negative: the number of the signal that ended it."""
+    """The exit status. A negative number is that of the signal that ended the run."""
     timed_out: bool
 
 
 class Stopped(Exception):
-    """A run was ended because nobody wants its result any more."""
+    """A run was ended because its result is no longer needed."""
 
 
 def run_in_sandbox(
@@ -69,20 +69,20 @@ def run_in_sandbox(
 ) -> SandboxRun:
     """Run `python -m <module_args…>` in the grading sandbox and wait for it.
 
-    The module sees this virtual environment, the `autograder` package and an empty /tmp; no labs, no submissions, no
-    gradebook, no network. With reduced or no isolation it is a plain child process.
+    The module sees this virtual environment, the `autograder` package and an empty /tmp, but no labs, no submissions,
+    no gradebook and no network. With reduced or no isolation, it is an ordinary child process.
 
     Args:
-        module_args: module name and its arguments.
-        stdin: what it reads.
-        isolation: as `isolation.choose` returned it.
-        time_limit: seconds after which everything in the sandbox is ended.
-        stop: everything in it is ended soon after this is set.
-        heard: is given what it writes on stdout, as it comes.
+        module_args: the name of the module and its arguments.
+        stdin: the module's input.
+        isolation: the isolation, as returned by `isolation.choose`.
+        time_limit: the seconds after which everything in the sandbox is ended.
+        stop: everything in the sandbox is ended soon after this event is set.
+        heard: called with each piece of the module's output on stdout as it arrives.
 
     Raises:
         OSError: the sandbox cannot be started at all.
-        Stopped: by `stop`.
+        Stopped: `stop` was set.
     """
     if stop is not None and stop.is_set():
         raise Stopped
@@ -91,7 +91,7 @@ def run_in_sandbox(
         return _run(_start_child(module_args), stdin, time_limit, stop, heard)
     fork = _forks.fork(module_args)
     run = _run(fork, stdin, time_limit, stop, heard)
-    if fork.lost and not fork.begun:  # the server was killed before it heard of it
+    if fork.lost and not fork.begun:  # the server was killed before it received the request
         _forks.gone()
         fork = _forks.fork(module_args)
         run = _run(fork, stdin, time_limit, stop, heard)
@@ -130,7 +130,7 @@ def _environment() -> dict[str, str]:
 
 
 def _start_child(module_args: list[str]) -> subprocess.Popen[bytes]:
-    """Without full isolation: a child that ends with the thread that calls this."""
+    """Start a child process for a run without full isolation; it ends with the calling thread."""
     command = [sys.executable, "-c", _RUN_AND_END_WITH_PARENT, str(os.getpid()), *module_args]
     pipe = subprocess.PIPE
     return subprocess.Popen(
@@ -139,18 +139,20 @@ def _start_child(module_args: list[str]) -> subprocess.Popen[bytes]:
 
 
 def start_fork_server(channel: int, stderr: int, idle: float = 60.0) -> subprocess.Popen[bytes]:
-    """Start what forks the processes of the grading sandbox; it is in one itself, and ends with the calling thread.
+    """Start the server that forks the processes of the grading sandbox.
+
+    The server itself runs in a sandbox, and ends with the calling thread.
 
     Args:
-        channel: its end of the socket pair on which it is asked for forks.
-        stderr: where its standard error goes.
-        idle: seconds without a request or a fork after which it ends, to give the memory back.
+        channel: the server's end of the socket pair on which it receives requests.
+        stderr: the descriptor for its standard error.
+        idle: the seconds without a request or a running fork after which it ends to free its memory.
     """
     command = [sys.executable, "-m", "autograder.sandbox.fork_server", str(channel), str(idle)]
     around = None
     if os.getuid() == 0:
-        # Namespaces nest only for an ordinary user, and only root may read below /root: give up root inside a mount
-        # tree of our own, in which this Python lies under folders that everyone may enter.
+        # Namespaces can be nested only by an ordinary user, but only root may read below /root. Therefore root is given
+        # up inside a private mount tree, in which this Python is below folders that everyone may enter.
         around = (bubblewrap.options_for_root(), [sys.executable, "-I", "-S", "-c", _GIVE_UP_ROOT])
     copies = bubblewrap.copies_of_files()
     options = bubblewrap.outer_options(_environment(), copies)
@@ -162,11 +164,11 @@ def start_fork_server(channel: int, stderr: int, idle: float = 60.0) -> subproce
 
 
 _forks = ForkServer(start_fork_server)
-"""Of this process; it starts with the first run in full isolation."""
+"""The fork server of this process. It starts with the first run with full isolation."""
 
 
 def _compile_package() -> None:
-    with _compiling:  # the threads of a class come here all at once
+    with _compiling:  # when a class is graded, many threads call this at once
         _compile_package_once()
 
 
@@ -175,8 +177,8 @@ _compiling = threading.Lock()
 
 @functools.cache
 def _compile_package_once() -> None:
-    """Keep the package's bytecode up to date: a sandbox cannot write it, and would compile everything each time."""
-    compileall.compile_dir(bubblewrap.PACKAGE, quiet=2)  # where it may not write either, it goes on
+    """Update the package's bytecode, because a sandbox cannot write it and would compile everything each time."""
+    compileall.compile_dir(bubblewrap.PACKAGE, quiet=2)  # if it may not write here either, it is ignored
 
 
 def exchange(
@@ -186,14 +188,14 @@ def exchange(
     stop: threading.Event | None = None,
     heard: Callable[[bytes], None] | None = None,
 ) -> SandboxRun:
-    """Feed a process and take what it writes, until it ends, writes too much, or its time is over.
+    """Send a process its input and collect its output, until it ends, writes too much, or its time is over.
 
     Args:
-        process: with pipes for its three streams; whoever started it ends it.
-        stdin: what it reads.
-        time_limit: seconds.
-        stop: gives up soon after this is set.
-        heard: is given what it writes on stdout, as it comes.
+        process: the process, with pipes for its three streams. The caller ends it if an exception is raised.
+        stdin: the process's input.
+        time_limit: the limit in seconds.
+        stop: the exchange is given up soon after this event is set.
+        heard: called with each piece of the output on stdout as it arrives.
 
     Raises:
         Stopped: by `stop`.
@@ -242,7 +244,7 @@ def exchange(
 
 
 def _fed(pipe: int, waiting: memoryview) -> memoryview:
-    """Write as much as a pipe takes, and return the rest: nothing if nobody reads it any more."""
+    """Write as much as the pipe takes, and return the rest. If nobody reads the pipe any more, nothing is left."""
     try:
         return waiting[os.write(pipe, waiting[: 1 << 16]) :]
     except BrokenPipeError:

@@ -1,4 +1,4 @@
-"""What isolation this machine offers, tried and not guessed; and the refusal to grade with less than was asked for."""
+"""Finds out by a trial which isolation this machine offers, and refuses to grade with less than was requested."""
 
 from __future__ import annotations
 
@@ -19,27 +19,30 @@ _TIME_LIMIT = 60.0
 
 @dataclass(frozen=True)
 class Preflight:
-    """What this machine offers, and why not more."""
+    """The isolation that this machine offers, and why it does not offer more."""
 
     full: bool
     reduced: bool
     why_not_full: str = ""
     do: str = ""
-    """What to do to get full isolation."""
+    """What the user can do to get full isolation."""
 
 
 @functools.cache
 def preflight() -> Preflight:
-    """Try a program in the two nested sandboxes, exactly as grading does; takes about half a second, once."""
+    """Try a program in the two nested sandboxes, exactly as grading does.
+
+    This takes about half a second, but only once.
+    """
     why = _why_not_full()
     return Preflight(full=not why, reduced=_reduced(), why_not_full=why, do=_remedy(why) if why else "")
 
 
 def choose(wanted: Isolation) -> Isolation:
-    """Return `wanted`, if this machine offers it. Nothing is ever weakened silently.
+    """Return `wanted` if this machine offers it. The isolation is never weakened silently.
 
     Raises:
-        KitError: it does not; says what to do, and which weaker isolation may be asked for.
+        KitError: the machine does not offer it. The message says what to do, and which weaker isolation is available.
     """
     if wanted is Isolation.NONE:
         return wanted
@@ -59,7 +62,10 @@ def choose(wanted: Isolation) -> Isolation:
 
 
 def most() -> tuple[Isolation, str]:
-    """Return the most that this machine offers, and why it is not full; for who runs programs of their own."""
+    """Return the strongest isolation that this machine offers, and why it is not full.
+
+    This is for users who run their own programs.
+    """
     found = preflight()
     if found.full:
         return Isolation.FULL, ""

@@ -1,9 +1,9 @@
-"""What a student's programs may use.
+"""The limits of what a student's programs may use.
 
-Nothing here is a statement about the machine. How long a program runs, how much it computes and how much it prints
-depends on how fast that is and on what else it does, so none of these ends a program: it runs until the end of its
-launch. One that computes on and on gives way to others (`running_program.py`), and one that prints without end is read
-no faster than a terminal would (`running_programs.py`).
+No limit depends on the machine. How long a program runs, how much it computes and how much it prints depends on how
+fast the machine is and on what else it does. Therefore none of these ends a program: it runs until the end of its
+launch. A program that computes all the time gets a low priority (`running_program.py`), and one that prints without end
+is read no faster than a terminal would read it (`running_programs.py`).
 """
 
 from __future__ import annotations
@@ -15,23 +15,24 @@ MIB = 1024 * 1024
 
 @dataclass(frozen=True)
 class Limits:
-    """Limits of a launch. Sizes are in bytes."""
+    """The limits of a launch. Sizes are in bytes."""
 
     memory: int = 512 * MIB
-    """Sum over all programs of what they do not share with each other."""
+    """The sum, over all programs, of the memory that they do not share with each other."""
     address_space: int = 2048 * MIB
-    """Of one process. A node's threads alone reserve 0.4 GiB."""
+    """The limit of one process. A node's threads alone reserve 0.4 GiB."""
     processes: int = 192
-    """Processes and threads of all programs together; a node has about 12."""
+    """The processes and threads of all programs together; a node has about 12."""
     open_files: int = 256
     signals: int = 1024
-    """Waiting signals and timers of all programs together."""
+    """The pending signals and timers of all programs together."""
     file_size: int = 16 * MIB
     disk: int = 16 * MIB
-    """What may lie in /tmp, and again in /dev/shm."""
+    """The size of all files in /tmp, and the same for /dev/shm."""
     inodes: int = 1024
-    """Files and folders there, again in each: an empty file costs the kernel a kilobyte that no limit counts."""
+    """The number of files and folders in each of these. Even an empty file costs the kernel a kilobyte of memory, which
+    no other limit counts."""
     output_kept: int = 256 * 1024
-    """How much of a program's output is kept: the first half and the last half of it."""
+    """The bytes of a program's output that are kept: one half from its beginning, and one half from its end."""
     events: int = 2000
-    """How many lines of the probe are kept."""
+    """The number of the probe's lines that are kept."""

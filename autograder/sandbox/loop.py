@@ -1,4 +1,4 @@
-"""One thread that waits for descriptors, does what it is asked to, and looks at something now and then."""
+"""One thread that waits for descriptors, runs requested actions, and calls a function at intervals."""
 
 from __future__ import annotations
 
@@ -14,17 +14,18 @@ from collections.abc import Callable
 from autograder.core.errors import KitError
 
 _LOOK_EVERY = 0.1
-"""Seconds between two looks."""
+"""The least seconds between two looks."""
 _TIME_BETWEEN_LOOKS = 50
-"""How many times its own length lies between two looks: with a thousand processes on the machine one costs a lot."""
+"""The time between two looks is at least this many times as long as a look takes, because a look is expensive on a
+machine with thousands of processes."""
 
 
 class Loop:
-    """Runs callbacks one after another, in a thread of its own that lives until `stop`.
+    """Runs callbacks one after another in its own thread, which runs until `stop`.
 
     Args:
         busy: whether there is anything to look at.
-        look: called every 0.1 s while there is.
+        look: called about every 0.1 s as long as there is something to look at.
     """
 
     def __init__(self, busy: Callable[[], bool], look: Callable[[], None]) -> None:
@@ -39,7 +40,7 @@ class Loop:
         self._thread.start()
 
     def do(self, action: Callable[[], None]) -> None:
-        """Do something in the thread, and wait until it is done. What it raises is raised here."""
+        """Run an action in the thread and wait until it is done. An exception that it raises is raised here."""
         if threading.current_thread() is self._thread:
             action()
             return
@@ -63,21 +64,21 @@ class Loop:
             raise problem[0]
 
     def when_readable(self, descriptor: int, action: Callable[[], None]) -> None:
-        """Call `action` whenever there is something to read; only from the thread itself."""
+        """Call `action` whenever there is something to read; call this only in the thread itself."""
         self._selector.register(descriptor, selectors.EVENT_READ, action)
 
     def read_now(self, descriptor: int) -> None:
-        """Call the action of a descriptor, if it is still waited for; only from the thread itself."""
+        """Call the action of a descriptor if it is still registered; call this only in the thread itself."""
         key = self._selector.get_map().get(descriptor)
         if key is not None:
             key.data()
 
     def forget(self, descriptor: int) -> None:
-        """Wait for it no more; only from the thread itself."""
+        """Stop waiting for a descriptor; call this only in the thread itself."""
         self._selector.unregister(descriptor)
 
     def stop(self) -> None:
-        """End the thread, and close what belongs to it."""
+        """End the thread, and close its descriptors."""
         self._stopped = True
         os.write(self._wake_write, b"x")
         self._thread.join()
@@ -103,7 +104,7 @@ class Loop:
 
     @staticmethod
     def _call_and_go_on(action: Callable[[], object]) -> None:
-        """Call it; whatever goes wrong must not end this thread, which everyone waits for."""
+        """Call an action. An error in it must not end this thread, because other threads wait for it."""
         try:
             action()
         except Exception:

@@ -1,7 +1,7 @@
-"""The node sandbox: starts a student's programs by a warm launcher, and ends them.
+"""The node sandbox: starts a student's programs with a launcher that has already loaded rclpy, and ends them.
 
-Used by the grading worker inside the grading sandbox, and with `Isolation.NONE` in a student's own Jupyter kernel,
-which is never forked: it has threads.
+The grading worker uses it inside the grading sandbox. With `Isolation.NONE`, it is used in a student's own Jupyter
+kernel, which is never forked, because it has threads.
 """
 
 from __future__ import annotations
@@ -26,17 +26,18 @@ from autograder.sandbox.scratch import Scratch
 from autograder.sandbox.walls import bubblewrap, seccomp
 
 _READY_WITHIN = 30.0
-"""Seconds that a launcher may take to load rclpy on a machine that is busy."""
+"""The seconds that a launcher may take to load rclpy on a busy machine."""
 _ENDED_WITHIN = 2.0
-"""Seconds that a launcher may take to end what is below it, where no PID namespace does."""
+"""The seconds that a launcher may take to end its descendants if there is no PID namespace that ends them."""
 
 
 class NodeSandbox:
     """Runs the programs of one folder.
 
     Args:
-        folder: holds the programs (`NAME.py`) and their files; it is their working directory, read-only to them.
-        isolation: how they are kept apart. `Isolation.FULL` works in the grading sandbox, and for an ordinary user.
+        folder: the folder with the programs (`NAME.py`) and their files. It is the programs' working directory, and
+            they cannot write to it.
+        isolation: how they are isolated. `Isolation.FULL` works in the grading sandbox, and for an ordinary user.
         limits: what the programs of a group may use together.
 
     Raises:
@@ -44,7 +45,7 @@ class NodeSandbox:
     """
 
     def __init__(self, folder: Path, isolation: Isolation, *, limits: Limits | None = None) -> None:
-        """Start the launcher at once, without waiting for it: it warms up while the caller goes on."""
+        """Start the launcher immediately, without waiting for it: it loads rclpy while the caller continues."""
         self.folder = folder
         self.isolation = isolation
         self.limits = limits or Limits()
@@ -53,10 +54,10 @@ class NodeSandbox:
         self._launcher: subprocess.Popen[bytes] | None = None
         self._channel: socket.socket | None = None
         self._said = -1
-        """What the launcher writes on its standard error."""
+        """A file with what the launcher writes to its standard error."""
         self._closed = False
         self._scratch = None if isolation is Isolation.FULL else Scratch()
-        # bwrap ends with the thread that started it, so this one thread starts it, and lives as long as the sandbox.
+        # bwrap ends with the thread that started it, so this thread starts it and runs as long as the sandbox.
         self._loop = Loop(self._busy, self._look)
         try:
             self._loop.do(self._spawn)
@@ -65,10 +66,10 @@ class NodeSandbox:
             raise
 
     def group(self) -> RunningPrograms:
-        """Begin a launch: programs that are started in it find a fresh /tmp, and end with it and with no other.
+        """Begin a launch. Its programs have a new, empty /tmp, and end with this launch and with no other.
 
         Raises:
-            KitError: it cannot be begun.
+            KitError: the launch cannot be started.
         """
         why = ""
         for _ in range(2):
@@ -86,7 +87,7 @@ class NodeSandbox:
         )
 
     def close(self) -> None:
-        """End everything, the launcher included, and remove what lies on the disk. Can be called twice."""
+        """End everything, including the launcher, and remove the files on the disk. This can be called twice."""
         if self._closed:
             return
         self._closed = True
@@ -98,11 +99,11 @@ class NodeSandbox:
                 self._scratch.remove()
 
     def __enter__(self) -> NodeSandbox:
-        """Return itself."""
+        """Return the sandbox."""
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Close it."""
+        """Close the sandbox."""
         self.close()
 
     def _new_group(self) -> RunningPrograms:
@@ -112,14 +113,16 @@ class NodeSandbox:
             full = self.isolation is Isolation.FULL
             limits = bubblewrap.rlimits(self.limits)
             if not full:
-                # Without a user namespace the kernel counts all that a user runs: beside a browser nothing would start.
-                del limits["RLIMIT_NPROC"]  # what a launch has too many of, `watch` counts and ends
+                # Without a user namespace, the kernel counts all processes of the user, so no program could start
+                # while a browser is running. Instead, `watch` counts the processes of a launch.
+                del limits["RLIMIT_NPROC"]
             request = {
                 "namespaces": full,
                 "disk": self.limits.disk,
                 "inodes": self.limits.inodes,
                 "limits": limits,
-                # With reduced isolation the launcher is under this filter already; nobody is kept from himself.
+                # With reduced isolation, the launcher already has this filter. Without isolation, none is needed,
+                # because the programs are the user's own.
                 "filter": seccomp.filter_program().hex() if full else "",
                 "program_filter": seccomp.no_processes().hex(),
             }
@@ -149,7 +152,7 @@ class NodeSandbox:
         os.lseek(self._said, 0, os.SEEK_SET)
         return " ".join(os.read(self._said, 10_000).decode("utf-8", "replace").strip().splitlines()[-3:])
 
-    # In the sandbox's thread.
+    # Methods that run in the sandbox's thread.
 
     def _spawn(self) -> None:
         ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
@@ -192,10 +195,10 @@ class NodeSandbox:
                 group.end()
         channel.close()
         if self._scratch is not None:
-            # At the end of its channel it ends what is below it, and itself.
+            # When its channel is closed, the launcher ends its descendants and itself.
             with contextlib.suppress(subprocess.TimeoutExpired):
                 launcher.wait(_ENDED_WITHIN)
-        launcher.kill()  # in a PID namespace, everything with it
+        launcher.kill()  # this ends everything in its PID namespace, if it has one
         launcher.wait()
         os.close(self._said)
 

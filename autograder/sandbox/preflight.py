@@ -1,4 +1,4 @@
-"""What the preflight runs in the grading sandbox: a program in the node sandbox that must be able to say a word."""
+"""The module that the preflight runs in the grading sandbox: it starts a program in the node sandbox."""
 
 from __future__ import annotations
 
@@ -12,7 +12,10 @@ from autograder.sandbox.node_sandbox import NodeSandbox
 
 
 def main() -> int:
-    """Return 0 if a program was started in the node sandbox, and said its word."""
+    """Start a program in the node sandbox and print its output.
+
+    Return 1 if the sandbox cannot be started, otherwise 0.
+    """
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         folder.chmod(0o755)

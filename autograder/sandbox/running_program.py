@@ -1,4 +1,4 @@
-"""One running program of a student's, as its launcher's keeper sees it."""
+"""One running program of a student, as the process that controls the launcher sees it."""
 
 from __future__ import annotations
 
@@ -16,40 +16,41 @@ from autograder.sandbox.inside import thread_stacks
 from autograder.sandbox.limits import Limits
 
 LAST = 19
-"""The nice value of whoever lets everyone else go first (sched(7))."""
+"""The nice value with the lowest priority (sched(7))."""
 _TO_BEGIN = 1.0
-"""Seconds of CPU up to which a program is not looked at; a node that rests never has more."""
+"""The seconds of CPU time up to which a program is not examined; an idle node never uses more."""
 _ON_AND_ON = 10.0
-"""Seconds of CPU within the time that is judged."""
+"""A program computes all the time if it uses more than this many seconds of CPU time within one period."""
 _LOOKS = 50
-"""After so many looks a new time begins if the program did not want to compute in most of them."""
+"""After this many looks, a new period begins if the program did not want to compute at most of them."""
 
 
 class Priority:
-    """The priority of one program, which is looked at now and then.
+    """The priority of one program, which is examined at intervals.
 
-    A program that computes on and on lets everyone else go first. It cannot get its priority back, so it has to be seen
-    to compute on and on: many seconds of CPU within a time in most of which it wanted to compute, whether it could or
-    not. What a program needs to begin, on whatever machine, is not that.
+    A program that computes all the time gets the lowest priority. It cannot get its priority back, so there must be
+    clear evidence: many seconds of CPU time within a period during most of which it wanted to compute, whether it got a
+    CPU or not. The CPU time that a program needs to start, on any machine, does not count as this.
     """
 
     def __init__(self) -> None:
-        """Begin with that of everyone."""
+        """Begin with the normal priority."""
         self._behind = False
         self._looks = self._wanted = 0
-        """Looks since this time began, and those at which the program wanted to compute."""
+        """The looks since this period began, and those at which the program wanted to compute."""
         self._before = 0.0
-        """Seconds of CPU that it had had when this time began."""
+        """The seconds of CPU time that the program had used when this period began."""
 
     def look(self, pid: int) -> None:
-        """Give all threads of the program the lowest priority if it computes on and on, whatever it gave to some.
+        """Give all threads of the program the lowest priority if it computes all the time.
 
-        The programs of its launch, and of others, come before it then. Where each session has its share of the CPUs
-        (sched(7), the autogroup feature) it takes no more than one session's, with however many threads: each program
-        is a session of its own.
+        This overrides priorities that the program itself has set for some threads. The other programs of its launch and
+        of other launches come first then. If the kernel divides the CPUs between sessions (sched(7), the autogroup
+        feature), the program gets no more than the share of one session, with any number of threads, because each
+        program is in its own session.
 
         Args:
-            pid: of the program.
+            pid: the process ID of the program.
         """
         with contextlib.suppress(OSError):
             self._behind = self._behind or self._goes_on_and_on(pid)
@@ -73,50 +74,50 @@ class Priority:
 
 
 _LONGEST_NOTE = 4096
-"""Bytes; the probe's own are shorter."""
+"""The bytes from which a line is dropped; the probe's own lines are shorter."""
 _NOTES_KEPT = 1 << 20
-"""Bytes of notes that are kept of one program: what they become in memory is twenty times as much at worst."""
+"""The bytes of notes that are kept for one program. In memory, they take up to twenty times as much."""
 _RECORDS = 500
-"""Notes that stand for a thing: only the last one of each is kept."""
+"""The number of things for which a record is kept. Only the last record of each thing is kept."""
 
 
 class RunningProgram:
-    """A program that was started. Its output is read all the time by the sandbox's own thread.
+    """A program that was started. The sandbox's own thread reads its output continuously.
 
     Attributes:
-        name: what `RunningPrograms.start` was asked for.
+        name: the name with which `RunningPrograms.start` was called.
     """
 
     def __init__(
         self, name: str, limits: Limits, changed: threading.Condition, catch_up: Callable[[RunningProgram], None]
     ) -> None:
-        """Made by `RunningPrograms.start`."""
+        """Begin without a process; `RunningPrograms.start` creates the object."""
         self.name = name
         self._limits = limits
         self._changed = changed
         self._catch_up = catch_up
         self._handle = -1
         self.pid = -1
-        """Process id as this process sees it."""
+        """The process ID as this process sees it."""
         self.priority = Priority()
         self.began = time.monotonic()
         self._head = bytearray()
         self._tail = bytearray()
         self._written = 0
         self._noted = 0
-        """Bytes that came from the probe, and stacks."""
+        """The bytes that came from the probe, and stacks."""
         self._status: int | None = None
         self._stopped_by = ""
         self._events: list[dict[str, Any]] = []
         self._records: dict[str, dict[str, Any]] = {}
-        """Events that stand for a thing, by its key: only the last one counts."""
+        """The last record of each thing, by the key of the thing."""
         self._event_rest = b""
         self._event_bytes = 0
         self._stacks = bytearray()
         self.readers: list[int] = []
-        """The pipes from it that are still open."""
+        """The pipes from the program that are still open."""
 
-    # What the sandbox's thread tells it; all under the condition's lock.
+    # Methods for the sandbox's thread, which calls them while it holds the condition's lock.
 
     def _started(self, handle: int) -> None:
         self._handle = handle
@@ -144,7 +145,7 @@ class RunningProgram:
                     self._take_event(event, len(line))
 
     def _take_event(self, event: dict[str, Any], size: int) -> None:
-        """Keep an event; one that has a key stands for a thing, and takes the place of the one before it."""
+        """Keep an event. One with a key is the record of a thing, and replaces its earlier record."""
         key = event.get("key")
         if isinstance(key, str) and (key in self._records or len(self._records) < _RECORDS):
             self._records[key] = event
@@ -168,27 +169,30 @@ class RunningProgram:
             self._handle = -1
 
     def _kill(self, why: str) -> None:
-        """End it because of a limit."""
+        """End the program because of a limit."""
         if self._status is None and not self._stopped_by:
             self._stopped_by = why
         self.signal(signal.SIGKILL)
 
-    # What others ask of it.
+    # Methods for callers.
 
     def running(self) -> bool:
-        """Whether it has not ended."""
+        """Whether the program has not ended."""
         return self._status is None
 
     def exit_status(self) -> int | None:
-        """Return None while it runs; negative: the number of the signal that ended it."""
+        """Return the exit status, or None while the program runs.
+
+        A negative number is that of the signal that ended the program.
+        """
         return self._status
 
     def stopped_by(self) -> str:
-        """Return which limit ended it (`memory limit` or `process limit`), or "" for none."""
+        """Return the limit because of which the program was ended (`memory limit` or `process limit`), or ""."""
         return self._stopped_by
 
     def output(self) -> str:
-        """Return what it has printed so far: of a long output the beginning and the end."""
+        """Return the program's output so far. Of a long output, only the beginning and the end are kept."""
         self._catch_up(self)
         with self._changed:
             half = self._limits.output_kept // 2
@@ -197,40 +201,41 @@ class RunningProgram:
             return (bytes(self._head) + cut + tail).decode("utf-8", "replace")
 
     def truncated(self) -> bool:
-        """Whether `output` has a gap."""
+        """Whether a part is missing from `output`."""
         return self._written > self._limits.output_kept // 2 * 2
 
     def events(self) -> list[dict[str, Any]]:
-        """Return what the probe inside it noted, in order. The program can forge it: for hints, never for points.
+        """Return the events that the probe inside the program noted, in order.
 
-        What happened before it sent an answer or a message is in here once that has arrived; what stands for a thing
-        (the events with a `key`) follows within a moment.
+        The program can forge them, so they may be used for hints, but never for points. Everything that happened before
+        the program sent a response or a message is included once that has arrived. Only the records of things (the
+        events with a `key`) may come a moment later.
         """
         self._catch_up(self)
         with self._changed:
             return [*self._events, *self._records.values()]
 
     def wait(self, timeout: float) -> bool:
-        """Wait until it has ended, at most `timeout` seconds; return whether it has."""
+        """Wait until the program has ended, at most `timeout` seconds, and return whether it has ended."""
         with self._changed:
             return self._changed.wait_for(lambda: self._status is not None, timeout)
 
     def signal(self, number: int) -> None:
-        """Send it a signal, if it still runs."""
+        """Send the program a signal, if it is still running."""
         with self._changed, contextlib.suppress(ProcessLookupError):
             if self._status is None and self._handle >= 0:
                 signal.pidfd_send_signal(self._handle, number)
 
     def stop(self, grace: float = 1.0) -> None:
-        """Ask it to end (SIGTERM); after `grace` seconds make it end (SIGKILL)."""
+        """Ask the program to end (SIGTERM), and kill it (SIGKILL) if it has not ended after `grace` seconds."""
         self.signal(signal.SIGTERM)
         if not self.wait(grace):
             self.signal(signal.SIGKILL)
             self.wait(1.0)
 
     def stacks(self, timeout: float = 1.0) -> str:
-        """Return what each of its threads does now, as a traceback each, newest call first; "" if it does not say."""
-        self._catch_up(self)  # what is left of an earlier answer is none to this question
+        """Return a traceback of each thread of the program, newest call first, or "" if the program does not answer."""
+        self._catch_up(self)  # otherwise the rest of an earlier answer would be taken for the answer to this request
         with self._changed:
             self._stacks.clear()
             if self._status is not None:

@@ -1,10 +1,10 @@
-"""The programs of one launch: started together, read together, held to their common limits, ended together.
+"""The programs of one launch: they are started, read and ended together, and share common limits.
 
-A program that writes without end is read no faster than a terminal would read it. Then it has to wait when it prints,
-as it would there, and neither it nor the reading takes the machine from others.
+A program that prints without end is read no faster than a terminal would read it. Then it has to wait when it prints,
+as in a terminal, and neither the program nor the reading takes the CPUs from others.
 
-Memory, processes and disk have limits. CPU time has none, because how fast a program uses it depends on the machine as
-well. One that computes on and on goes on, behind everyone else who wants to compute (`Priority`).
+There are limits for memory, processes and disk space. There is none for CPU time, because how fast a program uses it
+also depends on the machine. A program that computes all the time continues with the lowest priority (`Priority`).
 """
 
 from __future__ import annotations
@@ -28,44 +28,45 @@ from autograder.sandbox.loop import Loop
 from autograder.sandbox.running_program import RunningProgram
 
 _PIECE = 1 << 16
-"""Bytes read at once."""
+"""The bytes that are read at once."""
 _MOST_PIECES = 64
-"""Of one pipe before others have their turn: more than is read at once."""
+"""The number of reads from one pipe before it is the turn of other pipes, which is enough for more than `_AT_ONCE`."""
 _AT_ONCE = 1 << 18
-"""Bytes of one pipe that may be read between two looks at the launch, however soon they follow each other."""
+"""The bytes of one pipe that may be read between two looks at the launch, however short the time between them is."""
 _A_SECOND = 10 * _AT_ONCE
-"""Bytes of one pipe that may be read in a second: a book. How often a launch is looked at depends on the machine."""
+"""The bytes of one pipe that may be read in a second, which is as much as a long book. The limit is per second because
+the time between two looks at a launch depends on the machine."""
 _LONGEST = 10.0
-"""Seconds between two looks that count at the most."""
+"""The most seconds between two looks that count."""
 
 
 class ProgramPipes:
-    """Reads the programs of one group in the sandbox's thread.
+    """Reads the output of the programs of one group in the sandbox's thread.
 
     Args:
-        loop: that thread.
-        changed: held and notified whenever a program is told something.
+        loop: the loop of the sandbox's thread.
+        changed: a condition that is held and notified whenever the state of a program changes.
     """
 
     def __init__(self, loop: Loop, changed: threading.Condition) -> None:
-        """Begin with no program."""
+        """Begin without programs."""
         self._loop = loop
         self._changed = changed
         self._looked = time.monotonic()
         self._room = _AT_ONCE
-        """Bytes of a pipe that may be read until the next look: as many as in the time between the last two."""
+        """The bytes of a pipe that may be read until the next look, computed from the time between the last two."""
         self._read: dict[int, int] = {}
-        """Bytes that were read of a pipe since the last look."""
+        """The bytes that were read from each pipe since the last look."""
         self._paused: dict[int, Callable[[], None]] = {}
-        """What reads a pipe that was full of more than may be read at once."""
+        """For each pipe from which no more may be read until the next look: the function that reads it."""
 
     def open(self, program: RunningProgram) -> list[int]:
-        """Make a program's pipes, and read them from now on; return the ends to write to, closed by the caller."""
+        """Create a program's pipes and read them from now on. Return their write ends, which the caller closes."""
         ends = [os.pipe2(os.O_CLOEXEC) for _ in range(3)]
         for ours, _ in ends:
             os.set_blocking(ours, False)
         for _, theirs in ends[1:]:
-            os.set_blocking(theirs, False)  # the probe drops what does not fit, it never waits
+            os.set_blocking(theirs, False)  # the probe never waits, but drops data that does not fit
         takers = (program._take_output, program._take_events, program._take_stacks)
         program.readers = [ours for ours, _ in ends]
 
@@ -77,12 +78,15 @@ class ProgramPipes:
         return [theirs for _, theirs in ends]
 
     def catch_up(self, program: RunningProgram) -> None:
-        """Take what lies in a running program's pipes: its answer may have come by DDS before its notes were read."""
+        """Read what is in a running program's pipes now.
+
+        This is needed because a response may come over DDS before the notes that the program wrote earlier are read.
+        """
         if program.readers:
             self._loop.do(lambda: self._drain(program))
 
     def go_on(self) -> None:
-        """Read on where more was written than is read at once; only from the sandbox's thread."""
+        """Continue to read pipes with more data than may be read at once; call this only in the sandbox's thread."""
         now = time.monotonic()
         self._room = max(_AT_ONCE, int(_A_SECOND * min(now - self._looked, _LONGEST)))
         self._looked = now
@@ -92,7 +96,7 @@ class ProgramPipes:
         self._paused.clear()
 
     def take_rest(self, program: RunningProgram) -> None:
-        """Take what a program that has ended has left in its pipes; only from the sandbox's thread."""
+        """Read the rest of the pipes of a program that has ended; call this only in the sandbox's thread."""
         self.go_on()
         self._drain(program)
 
@@ -107,14 +111,14 @@ class ProgramPipes:
                     break
 
     def close(self, program: RunningProgram) -> None:
-        """Close what is still open of a program's pipes; only from the sandbox's thread."""
+        """Close a program's pipes that are still open; call this only in the sandbox's thread."""
         for descriptor in list(program.readers):
             self._close(program, descriptor)
 
     def _reader(self, program: RunningProgram, descriptor: int, taker: Callable[[bytes], None]) -> Callable[[], None]:
         def read() -> None:
             if descriptor not in program.readers:
-                return  # closed by what came before it in the same round
+                return  # an earlier callback in the same round has closed it
             data = b""
             with contextlib.suppress(BlockingIOError):
                 data = os.read(descriptor, _PIECE)
@@ -142,16 +146,16 @@ class ProgramPipes:
 
 
 def enforce_limits(first: int, base: int, programs: Sequence[RunningProgram], limits: Limits) -> bool:
-    """Look at what a launch uses, and end the biggest of its programs if that is too much.
+    """Measure what a launch uses, and end the program that uses most if that is too much.
 
     Args:
-        first: its first process; every other one descends from it, since orphans become its children.
-        base: bytes of memory that the first process had before it started anything; forks share them.
-        programs: those that run.
-        limits: of all together.
+        first: the first process of the launch. All others descend from it, because orphans become its children.
+        base: the bytes of memory that the first process had before it started anything; forks share them.
+        programs: the running programs.
+        limits: the limits of all programs together.
 
     Returns:
-        False if it is the first process itself that uses too much: then everything has to end.
+        False if the first process itself uses too much, so that the whole launch has to end.
     """
     family = descendants(first)
     own = memory(first) - base
@@ -169,7 +173,7 @@ def enforce_limits(first: int, base: int, programs: Sequence[RunningProgram], li
 def _end_biggest(
     programs: Sequence[RunningProgram], family: dict[int, Process], sizes: dict[int, int], why: str
 ) -> None:
-    """End the program whose processes use most, and all processes that belong to no program any more."""
+    """End the program whose processes use most, and all processes that no longer belong to a program."""
     owned: dict[int, list[int]] = {}
     roots = {program.pid for program in programs}
     for pid in family:
@@ -188,37 +192,37 @@ def _end_biggest(
 
 
 _ANSWER_WITHIN = 30.0
-"""Seconds after which a first process that does not answer is given up."""
+"""The seconds to wait for an answer of a first process."""
 _ENDED_WITHIN = 30.0
-"""Seconds that the kernel may take to end killed processes."""
+"""The seconds that the kernel may take to end killed processes."""
 _SET_BY_THE_SANDBOX = ("FASTRTPS_DEFAULT_PROFILES_FILE", "ROS_LOG_DIR", "HOME", "TMPDIR", "LD_LIBRARY_PATH")
-"""What a caller cannot set for a program: it depends on where the program runs."""
+"""The variables that a caller cannot set for a program, because they depend on where the program runs."""
 
 
 class GroupLost(Exception):
-    """The group's first process has ended, or never began."""
+    """The group's first process has ended, or has never started."""
 
 
 class RunningPrograms:
-    """The programs of one launch. Made by `NodeSandbox.group`; ended with `end`, or as a `with` block.
+    """The group of the programs of one launch. `NodeSandbox.group` creates it; `end` or leaving a `with` block ends it.
 
-    Where there is full isolation, it is a PID namespace: when its first process is gone, everything in it is, whoever
-    its parent was.
+    With full isolation, the launch has its own PID namespace: when the first process has ended, the kernel has ended
+    everything in the namespace, no matter which process started it.
     """
 
     def __init__(
         self, folder: Path, inside: str, variables: Mapping[str, str], limits: Limits, loop: Loop,
         channel: socket.socket,
     ) -> None:  # fmt: skip
-        """Listen to the first process, which may still be on its way.
+        """Begin to listen to the first process, which may not have started yet.
 
         Args:
-            folder: of the programs.
-            inside: where the programs find it.
+            folder: the folder of the programs.
+            inside: the path at which the programs see this folder.
             variables: the environment of every program.
-            limits: of the whole group.
-            loop: the sandbox's thread.
-            channel: to the first process.
+            limits: the limits of the whole group.
+            loop: the loop of the sandbox's thread.
+            channel: the socket to the first process.
         """
         self.folder = folder
         self.changed = threading.Condition()
@@ -233,9 +237,9 @@ class RunningPrograms:
         self._first = -1
         """A pidfd of the first process."""
         self.pid = -1
-        """The first process as this process sees it."""
+        """The ID of the first process as this process sees it."""
         self._base = 0
-        """Bytes of memory that it had before it started anything."""
+        """The bytes of memory that the first process had before it started anything."""
         self._ready = False
         self._broken = ""
         self._over = False
@@ -243,20 +247,20 @@ class RunningPrograms:
         loop.do(lambda: loop.when_readable(channel.fileno(), self._on_channel))
 
     def __enter__(self) -> RunningPrograms:
-        """Return itself."""
+        """Return the group."""
         return self
 
     def __exit__(self, *_: object) -> None:
-        """End it."""
+        """End all programs of the group."""
         self.end()
 
-    # What callers use.
+    # Methods for callers.
 
     def wait_ready(self, timeout: float) -> None:
-        """Wait for the first process.
+        """Wait until the first process is ready.
 
         Raises:
-            GroupLost: it did not come; says why.
+            GroupLost: it did not become ready; the message says why.
         """
         with self.changed:
             self.changed.wait_for(lambda: (self._ready and self.pid > 0) or self._over, timeout)
@@ -267,19 +271,19 @@ class RunningPrograms:
         self, program: str, args: Sequence[str] = (), env: Mapping[str, str] | None = None, cores: int = 2,
         *, file: str = "", prefixes: Sequence[str] = (),
     ) -> RunningProgram:  # fmt: skip
-        """Start a program of the folder as a process of its own.
+        """Start a program of the folder as a new process.
 
         Args:
-            program: its name.
-            args: `sys.argv[1:]`.
-            env: variables besides those of every program, such as ROS_DOMAIN_ID.
-            cores: the number of CPUs that it sees.
-            file: its path in the folder; by default `program`.py.
-            prefixes: paths in the folder of installed ROS packages, whose modules it can import.
+            program: the name of the program.
+            args: the arguments, `sys.argv[1:]`.
+            env: variables in addition to those of every program, such as ROS_DOMAIN_ID.
+            cores: the number of CPUs that the program sees.
+            file: the path of the program in the folder; by default `program`.py.
+            prefixes: the paths in the folder of installed ROS packages, whose modules the program can import.
 
         Raises:
             FileNotFoundError: the folder has no such program.
-            KitError: it is not started.
+            KitError: the sandbox cannot start the program.
         """
         file = file or f"{program}.py"
         if not (self.folder / file).is_file():
@@ -294,16 +298,16 @@ class RunningPrograms:
         return started
 
     def end(self) -> None:
-        """End everything that was started, and make sure of it. Can be called twice.
+        """End everything that was started, and check that it has ended. This can be called twice.
 
         Raises:
-            KitError: something goes on.
+            KitError: something has not ended.
         """
         self._loop.do(self._end)
 
     @property
     def over(self) -> bool:
-        """Whether it has ended."""
+        """Whether the group has ended."""
         return self._over
 
     def running(self) -> bool:
@@ -311,7 +315,7 @@ class RunningPrograms:
         return not self._over and bool(self._programs)
 
     def watch(self) -> None:
-        """Hold the programs to the limits of the group; only from the sandbox's thread."""
+        """Enforce the limits of the group on its programs; call this only in the sandbox's thread."""
         with self.changed:
             programs = [program for program in self._programs.values() if program.pid > 0]
             if self._over or not programs:
@@ -323,10 +327,10 @@ class RunningPrograms:
                 signal.pidfd_send_signal(self._first, signal.SIGKILL)
             self.changed.notify_all()
 
-    # Starting.
+    # Methods that start a program.
 
     def _packages(self, prefixes: Sequence[str]) -> dict[str, str]:
-        """The variable by which ROS, and here the launcher too, finds installed packages."""
+        """Return the variable by which ROS and the launcher find installed packages."""
         return {"AMENT_PREFIX_PATH": ":".join(f"{self._inside}/{one}" for one in prefixes)} if prefixes else {}
 
     def _request(self, program: RunningProgram, file: str, args: list[str], env: dict[str, str], cores: int) -> bool:
@@ -341,7 +345,7 @@ class RunningPrograms:
             "folder": self._inside,
             "args": args,
             "env": {**self._variables, **env, **{name: self._variables[name] for name in _SET_BY_THE_SANDBOX}},
-            # A random choice: with the same two CPUs for everyone, a big machine would be idle beside them.
+            # The choice is random, because with the same two CPUs for all programs, the other CPUs would be idle.
             "cpus": sorted(random.sample(usable, min(cores, len(usable)))),
             "cores": cores,
         }
@@ -355,10 +359,10 @@ class RunningPrograms:
             self.changed.wait_for(lambda: program.pid >= 0 or not program.running() or self._over, _ANSWER_WITHIN)
             return program.pid >= 0 or not program.running()
 
-    # In the sandbox's thread.
+    # Methods that run in the sandbox's thread.
 
     def _on_channel(self) -> None:
-        """Take one answer. What was never one of a first process of ours ends the group."""
+        """Receive one answer of the first process. An invalid answer ends the group."""
         try:
             packet, handles, _, _ = socket.recv_fds(self._channel, 1 << 16, 1)
         except BlockingIOError:
@@ -418,7 +422,7 @@ class RunningPrograms:
 
     def _kill(self) -> None:
         """End the first process, and wait until it and all programs are gone."""
-        self._channel.shutdown(socket.SHUT_WR)  # a first process that is not known yet ends at this
+        self._channel.shutdown(socket.SHUT_WR)  # this ends a first process whose pidfd has not arrived yet
         handles = [handle for handle in (self._first, *(one._handle for one in self._programs.values())) if handle >= 0]
         for handle in handles:
             with contextlib.suppress(ProcessLookupError):
@@ -427,13 +431,13 @@ class RunningPrograms:
         deadline = time.monotonic() + _ENDED_WITHIN
         for handle in handles:
             poll.register(handle, select.POLLIN)
-            # The first process of a PID namespace is gone only when everything in it is.
+            # The first process of a PID namespace has ended only when everything in the namespace has.
             if not poll.poll(1000 * max(0.0, deadline - time.monotonic())):
                 raise KitError("Programs that were killed do not end.", "Look at the machine's process list.")
             poll.unregister(handle)
 
     def _take_last_answers(self) -> None:
-        """Take what the first process said before its end: how programs that ended by themselves did."""
+        """Receive what the first process reported before its end, such as how programs ended by themselves."""
         while True:
             try:
                 packet, handles, _, _ = socket.recv_fds(self._channel, 1 << 16, 1)

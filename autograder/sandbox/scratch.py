@@ -1,4 +1,4 @@
-"""A folder of one process's own, which is gone with the process or soon after, however that ends."""
+"""A temporary folder of one process, which is removed when the process ends, or soon afterwards."""
 
 from __future__ import annotations
 
@@ -13,10 +13,13 @@ _PREFIX = "autograder-run-"
 
 
 class Scratch:
-    """An empty folder. A lock shows that its process lives: whoever makes one removes those of processes now dead."""
+    """An empty folder. A lock shows that its process is alive.
+
+    Every new scratch folder first removes the folders of processes that are no longer alive.
+    """
 
     def __init__(self) -> None:
-        """Make it."""
+        """Create the folder."""
         for old in Path(tempfile.gettempdir()).glob(f"{_PREFIX}*"):
             with contextlib.suppress(OSError):
                 held = os.open(old, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW | os.O_CLOEXEC)
@@ -26,7 +29,7 @@ class Scratch:
                 finally:
                     os.close(held)
         self.folder = Path()
-        while not self.folder.name:  # another process may have taken it for an abandoned one, before it was locked
+        while not self.folder.name:  # another process may remove a new folder as abandoned before it is locked
             made = Path(tempfile.mkdtemp(prefix=_PREFIX))
             try:
                 self._held = os.open(made, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
@@ -39,7 +42,7 @@ class Scratch:
                 os.close(self._held)
 
     def remove(self) -> None:
-        """Remove it and all that lies in it. Can be called twice."""
+        """Remove the folder and everything in it. This can be called twice."""
         if self._held >= 0:
             shutil.rmtree(self.folder, ignore_errors=True)
             os.close(self._held)
@@ -50,5 +53,5 @@ class Scratch:
         return self.folder
 
     def __exit__(self, *_: object) -> None:
-        """Remove it."""
+        """Remove the folder."""
         self.remove()

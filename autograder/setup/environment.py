@@ -1,6 +1,6 @@
-# Written for Python 3.6 and up, so that an old Python meets a sentence and not a SyntaxError.
+# This file runs in Python 3.6 and newer, so that an old Python prints a message and not a SyntaxError.
 # ruff: noqa: UP006, UP031, UP035
-"""The environment `.venv`: made empty, pointed to the kit and the course, finished with a marker, or removed."""
+"""Create the environment `.venv`, connect it with the kit and the course, mark it as finished, or remove it."""
 
 import contextlib
 import hashlib
@@ -14,8 +14,8 @@ from autograder.setup.interpreter import Interpreter, output_of
 from autograder.setup.places import MARKER, PYTHON, ROOT, VENV, WHEEL
 from autograder.setup.refusals import SetUpError, refuse_full_disk, tail
 
-# A #! line can hold no space and is cut at 127 bytes: /bin/sh starts the Python that lies beside this file.
-# Guarded, since processes of a pool import the main script once more.
+# A #! line must not contain a path with a space, and is cut off after 127 bytes. Therefore /bin/sh starts the Python
+# that is beside this file. The last two lines are guarded, because processes of a pool import the main script again.
 _COMMAND = (
     '#!/bin/sh\n\'\'\'exec\' "$(dirname "$(readlink -f "$0")")/python" "$0" "$@"\n\' \'\'\'\n'
     "import sys\n\nfrom autograder.cli import %s\n\nif __name__ == '__main__':\n    sys.exit(%s())\n"
@@ -23,7 +23,7 @@ _COMMAND = (
 
 
 def write_commands() -> None:
-    """Write those that are missing or of an earlier form."""
+    """Write the commands `autograder` and `ros2` if they are missing or have an earlier form."""
     for name, function in (("autograder", "main"), ("ros2", "ros2")):
         command = VENV / "bin" / name
         text = _COMMAND % (function, function)
@@ -33,11 +33,11 @@ def write_commands() -> None:
 
 
 def lead_jupyter() -> None:
-    """Let nbgrader, nbconvert and kernels of this environment use the course's configuration, wherever they start.
+    """Make nbgrader, nbconvert and kernels of this environment use the course's configuration, wherever they start.
 
-    Started elsewhere than in the course, nbgrader would go on with its own stages, which run what students wrote.
-    nbconvert would write reports into Markdown as HTML, though they have a plain text. Kernels would not know what to
-    say when a notebook's first cell was not run.
+    Without this, nbgrader would use its own stages outside of the course's folder, and these run students' code.
+    nbconvert would write reports into Markdown as HTML, although they also have a plain text. Kernels could not explain
+    what to do if a notebook's first cell was not run.
     """
     if WHEEL:
         return
@@ -56,7 +56,7 @@ def lead_jupyter() -> None:
 
 
 def lead_python() -> None:
-    """Write the file that each Python of the environment reads first, if it says something else."""
+    """Write the file that each Python of the environment reads first, unless the file is already up to date."""
     text = TEXT if WHEEL else "%s\n%s" % (ROOT, TEXT)
     for folder in VENV.glob("lib/python3*/site-packages"):
         file = folder / FILE
@@ -65,12 +65,12 @@ def lead_python() -> None:
 
 
 def digest(lock: str) -> str:
-    """Return the SHA-256 of the file `lock` of the course: a lock, or the wheel of a student's kit."""
+    """Return the SHA-256 of the file `lock` below `ROOT`, which is a lock or the wheel of a student's kit."""
     return hashlib.sha256((ROOT / lock).read_bytes()).hexdigest()
 
 
 def read_marker() -> "Dict[str, Any]":
-    """Return what the finished `.venv` was made of; empty if it is unfinished, moved, or lost its Python."""
+    """Return the marker of `.venv`; empty if `.venv` is not finished, was moved, or has lost its Python."""
     try:
         state = json.loads(MARKER.read_text(encoding="utf-8"))
     except (OSError, ValueError):
@@ -80,9 +80,9 @@ def read_marker() -> "Dict[str, Any]":
 
 
 def create(base: Interpreter) -> "List[str]":
-    """Make an empty `.venv` on `base`; return the command that is pip for it, or an empty list if there is none.
+    """Create an empty `.venv` on `base`, and return the command that runs pip for it, or an empty list without pip.
 
-    Raises SetUpError.
+    Raises SetUpError if `.venv` cannot be created.
     """
     options = [] if base.ensurepip else ["--without-pip"]
     status, text = output_of(base.program, "-I", "-m", "venv", *options, str(VENV))
@@ -97,7 +97,7 @@ def create(base: Interpreter) -> "List[str]":
 
 
 def finish(locks: "List[str]", version: "Tuple[int, ...]") -> None:
-    """Lead the environment's programs to the kit, then write the marker as the very last act.
+    """Connect the environment's programs with the kit, and then, as the last step, write the marker.
 
     Raises SetUpError if the new Python does not run.
     """
@@ -111,7 +111,7 @@ def finish(locks: "List[str]", version: "Tuple[int, ...]") -> None:
 
 
 def write_marker(locks: "List[str]", version: "Tuple[int, ...]") -> None:
-    """Declare `.venv` finished."""
+    """Write the marker that says that `.venv` is finished."""
     state = {
         "folder": str(VENV),
         "program": str(PYTHON.resolve()),
@@ -124,7 +124,7 @@ def write_marker(locks: "List[str]", version: "Tuple[int, ...]") -> None:
 
 
 def discard() -> None:
-    """Remove `.venv`, the marker first: an interrupted removal must not look finished."""
+    """Remove `.venv`. The marker is removed first, so that `.venv` does not look finished if this is interrupted."""
     with contextlib.suppress(OSError):
         MARKER.unlink()
     if VENV.is_symlink():

@@ -1,6 +1,6 @@
-# Written for Python 3.6 and up, so that an old Python meets a sentence and not a SyntaxError.
+# This file runs in Python 3.6 and newer, so that an old Python prints a message and not a SyntaxError.
 # ruff: noqa: UP006, UP031, UP035, UP045
-"""The search for a Python that the environment can be built on."""
+"""Find a Python on which the environment can be built."""
 
 import json
 import os
@@ -31,7 +31,7 @@ print(json.dumps({
 
 
 class Interpreter(NamedTuple):
-    """A Python that `.venv` can be built on."""
+    """A Python on which `.venv` can be built."""
 
     program: str
     version: Tuple[int, ...]
@@ -40,13 +40,13 @@ class Interpreter(NamedTuple):
 
 
 def clean_environment() -> "Dict[str, str]":
-    """Return this process's environment without what would lead another Python or pip astray."""
+    """Return this process's environment without variables that would mislead another Python or pip."""
     unwanted = ("PYTHONPATH", "PYTHONHOME", "PYTHONSTARTUP", "VIRTUAL_ENV", "PIP_TARGET", "PIP_PREFIX", "PIP_USER")
     return {name: value for name, value in os.environ.items() if name not in unwanted}
 
 
 def output_of(*command: str, **environ: str) -> "Tuple[int, str]":
-    """Run `command` with `environ` added to a clean environment; return its exit status and all that it printed."""
+    """Run `command` with `environ` added to a clean environment, and return its exit status and its whole output."""
     try:
         process = subprocess.Popen(
             command,
@@ -63,14 +63,17 @@ def output_of(*command: str, **environ: str) -> "Tuple[int, str]":
 
 
 def probe(program: str) -> "Tuple[str, Optional[Interpreter]]":
-    """Ask `program` what Python it is; return why it will not do (empty if it will) and the Interpreter."""
+    """Find out which Python `program` is.
+
+    Return the reason why it cannot be used and None, or an empty text and the Interpreter.
+    """
     status, text = output_of(program, "-I", "-c", PROBE)
     try:
         answer = json.loads(text.strip().splitlines()[-1]) if status == 0 else {}
     except (ValueError, IndexError):
         answer = {}
     if not answer:
-        return "does not run", None  # pyenv puts stand-ins on PATH that only say that the version is not chosen
+        return "does not run", None  # for example a program of pyenv that only says that no version is chosen
     version = tuple(answer["version"])
     if not OLDEST <= version[:2] <= NEWEST:
         return "is Python %d.%d.%d" % version, None
@@ -82,19 +85,19 @@ def probe(program: str) -> "Tuple[str, Optional[Interpreter]]":
 
 
 def find_python(wanted: str) -> Interpreter:
-    """Return the Python to build on: `wanted` if it is named, else the first good one on PATH.
+    """Return the Python to build on: `wanted` if it is named, and otherwise the first suitable one on PATH.
 
-    Raises SetUpError if there is none.
+    Raises SetUpError if there is no suitable Python.
     """
     names = [wanted] if wanted else ["python3"] + ["python3.%d" % n for n in range(NEWEST[1], OLDEST[1] - 1, -1)]
-    own = str(VENV / "bin")  # the environment may be active in this shell, but it cannot be built on itself
+    own = str(VENV / "bin")  # `.venv` may be active in this shell, but it cannot be built on its own Python
     path = os.pathsep.join(folder for folder in os.get_exec_path() if folder != own)
     refused: List[str] = []
     without_ensurepip = None
     for name in names:
         program = shutil.which(str(Path(name).expanduser()), path=path)
         if program is None:
-            refused += ["%s is not there" % name] if wanted else []
+            refused += ["%s does not exist" % name] if wanted else []
             continue
         why, interpreter = probe(program)
         if interpreter is None:

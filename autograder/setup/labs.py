@@ -1,6 +1,6 @@
-# Written for Python 3.6 and up, so that an old Python meets a sentence and not a SyntaxError.
+# This file runs in Python 3.6 and newer, so that an old Python prints a message and not a SyntaxError.
 # ruff: noqa: UP031
-"""The labs of a student's kit: as they were handed out below `kit/labs`, and below `labs` where the student works."""
+"""Copy the labs of a student's kit from `kit/labs`, as they were handed out, to `labs`, where the student works."""
 
 import contextlib
 import filecmp
@@ -11,10 +11,10 @@ from autograder.setup.places import KIT_FOLDER, ROOT
 
 
 def put_labs() -> None:
-    """Put each lab that is not there yet where the student works. A lab that is there is the student's, and stays.
+    """Copy each lab that does not exist there yet to the folder in which the student works. Keep existing labs.
 
-    Only `README.md`, the page that lists the labs, is the kit's, and is put in place of an earlier one. Another process
-    may do the same meanwhile.
+    Only `README.md`, the page that lists the labs, belongs to the kit and is replaced. Another process may do the same
+    at the same time.
 
     Raises OSError if files cannot be written.
     """
@@ -31,7 +31,7 @@ def put_labs() -> None:
                 shutil.copy(str(given), str(beside))
             beside.replace(mine)
         except OSError:
-            if not (given.is_dir() and mine.exists()):  # of a lab the first one counts
+            if not (given.is_dir() and mine.exists()):  # otherwise another process was faster, and its copy counts
                 raise
         finally:
             shutil.rmtree(str(beside), ignore_errors=True)

@@ -1,6 +1,6 @@
-# Written for Python 3.6 and up, so that an old Python meets a sentence and not a SyntaxError.
+# This file runs in Python 3.6 and newer, so that an old Python prints a message and not a SyntaxError.
 # ruff: noqa: UP031, UP035
-"""What a machine may lack: each refusal says what is in the way, and what to do about it."""
+"""Refuse a machine that lacks something. Each refusal says what is missing and what to do about it."""
 
 import os
 import platform
@@ -25,17 +25,17 @@ FULL_DISK = 16 << 20  # bytes
 
 
 class SetUpError(Exception):
-    """What is in the way, and what to do about it, each for a person to read."""
+    """An error of set-up with two sentences for a person: what the problem is, and what to do about it."""
 
     def __init__(self, what: str, do: str) -> None:
-        """Keep what happened and what to do."""
+        """Store two sentences: what the problem is, and what to do about it."""
         super().__init__(what)
         self.what = what
         self.do = do
 
 
 def foreign_ros(environ: Mapping[str, str]) -> str:
-    """Return where a sourced ROS distribution other than Jazzy shows in `environ`; empty if nowhere."""
+    """Return a text that says which variable shows that another ROS distribution is sourced; empty if none does."""
     for name in ROS_PATHS:
         for found in re.finditer(r"/opt/ros/([a-z]+)", environ.get(name, "")):
             if found.group(1) != ROS_DISTRIBUTION:
@@ -45,7 +45,7 @@ def foreign_ros(environ: Mapping[str, str]) -> str:
 
 
 def refuse_foreign_ros(environ: Mapping[str, str]) -> None:
-    """Raise SetUpError if another ROS distribution is sourced: its rclpy would be imported instead of ours."""
+    """Raise SetUpError if another ROS distribution is sourced, because its rclpy would be imported instead of ours."""
     where = foreign_ros(environ)
     if where:
         unset = " ".join("-u " + name for name in (*ROS_PATHS, "ROS_DISTRO") if name in environ)
@@ -57,7 +57,7 @@ def refuse_foreign_ros(environ: Mapping[str, str]) -> None:
 
 
 def refuse_other_machines() -> None:
-    """Raise SetUpError where the ROS 2 wheels do not run: they are for Linux on x86_64 with glibc 2.28 or newer."""
+    """Raise SetUpError if the ROS 2 wheels do not run here. They need Linux on x86_64 with glibc 2.28 or newer."""
     library, version = platform.libc_ver()
     if not sys.platform.startswith("linux") or platform.machine() not in ("x86_64", "AMD64"):
         found = "this is %s on %s" % (platform.system(), platform.machine())
@@ -74,7 +74,7 @@ def refuse_other_machines() -> None:
 
 
 def refuse_closed_folder(folder: Path) -> None:
-    """Raise SetUpError if this user may not write to `folder`."""
+    """Raise SetUpError if this user is not allowed to write to `folder`."""
     if not os.access(str(folder), os.W_OK):
         raise SetUpError(
             "This user may not write to %s." % folder,
@@ -83,8 +83,8 @@ def refuse_closed_folder(folder: Path) -> None:
 
 
 def refuse_full_disk(text: str) -> None:
-    """Raise SetUpError if a command failed because the disk is full: its output or the disk says so."""
-    if NO_SPACE.search(text) or shutil.disk_usage(str(ROOT)).free < FULL_DISK:  # venv keeps what ensurepip said
+    """Raise SetUpError if a command failed because the disk is full, according to its output or to the disk itself."""
+    if NO_SPACE.search(text) or shutil.disk_usage(str(ROOT)).free < FULL_DISK:  # venv does not print ensurepip's error
         raise SetUpError(
             "There is no space left:\n%s" % tail(text),
             "Free 1.5 GB (df -h shows which disk is full), then run the command again.",

@@ -1,4 +1,4 @@
-"""How the kit's wheel is built: as others are, and with what each Python of its environment reads first."""
+"""Build the kit's wheel like any other, but with the file that each Python of its environment reads first."""
 
 import runpy
 from pathlib import Path
@@ -7,10 +7,10 @@ from setuptools.command.build_py import build_py  # type: ignore[import-untyped]
 
 
 class WithFirstLines(build_py):  # type: ignore[misc]
-    """Puts a file beside the package, which setuptools alone cannot."""
+    """Adds a file beside the package, which setuptools alone cannot do."""
 
     def run(self) -> None:
-        """Build the package, and write that file."""
+        """Build the package, and write the file."""
         super().run()
         first = runpy.run_path(str(Path(__file__).with_name("first_lines.py")))  # the kit need not be importable
         Path(self.build_lib, first["FILE"]).write_text(first["TEXT"], encoding="utf-8")

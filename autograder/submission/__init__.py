@@ -1,1 +1,1 @@
-"""Turns a notebook into programs, files and check cells, as text and without running any of it."""
+"""Turn a notebook into programs, files and check cells. Everything is read as text, and nothing is executed."""

@@ -1,7 +1,7 @@
-"""Takes out of a submitted notebook, as text, the answers and the files that its cells name.
+"""Extract the answers of a submitted notebook, and the files that its cells name, as text.
 
-An answer is the source of a cell of the lab's own, found by its grade_id. A file comes from an answer, or from a cell
-that the student added for a module of their own.
+An answer is the source of one of the lab's answer cells, which is found by its grade_id. A file comes from an answer,
+or from a cell that the student added, for example for a module.
 """
 
 from __future__ import annotations
@@ -36,29 +36,29 @@ from autograder.submission.copies import (
 from autograder.submission.notebook_file import NOT_A_NOTEBOOK, UnreadableError, problem
 
 WRONG_NOTEBOOK = Kind(
-    "wrong-notebook", "it is another notebook, or hardly a cell of the lab is left in it", Group.NOTEBOOK
+    "wrong-notebook", "the file is another notebook, or almost none of the lab's cells are left in it", Group.NOTEBOOK
 )
 FORGED_CELL = Kind("forged-cell", "a cell has a grading mark that the lab does not know", Group.NOTEBOOK)
 SPLIT_CELL = Kind(
-    "split-cell", "an answer's cell was split; the piece without its first line is left out", Group.NOTEBOOK
+    "split-cell", "an answer's cell was split; a piece without the cell's first line is left out", Group.NOTEBOOK
 )
-DUPLICATED_CELL = Kind("duplicated-cell", "a cell with a grading mark is there more than once", Group.NOTEBOOK)
-FORGED_FLAGS = Kind("forged-flags", "a cell's grading marks are not the lab's", Group.NOTEBOOK)
-MISSING_CELL = Kind("missing-cell", "an answer's cell was deleted, or is no code cell any more", Group.NOTEBOOK)
-OVERSIZED_CELL = Kind("oversized-cell", "a cell is larger than is read", Group.NOTEBOOK)
-CHANGED_CELL = Kind("changed-cell", "a check cell was edited; the lab's own is run", Group.NOTEBOOK)
+DUPLICATED_CELL = Kind("duplicated-cell", "the notebook has a cell with a grading mark more than once", Group.NOTEBOOK)
+FORGED_FLAGS = Kind("forged-flags", "a cell's grading marks differ from those in the lab", Group.NOTEBOOK)
+MISSING_CELL = Kind("missing-cell", "an answer's cell was deleted, or is no longer a code cell", Group.NOTEBOOK)
+OVERSIZED_CELL = Kind("oversized-cell", "a cell is larger than the limit", Group.NOTEBOOK)
+CHANGED_CELL = Kind("changed-cell", "a check cell was edited; the lab's own cell is run", Group.NOTEBOOK)
 IGNORED_CELL = Kind(
-    "ignored-cell", "a cell of the student's own names a file that belongs to an answer or to the lab", Group.NOTEBOOK
+    "ignored-cell", "a cell that the student added names a file that belongs to an answer or the lab", Group.NOTEBOOK
 )
 TOO_MANY_FILES = Kind(
-    "too-many-files", "more cells of the student's own name files than are taken along", Group.NOTEBOOK
+    "too-many-files", "the student added more cells that name files than the limit allows", Group.NOTEBOOK
 )
 NO_FILE_NAME = Kind("no-file-name", "the first line of the cell does not name a file", Group.NOTEBOOK)
 GIVEN_FILE = Kind("given-file", "the cell names a file that belongs to the lab", Group.NOTEBOOK)
-RENAMED_FILE = Kind("renamed-file", "the cell names another file than the lab asks for", Group.NOTEBOOK)
-SAME_FILE = Kind("same-file", "two answers name one file", Group.NOTEBOOK)
+RENAMED_FILE = Kind("renamed-file", "the cell names a different file from the one the lab asks for", Group.NOTEBOOK)
+SAME_FILE = Kind("same-file", "two answers name the same file", Group.NOTEBOOK)
 BAD_FILE_NAME = Kind(
-    "bad-file-name", "the first line of the cell gives a name that no file here can have", Group.NOTEBOOK
+    "bad-file-name", "the first line of the cell gives a name that is not allowed for a file", Group.NOTEBOOK
 )
 
 
@@ -67,36 +67,36 @@ class Submission:
     """What a student handed in for a lab."""
 
     sources: dict[str, str] = field(default_factory=dict)
-    """The source of every answer cell by grade_id; what students receive where there was no usable answer."""
+    """The source of every answer cell by grade_id; the source that students receive if there is no usable answer."""
     files: dict[str, str] = field(default_factory=dict)
-    """File name to text: the programs and files that cells name, the lab's own and the student's own included."""
+    """The text of every program and file that a cell names, by file name, including the lab's files."""
     problems: list[Outcome] = field(default_factory=list)
     digest: str = ""
-    """SHA-256 over the answers, the lab and the kit: it changes when any of them does."""
+    """SHA-256 over the answers, the student's other files, the problems, the lab and the kit."""
     readable: bool = True
-    """False: there is no notebook of this lab to grade, and `problems` says why."""
+    """Whether there is a notebook of this lab to grade; if not, `problems` says why."""
     notebook: dict[str, Any] = field(default_factory=dict)
-    """The released notebook with the answers' sources in it."""
+    """The released notebook with the student's answers in it."""
 
 
 def take_answers(cells: list[dict[str, Any]], lab: Lab, submission: Submission) -> None:
     """Put the sources of a notebook's answer cells into a submission.
 
     Raises:
-        UnreadableError: no cell of it belongs to the lab.
+        UnreadableError: almost none of the notebook's cells belong to the lab.
     """
     released = {grade_id_of(cell): cell for cell in lab.released if grade_id_of(cell)}
     found = by_mark(cells)
     ours = lab.answers.keys() | {cell.grade_id for cell in lab.checks}
-    # Labs may have names of cells in common. Of another lab's notebook most are unknown here, and most answers of
-    # this one are missing.
+    # Two labs may use the same grade_ids. In another lab's notebook, most grade_ids are unknown here, and most answers
+    # of this lab are missing.
     known, answers = len(found.keys() & ours), len(found.keys() & lab.answers.keys())
     if not known or (2 * known < len(found.keys() - (released.keys() - ours)) and 2 * answers < len(lab.answers)):
         raise UnreadableError(
             problem(
                 f"the notebook is {lab.name}",
                 WRONG_NOTEBOOK(
-                    f"Almost none of its cells belongs to {lab.name}: this is a different notebook, or the graded cells"
+                    f"Almost none of its cells belong to {lab.name}: this is a different notebook, or the graded cells"
                     " were deleted.",
                     f"Start from labs/{lab.name}/{lab.name}.ipynb and submit that notebook.",
                 ),
@@ -158,7 +158,7 @@ def _take_cell(
         submission.problems.append(problem(f"the answer cell `{grade_id}` is there", MISSING_CELL(because, hint)))
         return
     try:
-        # A text may have been split or begun anew: whoever reads it decides.
+        # A text answer may have been split or started again. The person who reads it decides.
         texts = [source_of(cell) for cell in (copies if answer.file is None else copies[-1:])]
         written = [text for text in texts if text.strip() != answer.blank.strip()] or texts[:1]
         source = "\n\n".join(dict.fromkeys(written))
@@ -181,9 +181,9 @@ def _take_cell(
 
 
 def _compare(grade_id: str, copies: list[dict[str, Any]], lab: Lab, submission: Submission) -> None:
-    """Report an edited check cell; a deleted one does no harm, because the lab's own cell is run anyway.
+    """Report an edited check cell. A deleted one does not matter, because the lab's own cell is run anyway.
 
-    Not edited is also the cell of the lab's source, hidden lines included: who writes a lab checks that notebook.
+    A cell with the hidden lines of the lab's source does not count as edited, because authors check that notebook.
     """
 
     def text(cell: dict[str, Any]) -> list[str]:
@@ -206,7 +206,7 @@ def _compare(grade_id: str, copies: list[dict[str, Any]], lab: Lab, submission: 
 
 
 OWN_FILES = 50
-"""As many files of cells that a student added are taken along; a program and its modules need a few."""
+"""The number of files that cells added by a student may write. A program and its modules need only a few."""
 
 
 def take_files(lab: Lab, submission: Submission) -> None:
@@ -257,7 +257,10 @@ def take_files(lab: Lab, submission: Submission) -> None:
 
 
 def take_own_files(cells: list[dict[str, Any]], lab: Lab, submission: Submission) -> dict[str, str]:
-    """Take along what cells of the student's own hold, as in the notebook; an answer's name belongs to its own cell."""
+    """Put the files of cells that the student added into a submission, and return these files.
+
+    A file that belongs to an answer or the lab cannot be replaced in this way.
+    """
     answers = {answer.file.file_name: answer.grade_id for answer in lab.answers.values() if answer.file is not None}
     taken = dict(submission.files)
     places = _Places(taken)
@@ -274,7 +277,7 @@ def take_own_files(cells: list[dict[str, Any]], lab: Lab, submission: Submission
         if file is None or taken.get(file.file_name) == file.text:
             continue
         if file.file_name in taken or file.file_name in answers:
-            # Something has been said already of copies, and of marks that are no answer's.
+            # Copies of answer cells and cells with other grading marks have been reported already.
             if id(cell) not in looked_at and (not grade_id_of(cell) or grade_id_of(cell) in lab.answers):
                 submission.problems.append(_ignored(file, answers.get(file.file_name, ""), lab, submission))
             continue
@@ -300,7 +303,7 @@ def take_own_files(cells: list[dict[str, Any]], lab: Lab, submission: Submission
 
 
 class _Places:
-    """Where files lie, and the folders above them."""
+    """The paths of the files, and of the folders above them."""
 
     def __init__(self, names: Iterable[str]) -> None:
         self._files: set[str] = set()
@@ -313,26 +316,26 @@ class _Places:
         self._folders.update(_folders(name))
 
     def taken(self, name: str) -> bool:
-        """Whether a file would lie where another one needs a folder, or the other way round."""
+        """Return whether the path is the path of a folder, or needs a folder where there is a file."""
         return name in self._folders or not self._files.isdisjoint(_folders(name))
 
 
 def _folders(name: str) -> list[str]:
-    """The folders that a file's name puts it into."""
+    """Return the paths of the folders above a file."""
     parts = name.split("/")
     return ["/".join(parts[:count]) for count in range(1, len(parts))]
 
 
 def _ignored(file: CellFile, answer: str, lab: Lab, submission: Submission) -> Outcome:
-    """What to say of a cell of the student's own with a name that belongs to an answer or to the lab."""
+    """Return a problem: a cell that the student added names a file that belongs to an answer or to the lab."""
     first, title = f"%%{file.magic} {file.name}", f"one cell names {file.file_name}"
     hint = "Delete the other cell, or give its file another name."
     if not answer:
         because = f"Another cell also begins with `{first}`. It is ignored: {file.file_name} belongs to the lab."
         return problem(title, IGNORED_CELL(because, hint))
-    blank = ", still as you received it" if submission.sources[answer] == lab.answers[answer].blank else ""
+    blank = ", and it is still as you received it" if submission.sources[answer] == lab.answers[answer].blank else ""
     because = (
-        f"Another cell also begins with `{first}`. It is ignored: what counts is the cell for this answer, `{answer}`,"
-        f" as it stands{blank}."
+        f"Another cell also begins with `{first}`. It is ignored, because only the cell `{answer}` counts for this"
+        f" answer{blank}."
     )
-    return problem(title, IGNORED_CELL(because, f"Move what is to be graded into the cell `{answer}`. {hint}"))
+    return problem(title, IGNORED_CELL(because, f"Move what should be graded into the cell `{answer}`. {hint}"))

@@ -1,6 +1,6 @@
-"""Copies of a lab's cell: who copies or splits a cell in Jupyter copies its grading mark along.
+"""Copies of a lab's cells. A cell that is copied or split in Jupyter keeps its grading mark, so several cells have it.
 
-Which of them counts is decided here, for grading and for all that a notebook says of itself.
+This module decides which of them counts, both for grading and for the notebook's own messages.
 """
 
 from __future__ import annotations
@@ -13,18 +13,18 @@ from autograder.course.cells import CELL_BYTES, CellFile, grade_id_of, nbgrader_
 
 
 def named_file(cell: dict[str, Any]) -> CellFile | None:
-    """Return the file that a code cell names, if it does so in a way that the notebook's magics accept."""
+    """Return the file that a code cell names; None if it names none, or not in a way that the magics accept."""
     if cell.get("cell_type") != "code":
         return None
     try:
         source = source_of(cell)
         return None if len(source.encode("utf-8")) > CELL_BYTES else parse(source)
-    except ValueError:  # BadNameError is one: in the notebook, too, such a cell wrote nothing
+    except ValueError:  # such as BadNameError; such a cell writes no file in the notebook either
         return None
 
 
 def by_mark(cells: Sequence[dict[str, Any]]) -> dict[str, list[dict[str, Any]]]:
-    """Return the cells that have a grade_id, by it."""
+    """Return the cells that have a grade_id, by their grade_id."""
     found: dict[str, list[dict[str, Any]]] = {}
     for cell in cells:
         if grade_id_of(cell):
@@ -33,14 +33,14 @@ def by_mark(cells: Sequence[dict[str, Any]]) -> dict[str, list[dict[str, Any]]]:
 
 
 def copies_of(marked: Sequence[dict[str, Any]], file_name: str) -> list[dict[str, Any]]:
-    """Of the cells with one answer's mark, those that are the answer, in the notebook's order: the last one counts.
+    """Return the cells that are copies of an answer, in the notebook's order. The last one counts.
 
-    A copy that was given another name is a file of the student's own, and only a code cell is a file. Of an answer that
-    is no file, all are.
+    If the answer is a file, only code cells can be copies. A cell that names another file is not a copy but a file that
+    the student added. If the answer is not a file, all cells are copies.
 
     Args:
-        marked: the cells.
-        file_name: of the answer's file; empty if it is none.
+        marked: the cells with the answer's grading mark.
+        file_name: the name of the answer's file; empty if the answer is not a file.
     """
     if not file_name:
         return list(marked)
@@ -49,7 +49,12 @@ def copies_of(marked: Sequence[dict[str, Any]], file_name: str) -> list[dict[str
 
 
 def pieces_of(marked: Sequence[dict[str, Any]], file_name: str) -> list[dict[str, Any]]:
-    """Of the cells with one answer's mark, those that are left out: pieces that were split off, which name no file."""
+    """Return the cells that were split off from an answer and name no file, so that they are left out.
+
+    Args:
+        marked: the cells with the answer's grading mark.
+        file_name: the name of the answer's file; empty if the answer is not a file.
+    """
     copies = copies_of(marked, file_name)
     return [cell for cell in marked if copies and cell not in copies and not named_file(cell) and _is_written(cell)]
 
@@ -63,24 +68,24 @@ def _is_written(cell: dict[str, Any]) -> bool:
 
 @dataclass(frozen=True)
 class AnswerCells:
-    """What a notebook has of one of the lab's answers."""
+    """The cells in a notebook that belong to one of the lab's answers."""
 
     grade_id: str
     file_name: str
-    """Of its file; empty if it is none."""
+    """The name of the answer's file; empty if the answer is not a file."""
     marked: list[dict[str, Any]]
-    """All cells with its mark."""
+    """All cells with the answer's grading mark."""
 
     @property
     def copies(self) -> list[dict[str, Any]]:
-        """Those that are the answer; the last one counts."""
+        """The cells that are copies of the answer. The last one counts."""
         return copies_of(self.marked, self.file_name)
 
     def told(self, first: str) -> str:
-        """Say what of these cells does not count; empty if all do.
+        """Say which of these cells do not count; empty if all of them count.
 
         Args:
-            first: the first line of the lab's cell, or the name of one that is no file.
+            first: the first line of the lab's cell; if the answer is not a file, the cell's name.
         """
         count, is_file = len(self.copies), bool(self.file_name)
         copied = f"{told_of_copies(first, count, is_file)} {DELETE_COPIES}" if count > 1 else ""
@@ -91,8 +96,9 @@ def answers_in(cells: Sequence[dict[str, Any]], files: Mapping[str, str]) -> lis
     """Return the answers of a notebook in their order.
 
     Args:
-        cells: of the notebook.
-        files: of each answer that is one, by grade_id, as the notebook was released; of others a cell says it.
+        cells: the notebook's cells.
+        files: the file names of the answers by grade_id, as the notebook was released. For an answer that is not
+            listed, the file name is taken from a cell.
     """
     marked = by_mark([cell for cell in cells if nbgrader_of(cell).get("solution")])
     named = {
@@ -103,11 +109,11 @@ def answers_in(cells: Sequence[dict[str, Any]], files: Mapping[str, str]) -> lis
 
 
 def told_of_copies(name: str, count: int, is_file: bool = True) -> str:
-    """Say that there are copies, and which of them counts.
+    """Say that a cell has copies, and which of them counts.
 
     Args:
-        name: of the cell: the first line of one that is a file.
-        count: of the copies, the lab's own cell included.
+        name: the first line of the cell if it is a file, and otherwise its name.
+        count: the number of copies, including the lab's own cell.
         is_file: whether the answer is a file.
     """
     which = "the last one counts" if is_file else "all of them are read"
@@ -115,13 +121,13 @@ def told_of_copies(name: str, count: int, is_file: bool = True) -> str:
 
 
 def told_of_given_copies(grade_id: str, count: int) -> str:
-    """Say that there are copies of a cell that belongs to the lab, and which of them counts."""
+    """Say that a cell of the lab that is no answer has copies, and that the lab's own cell is run."""
     return f"There are {count} copies of the cell `{grade_id}`: the lab's own cell is run."
 
 
 DELETE_COPIES = "Delete the copies that should not count: a copied cell keeps its grading mark."
-"""What to do about copies."""
+"""The hint for a cell that has copies."""
 SPLIT = (
     "The cell `{0}` has been split. Grading ignores the piece that does not begin with this line, so merge the pieces."
 )
-"""What is said of a cell that was split, with its first line."""
+"""The sentence about a cell that was split; `{0}` is the first line of the cell."""

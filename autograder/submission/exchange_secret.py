@@ -1,4 +1,4 @@
-"""By what a student fetches feedback: the `submission_secret.txt` that nbgrader's exchange puts beside a notebook."""
+"""The file `submission_secret.txt`, which nbgrader's exchange puts beside a notebook and needs to return feedback."""
 
 from __future__ import annotations
 
@@ -11,6 +11,6 @@ _SECRET = re.compile(r"[0-9a-f]{1,512}", re.ASCII)
 
 
 def secret(content: bytes) -> str:
-    """Return what such a file says; empty if it is none that the exchange makes."""
+    """Return the secret in such a file; empty if the file does not have the form that the exchange writes."""
     text = content.decode("ascii", "replace").strip()
     return text if _SECRET.fullmatch(text) else ""

@@ -1,4 +1,4 @@
-"""Reads a notebook file as somebody placed it: bounded, through no link, and its cells as plain data."""
+"""Read a notebook file that somebody else wrote: with a limit on its size, through no link, and as plain data."""
 
 from __future__ import annotations
 
@@ -11,26 +11,26 @@ from autograder.core.results import Outcome, Status
 from autograder.course.cells import grade_id_of
 from autograder.reasons import Group, Kind, Reason
 
-NO_NOTEBOOK = Kind("no-notebook", "there is no file of the lab's name, or it is empty", Group.NOTEBOOK)
-OVERSIZED_NOTEBOOK = Kind("oversized-notebook", "the notebook is larger than is read", Group.NOTEBOOK)
-NOT_A_NOTEBOOK = Kind("not-a-notebook", "the file is JSON and no notebook, or a cell holds no text", Group.NOTEBOOK)
+NO_NOTEBOOK = Kind("no-notebook", "there is no file with the lab's name, or it is empty", Group.NOTEBOOK)
+OVERSIZED_NOTEBOOK = Kind("oversized-notebook", "the notebook is larger than the limit", Group.NOTEBOOK)
+NOT_A_NOTEBOOK = Kind("not-a-notebook", "the file is JSON but no notebook, or a cell holds no text", Group.NOTEBOOK)
 NOT_JSON = Kind("not-json", "the file is not JSON", Group.NOTEBOOK)
 
 NOTEBOOK_BYTES = 8 * 1024 * 1024
-"""The largest notebook that is read, in bytes."""
+"""The size of the largest notebook that is read, in bytes."""
 
 
 class UnreadableError(Exception):
-    """There is no notebook to read; `problem` says why."""
+    """The notebook cannot be read; `problem` says why."""
 
     def __init__(self, problem: Outcome) -> None:
-        """Keep what to say of it."""
+        """Store the problem."""
         super().__init__(problem.title)
         self.problem = problem
 
 
 def problem(title: str, reason: Reason) -> Outcome:
-    """Return an outcome that says what is wrong with a submission."""
+    """Return an outcome that describes a problem of a submission."""
     return Outcome(status=Status.FAILED, title=title, because=reason.because, hint=reason.hint, code=reason.kind.code)
 
 
@@ -38,16 +38,16 @@ def cells_of(path: Path) -> list[dict[str, Any]]:
     """Return a notebook's cells.
 
     Raises:
-        UnreadableError: it is no notebook.
+        UnreadableError: the file is not a notebook.
     """
     return _cells(_bytes(path))
 
 
 def released_files(path: Path) -> dict[str, str]:
-    """Return the files of a released notebook's answers by grade_id; none if it does not say them.
+    """Return the file names of a released notebook's answers by grade_id; empty if the notebook does not list them.
 
     Raises:
-        UnreadableError: it is no notebook.
+        UnreadableError: the file is not a notebook.
     """
     content = _bytes(path)
     _cells(content)
@@ -58,7 +58,7 @@ def released_files(path: Path) -> dict[str, str]:
 
 
 def grade_ids_in(path: Path) -> set[str]:
-    """Return the grade_ids in a notebook; none if it cannot be read."""
+    """Return the grade_ids in a notebook; empty if the notebook cannot be read."""
     try:
         return {grade_id_of(cell) for cell in _cells(_bytes(path))} - {""}
     except UnreadableError:
@@ -66,10 +66,10 @@ def grade_ids_in(path: Path) -> set[str]:
 
 
 def _way(path: Path) -> tuple[Path, tuple[str, ...]]:
-    """The folder that a path is trusted up to, and the names below it, none of which may be a link.
+    """Split a path into a folder that is trusted and the names below it, none of which may be a link.
 
-    A submission is `<student>/<lab>/<lab>.ipynb`. A link in place of any of the three could lead to the solution, or to
-    what another student handed in.
+    A submission is `<student>/<lab>/<lab>.ipynb`. If one of the three were a link, it could lead to the solution or to
+    another student's submission.
     """
     first = max(len(path.parts) - 3, path.parts.index(path.anchor) + 1 if path.anchor else 0)
     while ".." in path.parts[first:]:

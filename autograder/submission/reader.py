@@ -1,8 +1,8 @@
-"""Reads what a student handed in, as text: nothing of it is executed, imported or unpickled here.
+"""Read a student's submission as text. Nothing in it is executed, imported or unpickled here.
 
-The source of the answer cells counts, found by grade_id, and what a student's own `%%node` and `%%file` cells hold: the
-modules and files that the answers use. Whatever is wrong with the notebook becomes a named outcome, so that one broken
-submission never stops a class.
+Two things count: the source of the answer cells, which are found by grade_id, and the contents of `%%node` and `%%file`
+cells that the student added, because the answers may use these modules and files. Every problem of the notebook becomes
+an outcome with a code, so that one broken submission never stops a class.
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ from autograder.submission.notebook_file import UnreadableError, cells_of, grade
 MORE_PROBLEMS = Kind("more-problems", "the notebook has more problems than are listed", Group.NOTEBOOK)
 
 PROBLEMS_KEPT = 100
-"""As many problems of a notebook are listed."""
+"""The number of problems of a notebook that are listed."""
 
 
 def read_submission(path: Path, lab: Lab) -> Submission:
-    """Read a submitted notebook; every defect of it ends up in `problems`, none is raised.
+    """Read a submitted notebook. Every problem is added to `problems`, and none is raised.
 
-    A file that has not changed gives the same object again: grading a class needs each several times.
+    If the file has not changed, the same object is returned again, because grading a class needs it several times.
     """
     return _read(path.absolute(), signature(path), lab)
 
@@ -57,7 +57,7 @@ def _read(path: Path, _signature: object, lab: Lab) -> Submission:
 
 
 def _keep_first_problems(submission: Submission) -> None:
-    """Of very many problems, such as thousands of cells that are ignored, say only how many there are."""
+    """Keep only the first problems, and say how many more there are, for example thousands of ignored cells."""
     left_out = len(submission.problems) - PROBLEMS_KEPT
     if left_out > 0:
         because = f"The notebook has {left_out} more problem{'s' * (left_out != 1)}, not listed here."
@@ -65,10 +65,10 @@ def _keep_first_problems(submission: Submission) -> None:
 
 
 def lab_of(notebook: Path, name: str | None, root: Path) -> Lab:
-    """Return the lab that a notebook answers: by name, by the file's name, or by the grade_ids of its answers.
+    """Find the lab of a notebook by the given name, the name of the file, or the grade_ids of its answers.
 
     Raises:
-        KitError: it answers none of the course's labs.
+        KitError: the notebook belongs to none of the course's labs.
     """
     names = lab_names(root)
     if name is not None or notebook.stem in names:
@@ -76,11 +76,11 @@ def lab_of(notebook: Path, name: str | None, root: Path) -> Lab:
     ids = grade_ids_in(notebook)
     labs = [load_lab(root, known) for known in names]
     best = max(labs, key=lambda lab: len(ids & lab.answers.keys()), default=None)
-    # Half of them: two courses may well call one cell alike.
+    # At least half of the answers must be there, because two courses may use the same grade_id.
     if best is None or 2 * len(ids & best.answers.keys()) < max(1, len(best.answers)):
         here = next((one for one in (Path.cwd(), *Path.cwd().parents) if is_course(one) and one != root), None)
         raise KitError(
-            f"{notebook.name} is no notebook of a lab of the course in {root}, which has {', '.join(names)}.",
+            f"{notebook.name} does not belong to a lab of the course in {root}, which has {', '.join(names)}.",
             f"If it belongs to the course that you are in, add: --course {shlex.quote(str(here))}"
             if here is not None
             else "Name the lab: --lab NAME, or another course: --course FOLDER",

@@ -1,9 +1,9 @@
-"""Which submissions are more alike than chance makes them: a list for a person to read, never a verdict.
+"""Find submissions that are more similar than chance explains. The list is for a person to read, and is no verdict.
 
-Answers are cut into overlapping rows of tokens, in which every name of a student's own is the same word, so that
-renaming and reformatting hide nothing. Of these rows every so many are kept (winnowing, after Schleimer, Wilkerson and
-Aiken, 2003). What the lab hands out counts nothing, and what many students have in common counts little: a task has few
-solutions, and a class has one teacher.
+Answers are cut into overlapping rows of tokens. All names count as the same word, so that renaming and reformatting
+hide nothing. A part of these rows is kept (winnowing, after Schleimer, Wilkerson and Aiken, 2003). Text that the lab
+hands out does not count, and rows that many students have in common count little, because a task has few solutions and
+a class learns from the same teacher.
 """
 
 from __future__ import annotations
@@ -21,39 +21,39 @@ from dataclasses import dataclass
 from itertools import combinations
 
 ROW = 12
-"""Tokens of a row. Shorter ones are alike by chance."""
+"""The number of tokens in a row. Shorter rows are often equal by chance."""
 WINDOW = 6
-"""Of so many rows one is kept, the same in every text."""
+"""The number of consecutive rows of which at least one is kept; the choice is the same in every text."""
 COMMON = 0.25
-"""What a larger share of the class has is common knowledge."""
+"""The share of the class above which a row is common knowledge and does not count."""
 FEWEST = 8
-"""Of fewer rows of one's own nothing can be said."""
+"""The number of own rows that a submission must have; with fewer rows it is not compared."""
 
 _SKIPPED = (tokenize.COMMENT, tokenize.NL, tokenize.ENCODING, tokenize.ENDMARKER)
 _TELLING = 16
-"""Characters of a line that is worth showing."""
+"""The number of characters that a line must have to be shown."""
 
 
 @dataclass(frozen=True)
 class Pair:
-    """Two submissions that are alike."""
+    """Two similar submissions."""
 
     students: tuple[str, str]
     likeness: float
-    """Share of the shorter one's own rows that the other has too, from 0 to 1; rare rows count more."""
+    """The share, from 0 to 1, of the shorter submission's own rows that are also in the other; rare rows count more."""
     answers: tuple[str, ...]
-    """Where, the most alike first."""
+    """The grade_ids of the answers that have rows in common, the most similar first."""
     lines: tuple[str, ...]
-    """Lines and comments that these two have letter for letter, and nobody else."""
+    """Lines and comments that are identical in these two submissions and occur in no other."""
 
 
 def similar(submissions: Mapping[str, Mapping[str, str]], given: Mapping[str, str], at_least: float) -> list[Pair]:
-    """Return the pairs that are alike, the most alike first.
+    """Return the pairs of similar submissions, the most similar first.
 
     Args:
         submissions: the answers of each student, by grade_id.
-        given: what the lab hands out of each answer.
-        at_least: likeness of the pairs to return, from 0 to 1.
+        given: the text that the lab hands out for each answer.
+        at_least: the smallest likeness of a pair that is returned, from 0 to 1.
     """
     handed_out = _all(_rows(text) for text in given.values())
     own = {
@@ -77,14 +77,14 @@ def similar(submissions: Mapping[str, Mapping[str, str]], given: Mapping[str, st
 
 
 def _weights(rows: Mapping[str, set[int]]) -> dict[int, float]:
-    """What a row counts: the more, the fewer students have it; nothing if it is common knowledge."""
+    """Return the weight of each row. It is greater if fewer students have the row; common rows are left out."""
     counts = Counter(row for found in rows.values() for row in found)
     most = max(5, math.ceil(COMMON * len(rows)))
     return {row: math.log((len(rows) + 1) / count) for row, count in counts.items() if count <= most}
 
 
 def _shared(rows: Mapping[str, set[int]], weights: Mapping[int, float]) -> dict[tuple[str, str], float]:
-    """The weight of what two students have in common, for each pair that has anything."""
+    """Return the total weight of the rows that two students have in common, for each pair that has any."""
     owners: dict[int, list[str]] = defaultdict(list)
     for student in sorted(rows):
         for row in rows[student] if len(rows[student]) >= FEWEST else ():
@@ -102,14 +102,14 @@ def _all(sets: Iterable[set[int]]) -> set[int]:
 
 
 def _rows(text: str) -> set[int]:
-    """The kept rows of a text, as numbers."""
+    """Return the rows of a text that are kept, as numbers."""
     tokens = _tokens(text)
     rows = [zlib.crc32("\0".join(tokens[at : at + ROW]).encode()) for at in range(len(tokens) - ROW + 1)]
     return {min(rows[at : at + WINDOW]) for at in range(max(1, len(rows) - WINDOW + 1))} if rows else set()
 
 
 def _tokens(text: str) -> list[str]:
-    """The tokens of a program; the words of anything else, and of a program that is none."""
+    """Return the tokens of a program, or the words of a text that is no program or not valid Python."""
     if text.lstrip().startswith("%%node"):
         code = text.replace("%%node", "#", 1)
         with contextlib.suppress(tokenize.TokenError, SyntaxError, ValueError):
@@ -127,6 +127,6 @@ def _plain(token: tokenize.TokenInfo) -> str:
 
 
 def _lines(texts: Iterable[str]) -> dict[str, None]:
-    """The telling lines of some texts, in order, each once."""
+    """Return the lines of some texts that are long enough to be shown, in order and each once."""
     stripped = (" ".join(line.split()) for text in texts for line in text.split("\n"))
     return dict.fromkeys(line for line in stripped if len(line) >= _TELLING)

@@ -40,4 +40,6 @@ def build(output: Path, options: list[str]) -> int:
 
 
 if __name__ == "__main__":
+    if len(sys.argv) < 2 or sys.argv[1].startswith("-"):
+        sys.exit(__doc__)
     sys.exit(build(Path(sys.argv[1]).resolve(), sys.argv[2:]))

@@ -142,12 +142,12 @@ def test_a_value_given_with_the_option_for_rules_leads_to_the_one_for_parameters
 @pytest.mark.parametrize(
     ("text", "line", "words"),
     [
-        ("/a:\n  ros_parameters:\n    b: 1\n", 4, "no `name: value` below `ros__parameters:`"),
-        ("/a:\n  b: 1\n", 3, "no `name: value` below `ros__parameters:`"),
-        ("/a:\n  ros__parameters:\n    - b: 1\n    - c: 2\n", 5, "no `name: value` below `ros__parameters:`"),
+        ("/a:\n  ros_parameters:\n    b: 1\n", 4, "not a `name: value` below `ros__parameters:`"),
+        ("/a:\n  b: 1\n", 3, "not a `name: value` below `ros__parameters:`"),
+        ("/a:\n  ros__parameters:\n    - b: 1\n    - c: 2\n", 5, "not a `name: value` below `ros__parameters:`"),
         ("/a:\n  ros__parameters: &x {b: 1}\n/c:\n  ros__parameters: *x\n", 5, "an anchor"),
         ("/a/:\n  ros__parameters:\n    b: 1\n", 0, "ends with a slash"),
-        ("/a:\n  /a/c:\n    ros__parameters:\n      b: 1\n", 0, "which is no node's name"),
+        ("/a:\n  /a/c:\n    ros__parameters:\n      b: 1\n", 0, "which is not a node name"),
     ],
 )
 def test_a_parameter_file_that_rcl_refuses_is_explained(tmp_path: Path, text: str, line: int, words: str) -> None:

@@ -157,8 +157,8 @@ def test_nbgraders_own_settings_of_a_course_hold_everywhere(environment: Environ
 @pytest.mark.parametrize(
     ("address", "told"),
     [
-        ("gradebook.db", "no address of a gradebook"),
-        ("mysql+nodriver://h/db", "no address"),
+        ("gradebook.db", "not the address of a gradebook"),
+        ("mysql+nodriver://h/db", "not the address"),
         ("mysql://h/db", "driver"),
     ],
 )
@@ -245,16 +245,16 @@ def test_outside_of_a_course_nbgrader_executes_nothing(environment: Environment,
             "check_greeter",
             "String).expect_messages(at_least=3",
             "Strnig).expect_messages(at_least=3",
-            "nothing is called `Strn",
+            "the name `Strn",
         ),
-        ("check_greeter", '{"the text": 2,', '{"the text": 3,', "its score gives 4 points, and its metadata 3"),
+        ("check_greeter", '{"the text": 2,', '{"the text": 3,', "its score gives 4 points, but its metadata 3"),
         ("check_greeter", '"five times a second": 1}', '"six": 1}', 'no points for the part "five times a second"'),
-        ("check_greeter", '("/greeter")', '("greeter")', "takes full names, and `greeter` has no slash before it"),
+        ("check_greeter", '("/greeter")', '("greeter")', "takes full names, but `greeter` does not begin with a slash"),
         ("check_facts", "table.score(2)", "", "it has no score"),
         ("check_facts", "table.score(2)", "table.score(2", "was never closed"),
-        ("greeter", "### END SOLUTION", "", "`BEGIN SOLUTION` stands inside of the one of line"),
+        ("greeter", "### END SOLUTION", "", "`BEGIN SOLUTION` is inside the one that begins in line"),
         ("greeter", "%%node greeter", "# greeter", "its first line must be `%%node NAME`"),
-        ("greeter", '"""Publish one greeting."""', "", "what students receive is no Python"),
+        ("greeter", '"""Publish one greeting."""', "", "what students receive is not valid Python"),
     ],
 )
 def test_release_refuses_a_broken_cell_and_names_it(

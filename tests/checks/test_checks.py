@@ -679,7 +679,7 @@ def test_names_keep_their_capitals_and_an_end_that_is_not_there_has_its_nearest_
         ('launch("talker", ros_arguments="-r a:=b")', "ros_arguments='-r a:=b' is one text"),
         ('launch("talker", lifecycle="/talker")', "lifecycle='/talker' is one text"),
         ("ros.require(ros.graph.nodes, 'There is a node')", "call it"),
-        ('ros.topic("/chatter", "std_msgs/String").expect_publisher()', "is no message class"),
+        ('ros.topic("/chatter", "std_msgs/String").expect_publisher()', "is not a message class"),
         ('ros.publisher("/chatter", "std_msgs/String").open()', "line 2"),  # raised far inside of rclpy
     ],
 )
@@ -901,7 +901,7 @@ def test_a_parameter_rule_that_rcl_refuses_is_explained(grade: Grade) -> None:
         ros.score(2)
         """
     found = failure(grade(check, talker__py=TALKER))
-    assert found.code == "name-characters" and "`-` cannot stand in the name" in found.because
+    assert found.code == "name-characters" and "`-` is not allowed in the name" in found.because
 
 
 LATE = """

@@ -104,7 +104,7 @@ def test_what_lies_around_a_notebook_is_never_the_course(root: Path, tmp_path: P
     (evil / "toy.ipynb").write_bytes((root / "class" / "ann" / "toy.ipynb").read_bytes())
     for folder in (evil, evil / "labs"):
         status, _, err = run(folder, "check", str(evil / "toy.ipynb"))
-        assert status == 2 and "no notebook of a lab of this course" in err and f"Labs in {ROOT}: lab" in err
+        assert status == 2 and "does not belong to a lab of this course" in err and f"Labs in {ROOT}: lab" in err
     status, _, err = run(evil, "grade", "toy", ".")
     assert status == 2 and "is inside the submissions" in err
 
@@ -193,7 +193,10 @@ def test_a_class_is_graded_once_and_only_what_changed_again(root: Path) -> None:
     assert "5/5" in rows["ann"] and "✓ passed" in rows["ann"]
     assert "2/5" in rows["bob"] and "1 to grade" in rows["bob"] and "ZeroDiv" in rows["bob"]
     assert "2/5" in rows["cem"] and "✗" not in rows["dan"]
-    assert "dan: The file is not a notebook: it is not valid JSON. There are no points yet: a person decides." in out
+    assert (
+        "dan: The file is not a notebook: it is not valid JSON. There are no points yet, because a person decides."
+        in out
+    )
     with (root / "build" / "grades.csv").open() as file:
         scores = {row["student"]: (row["score"], row["waiting"]) for row in csv.DictReader(file)}
     assert scores == {"ann": ("5", "1"), "bob": ("2", "1"), "cem": ("2", "1"), "dan": ("", "2")}

@@ -47,7 +47,7 @@ def test_plain_yaml_is_read_as_pyyaml_reads_it(text: str) -> None:
         ("a: [1, 2\nb: 3", 3, "bracket"),
         ("a:\n  b: 1\n c: 2", 4, "indented"),
         ("a: 1\n---\nb: 1", 3, "second document"),
-        ("a: 1\nb: 2\na: 3", 4, "`a` stands a second time; it is also in line 2"),
+        ("a: 1\nb: 2\na: 3", 4, "`a` appears a second time; it is also in line 2"),
         ("1: a\n0x1: b", 3, "second time"),
         ("x:\n  y: 1\n  y: 2", 4, "second time"),
         ("a: 1\nb: !!python/object/apply:os.system [ls]", 3, "type"),
@@ -67,7 +67,7 @@ def test_plain_yaml_is_read_as_pyyaml_reads_it(text: str) -> None:
         ("a: 1\n? [b]\n: c", 3, "a key is"),
         ("a: 1\nb: \x07", 3, "cannot be printed"),
         ("a: 1\nb: \ud800", 3, "cannot be printed"),
-        ("a: 1\nb: " + "[" * 3000, 3, "inside one another"),
+        ("a: 1\nb: " + "[" * 3000, 3, "nested more than 40 levels"),
         ("- 1\n" * 6000, VALUES + 1, "more than"),
     ],
 )  # fmt: skip
@@ -91,12 +91,12 @@ def test_anchors_are_read_as_pyyaml_reads_them(text: str) -> None:
 @pytest.mark.parametrize(
     ("text", "line", "words"),
     [
-        ("a: 1\nb: &x [*x]", 3, "`*x` stands inside what it is to repeat"),
-        ("a: 1\nb: *x", 3, "no anchor of this name"),
+        ("a: 1\nb: &x [*x]", 3, "`*x` is inside the value that it repeats"),
+        ("a: 1\nb: *x", 3, "no anchor with this name"),
         ("a: &x 1\nb: &x 2", 3, "two anchors have this name"),
         ("a: 1\nb: {<<: 3}", 3, "`<<` takes a mapping"),
         ("a: &x [" + "1, " * (VALUES // 2) + "]\nb: *x", 3, "more than"),
-        ("a: &x " + "[" * (DEPTH - 2) + "]" * (DEPTH - 2) + "\nb: [[[*x]]]", 3, "inside one another"),
+        ("a: &x " + "[" * (DEPTH - 2) + "]" * (DEPTH - 2) + "\nb: [[[*x]]]", 3, "nested more than 40 levels"),
     ],
 )
 def test_what_an_alias_stands_for_counts_as_if_it_were_written_out(text: str, line: int, words: str) -> None:
@@ -169,4 +169,4 @@ def test_a_file_is_read_or_named(tmp_path: Path) -> None:
 def test_in_a_table_a_line_that_stands_twice_costs_itself_only() -> None:
     read = load("a: &same none\nb: *same\nc: 1\nd: 2\nc: 3\n", table=True)
     assert {key: read[key] for key in "abd"} == {"a": "none", "b": "none", "d": 2}
-    assert str(read["c"]) == "stands there twice, in lines 4 and 6 of the cell"
+    assert str(read["c"]) == "appears twice, in lines 4 and 6 of the cell"

@@ -92,7 +92,7 @@ def test_lines_are_hidden_that_are_cut_from_what_students_receive() -> None:
 def test_a_setting_that_there_is_not_is_refused(tmp_path: Path) -> None:
 
     (tmp_path / "course.toml").write_text('titel = "Robots"\n')
-    with pytest.raises(KitError, match=r"`titel`, which is no setting of a course[^\n]*\nSettings: title, labs"):
+    with pytest.raises(KitError, match=r"`titel`, which is not a setting of a course[^\n]*\nSettings: title, labs"):
         read_settings(tmp_path)
     (tmp_path / "course.toml").write_text("labs = 3\n")
     with pytest.raises(KitError, match="`labs` cannot be 3"):

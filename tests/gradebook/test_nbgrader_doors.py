@@ -80,7 +80,7 @@ def test_other_folders_are_no_way_around_the_course(root: Path, mark: Path) -> N
     notebook = root / "build" / "submitted" / "ann" / "toy" / "toy.ipynb"
     for folder in (notebook.parent, root / "build" / "submitted", root.parent):
         status, told = nbgrader(folder, "validate", notebook)
-        assert "toy.ipynb was not checked" in told and "no notebook of a lab of this course" in told
+        assert "toy.ipynb was not checked" in told and "does not belong to a lab of this course" in told
     for command in (("validate", notebook), ("autograde", toy.LAB, "--create")):
         status, told = nbgrader(root / "build", *command)
         assert status != 0 and "start nbgrader in the folder above it" in told

@@ -344,13 +344,13 @@ def test_a_course_without_solutions_has_none(course: Course, tmp_path: Path) -> 
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("a: [", "is no YAML"),
+        ("a: [", "is not valid YAML"),
         ("- {answer: talker, write: x, points: {check_talker: 0}}", "entry 1, `instead_of`: Field required"),
         (WRONG.replace("answer: talker", "answer: talkr"), "the lab has no answer `talkr`; it has talker"),
-        (WRONG.replace("print('hello')", "print('hallo')"), "stands 0 times in the solution of `talker`"),
+        (WRONG.replace("print('hello')", "print('hallo')"), "occurs 0 times in the solution of `talker`"),
         (WRONG.replace("check_talker", "check_talkr"), "the lab has no check `check_talkr`"),
-        (WRONG.replace("check_talker: 0", "check_talker: 3"), "a wrong answer has to get fewer"),
-        (WRONG.replace("check_talker: 0", "check_answers: 0"), "entry 2: an earlier entry names `check_answers`, too"),
+        (WRONG.replace("check_talker: 0", "check_talker: 3"), "a wrong answer must get fewer"),
+        (WRONG.replace("check_talker: 0", "check_answers: 0"), "entry 2: an earlier entry also names `check_answers`"),
     ],
 )
 def test_what_is_wrong_with_the_file_is_told(course: Course, text: str, said: str) -> None:
@@ -364,7 +364,7 @@ def test_a_broken_file_stops_a_class_before_it_is_taken_in_and_the_switch_is_nam
     course.hand_in("ann")
     course.wrong_answers("a: [")
     for run in (grade_class, try_class):
-        with pytest.raises(KitError, match="is no YAML") as refused:
+        with pytest.raises(KitError, match="is not valid YAML") as refused:
             run(course.root, toy.LAB, course.class_, ALONE)
         assert "--no-canaries" in refused.value.do and not course.paths.submitted.exists()
 

@@ -55,7 +55,7 @@ def test_a_killed_worker_costs_no_result_and_another_kit_is_refused(
         shutil.copytree(ROOT / "autograder", other / "autograder", ignore=shutil.ignore_patterns("__pycache__"))
         (other / "autograder" / "core" / "version.py").write_text('VERSION = "0.0"\n')
         dask.worker("third", other)
-        with pytest.raises(KitError, match=r"1 of 2 workers have no kit, or another one"):
+        with pytest.raises(KitError, match=r"1 of 2 workers have no kit, or a different one"):
             run_class(class_, course, lab, Settings(isolation, executor=settings.executor, force=True), lambda _: None)
     monkeypatch.setattr("autograder.grading.executors.dask._SECONDS_TO_ANSWER", 1.0)
     with pytest.raises(KitError, match="No Dask scheduler answers"):

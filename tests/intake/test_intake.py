@@ -328,7 +328,7 @@ def test_when_it_was_handed_in_is_taken_if_it_is_a_time(tmp_path: Path, zipped: 
     collected = collect(source, toy.LAB, course)
     stamps = {who: path.with_name("timestamp.txt") for who, path in collected.notebooks.items()}
     assert stamps["ann"].read_text(encoding="utf-8") == "2026-11-02 14:30:00.123456 UTC"
-    assert not stamps["bob"].exists() and collected.refused[0].startswith("timestamp.txt of bob is no date and time")
+    assert not stamps["bob"].exists() and collected.refused[0].startswith("timestamp.txt of bob is not a date and time")
     (tmp_path / "class" / "ann" / "timestamp.txt").unlink()
     collect(tmp_path / "class", toy.LAB, course)
     assert not stamps["ann"].exists()

@@ -196,13 +196,13 @@ def test_whatever_lies_among_nbgraders_folders_is_taken_or_named(tmp_path: Path)
     taken, collected = taken_from(files, tmp_path)
     assert taken == {name: name for name in ("ann", "eve", "pat", "zoe")}
     told = "\n".join(collected.refused)
-    assert "'mal' cannot be anybody's work" in told and "lin is a link" in told and len(collected.refused) == 2
+    assert "'mal' cannot be the work of one student" in told and "lin is a link" in told and len(collected.refused) == 2
 
 
 def test_too_many_files_are_said_however_often_they_are_looked_at(tmp_path: Path) -> None:
     files = {f"a-mal/{number}.txt": b"" for number in range(MOST + 1)} | {"a-bob/labs/toy/toy.ipynb": b"bob"}
     taken, collected = taken_from(files, tmp_path)  # first as what GitHub Classroom gives out
-    assert taken == {"a-bob": "bob"} and "'a-mal' cannot be anybody's work" in collected.refused[0]
+    assert taken == {"a-bob": "bob"} and "'a-mal' cannot be the work of one student" in collected.refused[0]
 
 
 BROKEN = b"PK\x03\x04 and no more"
@@ -276,7 +276,7 @@ def test_what_is_said_of_files_that_do_not_count_is_true(tmp_path: Path) -> None
     assert taken == {name: name for name in ("ann", "bob", "cem")}
     assert "'ann_111_999_scratch.ipynb' of 'ann' ('toy.ipynb' counts, because it has the lab's name)" in collected.line
     assert "'ann_111_850_toy-1.ipynb' of 'ann' (a later file counts)" in collected.line
-    assert collected.line.endswith("LEFT OUT: 'readme.txt' is no student's folder, notebook or zip.")
+    assert collected.line.endswith("LEFT OUT: 'readme.txt' is not a student's folder, notebook or zip.")
 
 
 def test_a_record_that_nobody_understands_stops_the_next_class(tmp_path: Path) -> None:

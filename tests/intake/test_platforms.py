@@ -352,7 +352,7 @@ submission_2:
     ),
     "files": (
         {"ann.ipynb": "a", "bob.pdf": "", "toy.ipynb": "", "roster.csv": "id"},
-        {"ann": "a"}, ["'bob.pdf' is no student's", "It is not clear to whom 'toy.ipynb' belongs"],
+        {"ann": "a"}, ["'bob.pdf' is not a student's", "It is not clear to whom 'toy.ipynb' belongs"],
     ),
 }  # fmt: skip
 

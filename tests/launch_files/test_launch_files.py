@@ -264,10 +264,10 @@ def test_what_an_included_file_sets_stays_set_unless_a_group_holds_it(tmp_path: 
         ("launch:\n- include: {file: other.launch.yaml}\n", "there is no file `other.launch.yaml`"),
         ("launch:\n- include: {file: /etc/passwd}\n", "there is no file `passwd` there"),
         ("launch:\n- include: {file: $(dirname)/a.launch.yaml}\n", "more than 8 deep"),
-        ("launch: &all\n- group: *all\n", "`*all` stands inside what it is to repeat"),
+        ("launch: &all\n- group: *all\n", "`*all` is inside the value that it repeats"),
         (f"launch:\n{CAMERA}, param: [{{name: p, value: {{}}}}]}}\n", "a parameter is a bool"),
         ("launch:\n" + f"{CAMERA}}}\n" * 33, "more than 32 nodes"),
-        ("launch: [" + "[" * 5000 + "]" * 5000 + "]", "more than 40 lists"),
+        ("launch: [" + "[" * 5000 + "]" * 5000 + "]", "nested more than 40 levels"),
         ("#" * (FILE_BYTES + 1), "larger than 64 KiB"),
     ],
 )
@@ -282,7 +282,7 @@ def test_what_cannot_be_read_is_said_with_its_place(tmp_path: Path, text: str, t
     [
         (f'launch:\n{CAMERA}, name: "$(arg side)"}}\n', "In ROS 2 it is `$(var NAME)`"),
         (f'launch:\n{CAMERA}, name: "${{side}}"}}\n', "`$(var NAME)`"),
-        ("launch:\n- group:\n    include: {file: x}\n", "Below `group:` stands a list"),
+        ("launch:\n- group:\n    include: {file: x}\n", "Write a list below `group:`"),
         ("launch:\n- include: {file: $(dirname)/a_launch.yaml}\n", "Is `a.launch.yaml` meant?"),
     ],
 )

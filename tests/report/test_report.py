@@ -172,7 +172,7 @@ def test_a_reason_that_several_parts_have_is_told_once_and_none_of_them_is_left_
     assert page.count("Name them.") == 1
     seen, folded = page.split("<details", 1)
     assert "left" in seen and "It is not there." in seen and "right" not in seen
-    assert "1 more for reasons that stand above" in folded and "right · 0 of 1 point" in folded
+    assert "1 more for reasons that are given above" in folded and "right · 0 of 1 point" in folded
 
 
 def test_an_untouched_answer_is_named_and_is_no_failure() -> None:

@@ -152,7 +152,7 @@ def test_what_cannot_be_done_is_told_in_words(robot: Robot, command: str, told: 
 
 def test_a_regular_expression_that_is_none_is_told(robot: Robot) -> None:
     said, status = say(robot, "param list --filter '[' /demo")
-    assert status == 2 and "'[' is no regular expression" in said
+    assert status == 2 and "'[' is not a regular expression" in said
 
 
 def test_values_come_on_standard_input(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -226,7 +226,7 @@ def test_a_named_python_that_is_not_there(tmp_path: Path) -> None:
     folder = check_out(tmp_path / "course")
     done = make(folder, "setup", "PYTHON=/nowhere/python3")
     assert done.returncode == 2
-    assert "/nowhere/python3 is not there" in done.stderr
+    assert "/nowhere/python3 does not exist" in done.stderr
 
 
 def test_without_ensurepip_the_pip_of_the_python_below_helps(tmp_path: Path) -> None:

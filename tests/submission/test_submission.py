@@ -92,7 +92,7 @@ def test_a_copied_answer_cell_with_another_name_is_a_file_of_the_students_own(la
 @pytest.mark.parametrize(
     ("source", "code", "said"),
     [
-        ("%%node talker\nprint('better')", "ignored-cell", "what counts is the cell for this answer, `talker`"),
+        ("%%node talker\nprint('better')", "ignored-cell", "only the cell `talker` counts for this answer"),
         ("%%node helper\nprint('mine')", "ignored-cell", "helper.py belongs to the lab"),
         ("%%node rclpy\nx = 1", "bad-file-name", "the name of an installed module"),
         ("%%node json\nx = 1", "bad-file-name", "the name of an installed module"),
@@ -206,7 +206,7 @@ def test_a_copied_answer_cell_with_the_name_of_another_answer_is_told(lab: Lab, 
     cells.append(copy.deepcopy(by_id(cells, "talker")) | {"source": mine, "id": "copied"})
     submission = read(lab, tmp_path, cells)
     assert codes(submission) == ["ignored-cell"]
-    assert "what counts is the cell for this answer, `answers`" in submission.problems[0].because
+    assert "only the cell `answers` counts for this answer" in submission.problems[0].because
     assert "41" not in submission.files["answers.yaml"]
 
 

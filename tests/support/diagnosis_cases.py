@@ -402,6 +402,7 @@ CASES = {
         base="LifecycleNode",
         says="not-made-yet",
         because="in `on_activate`, line",
+        never=("taken-away",),
         ask=no_end,
     ),
     "made_it_and_took_it_away": Case(
@@ -409,8 +410,9 @@ CASES = {
         LATER.format("on_configure", "    self.destroy_publisher(self.more)\n" + SUCCESS),
         TRIGGER,
         base="LifecycleNode",
-        says="topic-name",
-        never=("not-made-yet",),
+        says="taken-away",
+        because="and has destroyed it since",
+        never=("not-made-yet", "topic-name"),
         ask=no_end,
     ),
     # Why a service waits for another callback.
@@ -665,6 +667,16 @@ CASES = {
     # Silence.
     "long_period": Case(
         "self.create_timer(500.0, lambda: None)\n", says="timer-period", because="every 500 s)", never=("silent",)
+    ),
+    "in_milliseconds": Case(
+        "self.create_timer(250, lambda: None)\n", says="timer-period", because="For 250 milliseconds, write `0.25`."
+    ),
+    "another_sends": Case(
+        "self.create_timer(500.0, lambda: None)\n"
+        "self.create_subscription(String, '~/in', lambda message: self.out.publish(message), 10)\n",
+        says="silent",
+        never=("timer-period",),
+        ready=lambda it: it.age > 1,
     ),
     "logs_later": Case(
         "self.create_timer(500.0, lambda: None)\n", says="timer-period", because="every 500 s)", ask=unlogged

@@ -104,9 +104,9 @@ def lost_page() -> str:
         "# What is broken, and what is lost",
         "",
         "Made by `python tests/tools/requirements.py`. Each line: a sample student whose notebook is the solution but",
-        "for some mistakes, a check, the points that it takes, the parts of it that are lost, and the words of the task",
-        "that the student breaks. Where a check takes points although nothing is broken that it holds, the last column",
-        "says why: one mistake then costs more than its own part.",
+        "for some mistakes, a check, the points that it takes, the parts of it that are lost, and the words of the",
+        "task that the student breaks. Where a check takes points although nothing is broken that it holds, the last",
+        "column says why: one mistake then costs more than its own part.",
         "",
     ]
     for name in labs():

@@ -1,1 +1,1 @@
-"""Says what is wrong with a lab before students meet it: first what can be read, then what running it shows."""
+"""Find mistakes in a lab before students receive it: first by reading the lab, then by running it."""

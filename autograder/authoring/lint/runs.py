@@ -1,4 +1,7 @@
-"""What running a lab shows: its solution gets all points, the blank notebook none, and a mistake takes each check."""
+"""Find mistakes in a lab by running it.
+
+The solution must get all points, the blank notebook must get none, and every check must fail for at least one mistake.
+"""
 
 from __future__ import annotations
 
@@ -15,17 +18,17 @@ from autograder.grading.job import Job
 from autograder.grading.supervisor import run_in_worker
 
 _TRIES = 40
-"""Mutants that are tried on a check before it counts as one that no mistake fails."""
+"""The number of mutants that are tried on a check before it counts as a check that passes in spite of every mistake."""
 
 
 def run_findings(lab: Lab, isolation: Isolation, jobs: int, known: Sequence[KnownAnswers] = ()) -> Iterator[Finding]:
-    """Run a lab's solution, its blank notebook, its known answers, and mutants until each check is beaten by one.
+    """Run a lab's solution, its blank notebook, its known answers, and for each check mutants until one loses points.
 
     Args:
-        lab: to run.
-        isolation: how the programs are kept apart.
-        jobs: how many run at once.
-        known: notebooks of which the points are known.
+        lab: the lab to run.
+        isolation: how the programs are isolated.
+        jobs: the number of runs at the same time.
+        known: notebooks whose points are known.
     """
     solutions = {grade_id: answer.solution for grade_id, answer in lab.answers.items()}
     blanks = {grade_id: answer.blank for grade_id, answer in lab.answers.items()}
@@ -72,7 +75,7 @@ def _otherwise(lab: Lab, isolation: Isolation, known: KnownAnswers) -> Iterator[
 
 
 def _unbeaten(lab: Lab, isolation: Isolation, check: Cell, every: list[Mutant]) -> Finding | None:
-    """A finding if no mutant of the solution loses points in a check."""
+    """Return a finding if no mutant of the solution loses points in a check; otherwise None."""
     reaching = [mutant for mutant in every if check in reached(lab, [mutant.answer])]
     cells = [cell for cell in lab.cells if cell.points is None or cell is check]
     tried = reaching[:: max(1, len(reaching) // _TRIES)]

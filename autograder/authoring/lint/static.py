@@ -1,4 +1,4 @@
-"""Everything about a lab that can be found out without running it."""
+"""Find mistakes in a lab that can be found without running it."""
 
 from __future__ import annotations
 
@@ -39,29 +39,29 @@ from autograder.reasons import all_kinds
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that is wrong with a lab."""
+    """A mistake in a lab."""
 
     cell: str
-    """grade_id of the cell, or its number where it has none; empty: it is about the whole lab."""
+    """The cell's grade_id, or its number if it has no grade_id; empty if the finding concerns the whole lab."""
     what: str
     """A sentence for the lab's author."""
     warning: bool = False
-    """Whether a lab can be released with it."""
+    """Whether the lab can be released in spite of the finding."""
 
     def __str__(self) -> str:
-        """Return it as a line to read."""
+        """Return the finding as a line of text."""
         place = f"cell `{self.cell}`: " if self.cell else ""
         return f"{'warning' if self.warning else 'error'}: {place}{self.what}"
 
 
 def metadata_findings(cells: list[dict[str, Any]]) -> Iterator[Finding]:
-    """Look through the marks and markers of a lab's cells."""
+    """Find mistakes in the metadata of a lab's cells, and in the markers of solutions and hidden tests."""
     ids = Counter(cell.get("id") for cell in cells)
     grade_ids = Counter(grade_id_of(cell) for cell in cells if nbgrader_of(cell))
     for number, cell in enumerate(cells, start=1):
         name = grade_id_of(cell) or str(number)
         if cell.get("id") and ids[cell["id"]] > 1:
-            yield Finding(name, f"another cell has the id `{cell['id']}`, too.")
+            yield Finding(name, f"another cell also has the id `{cell['id']}`.")
         for sentence in (*_markers(source_of(cell)), *_outside(cell)):
             yield Finding(name, sentence)
         if nbgrader_of(cell):
@@ -70,9 +70,7 @@ def metadata_findings(cells: list[dict[str, Any]]) -> Iterator[Finding]:
             for sentence in (*_marks(nbgrader_of(cell), cell["cell_type"]), *_answer(cell)):
                 yield Finding(name, sentence)
             if _is_check(cell) and not _says_something(cells[number - 2] if number > 1 else {}):
-                yield Finding(
-                    name, "students see it folded, and no sentence above says what it looks at.", warning=True
-                )
+                yield Finding(name, "students see it folded, and no sentence above says what it checks.", warning=True)
 
 
 def _is_check(cell: dict[str, Any]) -> bool:
@@ -81,7 +79,7 @@ def _is_check(cell: dict[str, Any]) -> bool:
 
 
 def _says_something(cell: dict[str, Any]) -> bool:
-    """Whether a cell is text that ends with more than a heading."""
+    """Return whether a cell is text whose last line is not a heading."""
     lines = source_of(cell).strip().splitlines() if cell.get("cell_type") == "markdown" else []
     return bool(lines) and not lines[-1].startswith("#")
 
@@ -94,9 +92,9 @@ def _marks(marks: dict[str, Any], kind: str) -> Iterator[str]:
     if marks.get("grade"):
         points = marks.get("points")
         if isinstance(points, bool) or not isinstance(points, (int, float)) or not points > 0:
-            yield f"a graded cell needs points above 0, and it has {points!r}."
+            yield f"a graded cell needs points above 0, but it has {points!r}."
         if kind == "code" and not marks.get("solution") and not marks.get("locked"):
-            yield "a check must be locked, or students could change it."
+            yield "a check must be locked, because otherwise students could change it."
         if kind == "code" and marks.get("solution"):
             yield "it must not have points of its own, because students' code gets its points from a check below it."
     elif "points" in marks:
@@ -110,13 +108,13 @@ def _answer(cell: dict[str, Any]) -> Iterator[str]:
         return
     try:
         if parse(source_of(cell)) is None:
-            yield "it is to be filled in, so its first line must be `%%node NAME` or `%%file NAME`."
+            yield "students fill it in, so its first line must be `%%node NAME` or `%%file NAME`."
     except BadNameError as error:
         yield str(error)
 
 
 def _outside(cell: dict[str, Any]) -> Iterator[str]:
-    """Markers that nothing cuts, and a tag that does nothing, because the cell is of another kind."""
+    """Yield sentences about markers that nothing removes, and a tag without effect, because of the kind of the cell."""
     marks = nbgrader_of(cell)
     if for_checks(cell) and (not marks.get("locked") or marks.get("grade") or marks.get("solution")):
         yield f"it has the tag `{FOR_CHECKS}`, so it must be locked and neither a check nor an answer."
@@ -124,7 +122,7 @@ def _outside(cell: dict[str, Any]) -> Iterator[str]:
     if "SOLUTION" in found and not marks.get("solution"):
         yield "it contains a solution, but students do not fill it in, so they would receive the solution."
     if "HIDDEN TESTS" in found and not _is_check(cell):
-        yield "hidden tests stand in a cell that is no check."
+        yield "it contains hidden tests, but it is not a check."
 
 
 def _markers(source: str) -> Iterator[str]:
@@ -132,7 +130,7 @@ def _markers(source: str) -> Iterator[str]:
     for number, line in enumerate(source.split("\n"), start=1):
         for which, mark in MARK.findall(line):
             if which == "BEGIN" and mark in is_open:
-                yield f"line {number}: `BEGIN {mark}` stands inside of the one of line {is_open[mark]}."
+                yield f"line {number}: `BEGIN {mark}` is inside the one that begins in line {is_open[mark]}."
             elif which == "END" and mark not in is_open:
                 yield f"line {number}: `END {mark}` has no `BEGIN {mark}` above it."
             if which == "BEGIN":
@@ -144,13 +142,13 @@ def _markers(source: str) -> Iterator[str]:
 
 
 _BLOCKS = {"launch": Launch, "launch_file": Launch, "answers": Answers, "build": Package}
-"""What `with launch(…) as ros` gives, by the function."""
+"""The class of the object that a `with` statement such as `with launch(…) as ros` binds, by the function's name."""
 _FULL_NAMES = {"topic", "node", "publisher", "nodes"}
-"""Arguments of nouns and expectations that are full names."""
+"""The arguments of nouns and expectations that are full names."""
 _NAMES = {"topic", "publisher", "node", "service", "server", "action"}
-"""What takes a full name as `name`."""
+"""The methods whose argument `name` is a full name."""
 _NO_FULL_NAMES = {"start"}
-"""What takes something else as `node`."""
+"""The methods whose argument `node` is not a full name."""
 _WORDS = {
     ("expect_state", "state"): ("unconfigured", "inactive", "active", "finalized"),
     ("transition", "label"): ("configure", "activate", "deactivate", "cleanup", "shutdown"),
@@ -159,7 +157,7 @@ _OF_THE_NOTEBOOK = {"get_ipython", "display", "__name__", "__file__"}
 
 
 def check_findings(lab: Lab) -> Iterator[Finding]:
-    """Look through the trusted cells of a lab, and the programs that it gives and solves."""
+    """Find mistakes in the trusted cells of a lab, and in the programs of its solutions and of its blank answers."""
     trees: list[tuple[Cell, ast.Module]] = []
     for cell in lab.cells:
         lines = ["" if line.startswith("%") else line for line in cell.source.split("\n")]
@@ -184,7 +182,7 @@ def _programs(lab: Lab) -> Iterator[Finding]:
                 try:
                     ast.parse(file.text if file else "")
                 except SyntaxError as error:
-                    yield Finding(answer.grade_id, f"{whose} is no Python, line {error.lineno}: {error.msg}.")
+                    yield Finding(answer.grade_id, f"{whose} is not valid Python, line {error.lineno}: {error.msg}.")
 
 
 def _bound(tree: ast.AST) -> Iterator[str]:
@@ -204,11 +202,11 @@ def _bound(tree: ast.AST) -> Iterator[str]:
 def _unknown_names(tree: ast.AST, known: set[str]) -> Iterator[str]:
     for node in ast.walk(tree):
         if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load) and node.id not in known:
-            yield f"line {node.lineno}: nothing is called `{node.id}`{_nearest(node.id, known)}."
+            yield f"line {node.lineno}: the name `{node.id}` is not defined{_nearest(node.id, known)}."
 
 
 def _unknown_expectations(tree: ast.AST) -> Iterator[str]:
-    """Methods and keywords that `ros` and its nouns, `table` or `package` do not have."""
+    """Yield sentences about methods and keywords that `ros` and its nouns, `table` or `package` do not have."""
     names = _nouns_of(tree)
     for node in ast.walk(tree):
         if not isinstance(node, ast.Attribute):
@@ -234,7 +232,10 @@ def _unknown_expectations(tree: ast.AST) -> Iterator[str]:
 
 
 def _nouns_of(tree: ast.AST) -> dict[str, type]:
-    """The names of a cell that stand for a noun: `ros` of a block or a function, and what was assigned from one."""
+    """Return the class of each name in a cell that refers to a noun.
+
+    Such a name is `ros` in a `with` statement or a function, or is assigned from another such name.
+    """
     names: dict[str, type] = {
         node.arg: Launch for node in ast.walk(tree) if isinstance(node, ast.arg) and node.arg == "ros"
     }
@@ -246,7 +247,7 @@ def _nouns_of(tree: ast.AST) -> dict[str, type]:
     values: dict[str, list[ast.expr]] = {}
     for name, value in _assigned(tree):
         values.setdefault(name, []).append(value)
-    # What is also bound in another way, by a loop or as an argument, is another thing there.
+    # A name that is also bound in another way, by a loop or as an argument, may be another object there.
     times = Counter(_bound(tree))
     for name, of in values.items():
         nouns = {_noun_of(value, names) for value in of}
@@ -257,7 +258,7 @@ def _nouns_of(tree: ast.AST) -> dict[str, type]:
 
 
 def _assigned(tree: ast.AST) -> Iterator[tuple[str, ast.expr]]:
-    """Each name that is assigned to, with its value: `a = …`, and `a, b = …, …`."""
+    """Yield each name that is assigned to, with its value: `a = …`, and `a, b = …, …`."""
     for node in ast.walk(tree):
         if not isinstance(node, ast.Assign):
             continue
@@ -270,7 +271,7 @@ def _assigned(tree: ast.AST) -> Iterator[tuple[str, ast.expr]]:
 
 
 def _noun_of(value: ast.expr, names: Mapping[str, type]) -> type | None:
-    """The noun that an expression gives, as far as it can be told without running it."""
+    """Return the class of the noun that an expression gives; None if this is not known without running it."""
     if isinstance(value, ast.Name):
         return names.get(value.id)
     if isinstance(value, ast.Call):
@@ -280,12 +281,12 @@ def _noun_of(value: ast.expr, names: Mapping[str, type]) -> type | None:
 
 
 def _is_field(owner: type, name: str) -> bool:
-    """Whether the objects of a class get this attribute when they are made."""
+    """Return whether the objects of a class get this attribute when they are created."""
     return any(name in getattr(one, "__annotations__", {}) for one in owner.__mro__) or name == "name"
 
 
 def _wrong_words(call: ast.Call, name: str, parameters: Iterable[str]) -> Iterator[str]:
-    """Names without their slash, and states and transitions that there are not, as far as they stand there as texts."""
+    """Yield sentences about string arguments that are full names without a slash, or unknown states and transitions."""
     given = dict(zip(list(parameters)[1:], call.args, strict=False))
     given |= {keyword.arg: keyword.value for keyword in call.keywords if keyword.arg is not None}
     for argument, value in given.items():
@@ -293,10 +294,10 @@ def _wrong_words(call: ast.Call, name: str, parameters: Iterable[str]) -> Iterat
             continue
         full = (argument in _FULL_NAMES and name not in _NO_FULL_NAMES) or (argument == "name" and name in _NAMES)
         if full and not value.value.startswith("/"):
-            yield f"line {value.lineno}: `{name}` takes full names, and `{value.value}` has no slash before it."
+            yield f"line {value.lineno}: `{name}` takes full names, but `{value.value}` does not begin with a slash."
         known = _WORDS.get((name, argument), (value.value,))
         if value.value not in known:
-            yield f"line {value.lineno}: `{name}` knows no `{value.value}`; it knows {', '.join(known)}."
+            yield f"line {value.lineno}: `{name}` does not know `{value.value}`; it knows {', '.join(known)}."
 
 
 def _nearest(name: str, known: set[str]) -> str:
@@ -319,16 +320,16 @@ def _score(tree: ast.Module, points: float) -> Iterator[str]:
         told = ast.literal_eval(call.args[0])
         total = sum(told.values()) if isinstance(told, dict) else float(told)
     except (ValueError, TypeError, IndexError):
-        return  # computed while it runs, which shows whether it is right
+        return  # the points are computed when the check runs, which shows whether they are right
     if abs(total - points) > 1e-6:
-        yield f"line {call.lineno}: its score gives {total:g} points, and its metadata {points:g}."
+        yield f"line {call.lineno}: its score gives {total:g} points, but its metadata {points:g}."
     yield from _part_titles(tree, told if isinstance(told, dict) else {}, call.lineno)
 
 
 def _part_titles(tree: ast.Module, worth: dict[str, float], score_line: int) -> Iterator[str]:
-    """Parts that the score does not know, and parts of the score that are nowhere."""
+    """Yield sentences about parts that the score does not contain, and parts of the score that do not exist."""
     named: set[str] = set()
-    # Each line of a table is a part.
+    # In a table of answers, each line is a part.
     computed = any(isinstance(node, ast.Name) and node.id == "answers" for node in ast.walk(tree))
     for node in ast.walk(tree):
         if not _is_call(node, "part") or not isinstance(node, ast.Call) or not node.args:
@@ -341,7 +342,7 @@ def _part_titles(tree: ast.Module, worth: dict[str, float], score_line: int) -> 
         if title not in worth:
             yield f'line {node.lineno}: the score gives no points for the part "{title}".'
     for title in worth.keys() - named if not computed else ():
-        yield f'line {score_line}: the score gives points for "{title}", and no part is called so.'
+        yield f'line {score_line}: the score gives points for "{title}", but there is no such part.'
 
 
 def _is_call(node: ast.AST, method: str) -> bool:
@@ -349,7 +350,7 @@ def _is_call(node: ast.AST, method: str) -> bool:
 
 
 def course_findings(root: Path) -> list[Finding]:
-    """Say what is wrong with the course's own settings: labs and codes that they list and that are not there."""
+    """Return the mistakes in the course's settings: labs and codes of reasons that are listed but do not exist."""
     names = lab_names(root)
     missing = [name for name in read_settings(root).labs if name not in names]
     found = [Finding("", f"{SETTINGS_FILE} lists the lab `{name}`, which does not exist.") for name in missing]
@@ -363,7 +364,7 @@ def course_findings(root: Path) -> list[Finding]:
 
 
 def read_findings(root: Path, name: str) -> list[Finding]:
-    """Read a lab's source, and say what is wrong with it.
+    """Read a lab's source, and return the mistakes in it.
 
     Raises:
         KitError: there is no such lab under `solutions`.
@@ -374,7 +375,7 @@ def read_findings(root: Path, name: str) -> list[Finding]:
     except FileNotFoundError as error:
         raise KitError(f"There is no solutions/{name}/{name}.ipynb.", "Name a folder under `solutions`.") from error
     except (ValueError, KeyError, TypeError) as error:
-        return [Finding("", f"{notebook.name} is no notebook: {error}.")]
+        return [Finding("", f"{notebook.name} is not a notebook: {error}.")]
     found = list(metadata_findings(cells))
     try:
         lab = load_lab(root, name)
@@ -405,7 +406,7 @@ def _canary_findings(root: Path, lab: Lab) -> Iterator[Finding]:
 
 def _requirement_findings(lab: Lab, path: Path) -> Iterator[Finding]:
     if not path.is_file():
-        yield Finding("", f"there is no {path}, so nobody can say whether every requirement is checked.", warning=True)
+        yield Finding("", f"there is no {path}, so it is not known whether every requirement is checked.", warning=True)
         return
     told = requirements.read(path)
     known = {check.grade_id for check in lab.checks}
@@ -421,11 +422,11 @@ def _requirement_findings(lab: Lab, path: Path) -> Iterator[Finding]:
             warning=True,
         )
     for check in told.unheld(lab):
-        yield Finding(check, "it holds no requirement.", warning=True)
+        yield Finding(check, "no requirement names this check.", warning=True)
 
 
 def release_findings(files: dict[Path, bytes]) -> list[Finding]:
-    """Look for what students must not receive in the files of a release."""
+    """Search the files of a release for text that students must not receive."""
     found = []
     for path, content in files.items():
         if path.suffix != ".ipynb":

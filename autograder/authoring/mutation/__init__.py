@@ -1,6 +1,6 @@
-"""Single changes of the model solutions, made by rule, and what grading makes of them.
+"""Mutate the model solutions: make single changes by rule, so that checks can be tested with wrong answers.
 
-General libraries (mutmut, cosmic-ray) change a package's files and run a test command. Here the text to change is the
-solution inside a notebook's answer cell, the rules that matter are those of ROS, and the test is the grading of just
-the checks that a change can reach; so the rules are the project's own, on Python's `ast`.
+General libraries (mutmut, cosmic-ray) change the files of a package and run a test command. Here the changed text is
+the solution in a notebook's answer cell, the important rules are about ROS, and the test is to grade only the checks
+that a change can affect. Therefore the project has its own rules, which use Python's `ast`.
 """

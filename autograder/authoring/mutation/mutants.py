@@ -1,7 +1,7 @@
-"""The mutants of a lab, and which checks each of them can reach.
+"""Return the mutants of a lab, and the checks that each of them can affect.
 
-`tests/grading/test_classes.py` shows that nothing else reaches them: without the files that are said not to reach a
-check, the solution passes it all the same.
+`tests/grading/test_classes.py` shows that other checks are not affected: a solution without the files that are said not
+to affect a check still passes this check.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from autograder.packages.workspace import SOURCES
 
 
 def mutants(lab: Lab) -> list[Mutant]:
-    """Every mutant of a lab's solutions; those with equal words are numbered."""
+    """Return every mutant of a lab's solutions. Mutants with the same description are numbered."""
     found: list[Mutant] = []
     counts: dict[str, int] = {}
     for answer in lab.answers.values():
@@ -59,7 +59,7 @@ def _is_python(text: str) -> bool:
 
 
 def _solution_lines(lab: Lab, answer: Answer) -> set[int]:
-    """Numbers of the lines of the solution, as `answer.solution` counts them, that students write themselves."""
+    """Return the numbers of the lines in `answer.solution` that students write themselves."""
     raw = next(source_of(cell) for cell in lab.raw["cells"] if grade_id_of(cell) == answer.grade_id)
     if "BEGIN SOLUTION" not in raw:
         return set(range(1, len(answer.solution.split("\n")) + 1))
@@ -75,7 +75,7 @@ def _solution_lines(lab: Lab, answer: Answer) -> set[int]:
 
 
 def _difference(before: str, after: str) -> tuple[str, str]:
-    """The first line that differs, and what became of it."""
+    """Return the first line that differs, before and after the change."""
     old, new = before.split("\n"), after.split("\n")
     first = next((n for n, (a, b) in enumerate(zip(old, new, strict=False)) if a != b), min(len(old), len(new)) - 1)
     shorter = len(new) < len(old)
@@ -84,13 +84,16 @@ def _difference(before: str, after: str) -> tuple[str, str]:
 
 
 def handed_in(lab: Lab, mutant: Mutant) -> dict[str, str]:
-    """The files of a submission that is the solution but for this change."""
+    """Return the files of a submission that differs from the solution only by this change."""
     solutions = {grade_id: answer.solution for grade_id, answer in lab.answers.items()}
     return lab.files_with(solutions | {mutant.answer: mutant.source})
 
 
 def reached(lab: Lab, answers: Iterable[str]) -> list[Cell]:
-    """The cells to run for changed answers: set-up, and the checks that use one's file or a file that mentions it."""
+    """Return the cells to run for changed answers: the set-up, and the checks that may be affected.
+
+    A check may be affected if it uses the file of a changed answer, or a file that mentions such a file.
+    """
     files = {answer.grade_id: answer.file for answer in lab.answers.values() if answer.file is not None}
     names = set(answers) & files.keys()
     grown = True
@@ -108,10 +111,10 @@ def reached(lab: Lab, answers: Iterable[str]) -> list[Cell]:
 
 
 def _word(name: str) -> str:
-    """What others name a file by: itself, or the package that it is a file of."""
+    """Return the name by which other files refer to a file: its own name, or the name of its package."""
     return name.split("/")[1] if name.startswith(f"{SOURCES}/") else name
 
 
 def using(lab: Lab, check: Cell) -> frozenset[str]:
-    """The answers that reach a check."""
+    """Return the answers that can affect a check."""
     return frozenset(name for name in lab.answers if check in reached(lab, [name]))

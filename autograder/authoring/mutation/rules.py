@@ -1,4 +1,4 @@
-"""The rules by which a solution is changed: what students get wrong in ROS, in Python, and in the other answers.
+"""The rules by which a solution is changed. They imitate students' mistakes in ROS, in Python and in other answers.
 
 Many mistakes show only the second time: something is done once and not again, for the first and not for each, or a
 bound is twice or half of what it should be.
@@ -17,10 +17,10 @@ import yaml
 
 @dataclass(frozen=True)
 class Change:
-    """One piece of the source and what takes its place."""
+    """A piece of the source and the text that replaces it."""
 
     start: int
-    """Offset in bytes of UTF-8."""
+    """The offset of the piece in bytes of UTF-8."""
     end: int
     text: str
     rule: str
@@ -31,25 +31,25 @@ class Mutant:
     """A solution with one change."""
 
     answer: str
-    """grade_id of the answer cell."""
+    """The grade_id of the answer cell."""
     rule: str
     before: str
     """The changed line, without its indentation."""
     after: str
     source: str
-    """The whole answer as it would be handed in."""
+    """The whole answer as a student would hand it in."""
 
     @property
     def key(self) -> str:
-        """The same words for the same change as long as the line stays as it is."""
+        """A description of the change that stays the same as long as the line does."""
         return f"{self.answer}: {self.rule}: {self.before} => {self.after}"
 
 
 class Source:
-    """A Python source and the places of its nodes."""
+    """A Python source and the positions of its AST nodes."""
 
     def __init__(self, text: str) -> None:
-        """Remember where each line begins."""
+        """Compute where each line begins."""
         self.text = text
         self.data = text.encode()
         self._lines = [0]
@@ -57,26 +57,26 @@ class Source:
             self._lines.append(self._lines[-1] + len(line))
 
     def start(self, node: ast.expr | ast.stmt | ast.keyword) -> int:
-        """Offset of a node's first byte; of a decorated function's decorator."""
+        """Return the offset of a node's first byte; for a decorated function, that of its first decorator."""
         decorators = getattr(node, "decorator_list", [])
         if decorators:
             return self.start(decorators[0]) - 1
         return self._lines[node.lineno - 1] + node.col_offset
 
     def end(self, node: ast.expr | ast.stmt | ast.keyword) -> int:
-        """Offset behind a node's last byte."""
+        """Return the offset after a node's last byte."""
         return self._lines[(node.end_lineno or node.lineno) - 1] + (node.end_col_offset or 0)
 
     def of(self, node: ast.expr | ast.stmt | ast.keyword) -> str:
-        """A node's own text."""
+        """Return the text of a node."""
         return self.data[self.start(node) : self.end(node)].decode()
 
     def with_change(self, change: Change) -> str:
-        """The text with one piece replaced."""
+        """Return the source with one piece replaced."""
         return (self.data[: change.start] + change.text.encode() + self.data[change.end :]).decode()
 
     def argument(self, call: ast.Call, node: ast.expr | ast.keyword) -> tuple[int, int]:
-        """The place of an argument together with the comma that parts it from the others."""
+        """Return the start and end of an argument, including the comma that separates it from the others."""
         start, end = self.start(node), self.end(node)
         after = self.data[end : self.end(call)]
         rest = after.lstrip()
@@ -95,7 +95,7 @@ ENTITIES = {
     "create_service": 1,
     "create_client": 1,
 }
-"""Where the name stands among the arguments."""
+"""The index of the name among the arguments of each method."""
 _POLICIES = {
     "RELIABLE": "BEST_EFFORT",
     "BEST_EFFORT": "RELIABLE",
@@ -118,17 +118,17 @@ _DROPPED_KEYWORDS = {
 
 
 def name_of(node: ast.AST) -> str:
-    """The last word of a name or of a dotted name."""
+    """Return the last part of a name or of a dotted name; empty if the node is neither."""
     return node.attr if isinstance(node, ast.Attribute) else node.id if isinstance(node, ast.Name) else ""
 
 
 def string(node: ast.AST) -> str | None:
-    """A string literal's value."""
+    """Return the value of a string literal; None if the node is no string literal."""
     return node.value if isinstance(node, ast.Constant) and isinstance(node.value, str) else None
 
 
 def ros_changes(source: Source, tree: ast.Module, node: ast.AST) -> Iterator[Change]:
-    """Every change of one node."""
+    """Yield every change that the rules for ROS make to one node."""
     if isinstance(node, ast.Call):
         yield from _entity(source, tree, node)
         yield from _timer(source, node)
@@ -156,7 +156,7 @@ def _new(source: Source, node: ast.expr, text: str, rule: str) -> Change:
 
 
 def other_names(name: str) -> Iterator[str]:
-    """Near misses of a topic's or service's name."""
+    """Yield similar but wrong names for a topic or service."""
     yield name[1:] if name.startswith("/") else "/" + name.removeprefix("~/")
     yield name[2:] if name.startswith("~/") else "~/" + name.lstrip("/")
     yield name + "x"
@@ -218,7 +218,7 @@ def _keywords(source: Source, tree: ast.Module, call: ast.Call) -> Iterator[Chan
 
 
 def _group_names(source: Source, tree: ast.Module) -> set[str]:
-    """What callback groups are called in the program."""
+    """Return the expressions to which the program assigns callback groups."""
     return {
         source.of(target)
         for node in ast.walk(tree)
@@ -259,11 +259,11 @@ _SIMPLE = (ast.Expr, ast.Assign, ast.AugAssign)
 
 
 def changes(text: str, lines: set[int]) -> Iterator[Change]:
-    """Every change of a program that begins in one of the lines, each once.
+    """Yield every change of a program that begins in one of the given lines, each of them once.
 
     Args:
-        text: Python.
-        lines: numbers of the lines that are the student's, from 1.
+        text: the Python program.
+        lines: the numbers of the lines that students write, counted from 1.
     """
     source, tree = Source(text), ast.parse(text)
     seen = {ast.dump(tree)}
@@ -323,7 +323,7 @@ def _constants(node: ast.Constant) -> Iterator[tuple[str, str]]:
 
 
 def _blocks(source: Source, node: ast.AST, lines: set[int]) -> Iterator[Change]:
-    """Statements left out, and neighbours swapped."""
+    """Yield the change that leaves out a statement."""
     if isinstance(node, _DROPPED) and not (isinstance(node, ast.Expr) and string(node.value) is not None):
         yield Change(source.start(node), source.end(node), "pass", f"dropped {_what(node)}")
 
@@ -364,7 +364,7 @@ def _times(source: Source, node: ast.AST, repeated: bool) -> Iterator[Change]:
 
 
 def swaps(text: str, lines: set[int]) -> Iterator[Change]:
-    """Neighbouring simple statements of a block in the other order."""
+    """Yield changes that swap two neighbouring simple statements of a block."""
     source, tree = Source(text), ast.parse(text)
     for node in ast.walk(tree):
         for body in (getattr(node, "body", None), getattr(node, "orelse", None)):
@@ -387,7 +387,7 @@ _RULE = re.compile(r"-([rp])\s+(\S+?):=(\S*)")
 
 
 def text_changes(text: str) -> Iterator[tuple[str, str]]:
-    """Every change of a YAML answer: the rule and the new text. What is not YAML any more is left out."""
+    """Yield every change of a YAML answer, as the rule and the new text. Texts that are no longer YAML are left out."""
     seen = {repr(_load(text))}
     for rule, changed in _all(text):
         value = _load(changed)
@@ -397,7 +397,7 @@ def text_changes(text: str) -> Iterator[tuple[str, str]]:
 
 
 def without_a_line(text: str) -> Iterator[str]:
-    """The text without one of its lines, each in turn, but for lines that are empty or only close something."""
+    """Yield the text without one of its lines, for each line that has words and is no comment or closing tag."""
     rows = text.split("\n")
     for number, row in enumerate(rows):
         if re.search(r"\w", row) and not row.strip().startswith(("#", "</")):
@@ -443,7 +443,10 @@ def _values(value: str) -> Iterator[tuple[str, str]]:
 
 
 def _words(text: str) -> Iterator[tuple[str, str]]:
-    """Remap and parameter rules inside a command line: left out, or with another left or right side."""
+    """Yield changes of the remap and parameter rules in a command line.
+
+    A rule is left out, gets another left or right side, or is swapped with the rule after it.
+    """
     for match in _RULE.finditer(text):
         start, end = match.span()
         yield "dropped rule", re.sub(r" +\n", "\n", f"{text[:start]}{text[end:].lstrip(' ')}")

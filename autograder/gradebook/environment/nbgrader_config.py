@@ -1,6 +1,7 @@
-"""For a whole environment that the kit's wheel was installed into: outside of a course nbgrader executes nothing.
+"""nbgrader's configuration for an environment with the kit's wheel: nbgrader executes nothing outside of a course.
 
-A course's own `nbgrader_config.py`, which nbgrader reads after this one, leads its commands the course's way.
+nbgrader reads the `nbgrader_config.py` of a course after this file. That configuration makes nbgrader's commands use
+the course's own stages.
 """
 
 import os

@@ -1,4 +1,4 @@
-"""For the environment of a student's kit: Validate says what `autograder check` says."""
+"""nbgrader's configuration for the environment of a student's kit: Validate shows what `autograder check` shows."""
 
 import os
 import sys

@@ -1,4 +1,4 @@
-"""Who runs the jobs of a class: a module for each executor, and a line for it here."""
+"""Executors run the jobs of a class. Each executor has its own module and an entry in `EXECUTORS`."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from autograder.grading.job import Job
 
 
 class Executor(Protocol):
-    """Runs jobs wherever it likes: a job is JSON, needs no file of the course, and goes to `run_in_worker`."""
+    """Runs jobs on any machine. A job is JSON, needs no file of the course, and is run by `run_in_worker`."""
 
     def run(self, jobs: Sequence[Job], started: Callable[[str], None]) -> Generator[SubmissionResult, None, None]:
-        """Run jobs, several at once, and yield each result as soon as it is there, in whatever order.
+        """Run several jobs at the same time, and yield each result as soon as it is known, in any order.
 
-        `started` is called with each student whose job begins to run, in any thread; more than once if it
-        has to begin again, and from another machine perhaps late.
+        `started` is called in any thread with each student whose job starts to run. It is called again if the job has
+        to start again, and may be called late if the job runs on another machine.
 
-        A job that goes wrong costs no other job its result: it yields `supervisor.unknown`. When the generator
-        is closed, as after Ctrl-C, everything is ended that still runs.
+        If a job fails, its result is `supervisor.unknown`, and the results of other jobs are not affected. When the
+        generator is closed, for example after Ctrl-C, all jobs that still run are ended.
 
         Raises:
-            KitError: no job can be run at all.
+            KitError: no job can be run.
         """
 
 
@@ -33,15 +33,15 @@ EXECUTORS: dict[str, Callable[[str, int], Executor]] = {
     "dask": lambda address, _: Dask(address),
     "local": lambda _, at_once: Local(at_once),
 }
-"""By the word before `://` in a course's setting `executor`: what makes one from the address behind it, and from how
-many jobs are to run at once."""
+"""For each name that may come before `://` in a course's setting `executor`, the function that makes the executor from
+the address after it and the number of jobs that run at the same time."""
 
 
 def chosen(setting: str, at_once: int) -> Executor:
     """Return the executor that a course's setting names.
 
     Raises:
-        KitError: there is none of that name.
+        KitError: there is no executor with this name.
     """
     name, _, address = setting.partition("://")
     if name not in EXECUTORS:

@@ -1,4 +1,4 @@
-"""Runs jobs on an existing Dask cluster: a scheduler, and workers on machines that have this very kit."""
+"""Run jobs on an existing Dask cluster: a scheduler, and workers on machines that have exactly the same kit."""
 
 from __future__ import annotations
 
@@ -15,28 +15,28 @@ from autograder.grading.job import Job
 from autograder.grading.supervisor import run_in_worker, unknown
 
 _SECONDS_TO_ANSWER = 30.0
-"""Seconds in which a scheduler has to answer, and as many in which it has to have a worker."""
+"""Seconds after which the scheduler must have answered, and again seconds after which it must have a worker."""
 
 
 class OtherKit(Exception):
-    """A worker has another kit than the one that grades: its verdicts may be others."""
+    """A worker has a different kit, whose verdicts may be different, or has got a different job."""
 
 
 class Dask:
-    """Sends each job to whichever worker is free. Of a worker that dies, another one takes the jobs over.
+    """Sends each job to a free worker. If a worker dies, another worker runs its jobs.
 
-    How many run at once is the cluster's business: as many as its workers have threads.
+    The cluster decides how many jobs run at the same time: as many as its workers have threads.
 
     Args:
-        address: of the scheduler, such as `tcp://grading:8786`.
+        address: the address of the scheduler, such as `tcp://grading:8786`.
     """
 
     def __init__(self, address: str) -> None:
-        """Nothing is connected yet."""
+        """Store the address without connecting to it."""
         self._address = address
 
     def run(self, jobs: Sequence[Job], started: Callable[[str], None]) -> Generator[SubmissionResult, None, None]:
-        """Run jobs, as `Executor.run` says; one that another worker takes over begins once more."""
+        """Run jobs as described in `Executor.run`. A job that another worker takes over starts again."""
         if not jobs:
             return
         client = self._client()
@@ -55,7 +55,7 @@ class Dask:
             for future in as_completed(futures, loop=client.loop):
                 yield self._result_of(future, by_student[futures[future]])
         finally:
-            client.close()  # which takes back what has not begun
+            client.close()  # this cancels the jobs that have not started
 
     def _client(self) -> Any:
         try:
@@ -63,7 +63,7 @@ class Dask:
         except ImportError as error:
             raise KitError("Sending jobs to Dask needs the package distributed.", "pip install distributed") from error
         for name in ("distributed", "distributed.client", "distributed.core"):
-            logging.getLogger(name).setLevel(logging.CRITICAL)  # what it says is said here, as sentences
+            logging.getLogger(name).setLevel(logging.CRITICAL)  # its errors are reported here as sentences
         try:
             client = Client(self._address, timeout=_SECONDS_TO_ANSWER, set_as_default=False)
         except (OSError, ValueError) as error:
@@ -82,7 +82,7 @@ class Dask:
         if other:
             client.close()
             raise KitError(
-                f"{len(other)} of {len(kits)} workers have no kit, or another one than this: {', '.join(other[:3])}.",
+                f"{len(other)} of {len(kits)} workers have no kit, or a different one: {', '.join(other[:3])}.",
                 "Install the same version of the kit there, and start them again.",
             )
         return client
@@ -96,11 +96,12 @@ class Dask:
             raise
         except CancelledError as error:
             raise KitError(
-                f"The Dask scheduler at {self._address} is gone.", "Start it, and run again: what is finished is kept."
+                f"The Dask scheduler at {self._address} no longer answers.",
+                "Start it, and run the command again: what is finished is kept.",
             ) from error
         except OtherKit as error:
             raise KitError(str(error), "Install the same version of the kit there, and start it again.") from error
-        except Exception as error:  # whatever became of that run, the class goes on
+        except Exception as error:  # the other submissions must still be graded
             return unknown(job, f"The grading process failed: {type(error).__name__}.", str(error))
 
 
@@ -108,18 +109,18 @@ def run_there(text: str, digest: str, kit: str, begun: str) -> str:
     """Run one job on a worker of the cluster, and return its result as JSON.
 
     Args:
-        text: the job as JSON: the submission, and the lab's cells.
-        digest: of that text, which must have arrived as it was sent.
-        kit: the digest of the kit that the verdicts have to come from.
-        begun: the topic under which it is told whose job begins.
+        text: the job as JSON, with the submission and the lab's cells.
+        digest: the digest of this text, which shows that it arrived unchanged.
+        kit: the digest of the kit that must give the verdicts.
+        begun: the topic on which the start of the job is announced, with the student's name.
 
     Raises:
-        OtherKit: this machine has another one, or got another job.
+        OtherKit: this machine has a different kit, or got a different job.
     """
     from distributed import get_worker
 
     if hashlib.sha256(text.encode()).hexdigest() != digest or kit_digest() != kit:
-        raise OtherKit(f"The Dask worker at {get_worker().address} has another kit than this, or got another job.")
+        raise OtherKit(f"The Dask worker at {get_worker().address} has a different kit, or got a different job.")
     job = Job.model_validate_json(text)
     get_worker().log_event(begun, job.student)
     return run_in_worker(job).model_dump_json()

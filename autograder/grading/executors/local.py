@@ -1,4 +1,4 @@
-"""Runs jobs on this machine."""
+"""Run jobs on this machine."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ from autograder.grading.supervisor import run_in_worker, unknown
 
 
 class Local:
-    """Several jobs at once, each alone in its sandbox.
+    """Runs several jobs at the same time, each in its own sandbox.
 
-    Threads will do: what takes time and may go wrong happens in the sandboxes, each a process tree of its own that
-    ends with the thread that started it, however this process ends.
+    Threads are sufficient, because everything that takes time or may fail happens in the sandboxes. Each sandbox is a
+    separate process tree that ends with the thread that started it, however this process ends.
 
     Args:
-        at_once: how many.
+        at_once: the number of jobs that run at the same time.
     """
 
     def __init__(self, at_once: int) -> None:
-        """Nothing runs yet."""
+        """Store the argument without starting anything."""
         self._at_once = at_once
 
     def run(self, jobs: Sequence[Job], started: Callable[[str], None]) -> Generator[SubmissionResult, None, None]:
-        """Run jobs, as `Executor.run` says."""
+        """Run jobs as described in `Executor.run`."""
         stop = threading.Event()
 
         def run(job: Job) -> SubmissionResult:
@@ -38,7 +38,7 @@ class Local:
         try:
             futures = {pool.submit(run, job): job for job in jobs}
             for future in as_completed(futures):
-                yield _result_of(future, futures.pop(future))  # a kept future keeps its result in memory
+                yield _result_of(future, futures.pop(future))  # a future that is kept also keeps its result in memory
         finally:
             stop.set()
             pool.shutdown(cancel_futures=True)
@@ -49,5 +49,5 @@ def _result_of(future: Future[SubmissionResult], job: Job) -> SubmissionResult:
         return future.result()
     except KitError:
         raise
-    except Exception as error:  # whatever became of that run, the class goes on
+    except Exception as error:  # the other submissions must still be graded
         return unknown(job, f"The grading process failed: {type(error).__name__}.", str(error))

@@ -1,4 +1,4 @@
-"""Results for other programs. A format is a module of this package and a line in `FORMATS`."""
+"""Export results for other programs. Each format has its function in this package and an entry in `FORMATS`."""
 
 from __future__ import annotations
 
@@ -22,6 +22,6 @@ FORMATS: Mapping[str, Format] = {
     "blackboard": to_blackboard,
     "gradescope": to_gradescope,
 }
-"""What writes a format, by the name that `autograder export` knows it by."""
+"""The function that makes each format, by the format's name in `autograder export`."""
 SEVERAL_LABS = frozenset({"csv", "junit", "gradescope"})
-"""Formats that hold several labs at once."""
+"""The formats that can contain several labs."""

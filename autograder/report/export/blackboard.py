@@ -1,6 +1,6 @@
-"""Blackboard's Grade Center: the table that "Work Offline" uploads.
+"""Export for Blackboard's Grade Center: the table that "Work Offline" uploads.
 
-Source: Blackboard's help, "Upload or download grade items": a student is found by user name, a column by its id.
+Source: Blackboard's help, "Upload or download grade items". Students are found by user name, and columns by their id.
 """
 
 from __future__ import annotations
@@ -11,10 +11,10 @@ from autograder.report.export.entry import Entry, Export, header, scores, table
 
 
 def to_blackboard(entries: Sequence[Entry], column: str) -> Export:
-    """Return the table, with every cell in quotes, as Blackboard wants it of commas.
+    """Return the table with every cell in quotes, as Blackboard requires if cells are separated by commas.
 
-    A column that exists is named as Blackboard's own download names it, `Lab 2 [Total Pts: 29 Score] |4711`; another
-    name makes a new column of text, which has to be turned into one of scores.
+    To fill an existing column, use the name from Blackboard's own download, `Lab 2 [Total Pts: 29 Score] |4711`. With
+    any other name, Blackboard creates a new text column, which has to be changed into a column of scores there.
     """
     left_out: list[str] = []
     rows = [("Last Name", "First Name", "Username", header(entries, column))]
@@ -26,7 +26,7 @@ def to_blackboard(entries: Sequence[Entry], column: str) -> Export:
 
 
 def _names(name: str) -> tuple[str, str]:
-    """First and last name, of `Doe, Jane` or `Jane Doe`."""
+    """Split `Doe, Jane` or `Jane Doe` into the first and the last name."""
     last, comma, first = name.partition(",")
     if not comma:
         first, _, last = name.rpartition(" ")

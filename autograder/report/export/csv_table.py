@@ -1,4 +1,4 @@
-"""A table: a row for each graded cell of each submission. The points of a submission add up to its score."""
+"""Export a table with a row for each graded cell of each submission. The points of a submission add up to its score."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from autograder.report.export.entry import Entry, Export, points, table
 
 
 def to_csv(entries: Sequence[Entry], _: str) -> Export:
-    """Return the table; points that nobody has decided yet stay empty."""
+    """Return the table. Points that have not been decided yet are empty."""
     rows: list[tuple[str, ...]] = [("student", "lab", "check", "points", "max_points", "status", "reason")]
     for entry in entries:
         graded = {cell.grade_id: cell for cell in entry.grade.cells} if entry.grade is not None else {}
@@ -34,5 +34,5 @@ def to_csv(entries: Sequence[Entry], _: str) -> Export:
 
 
 def points_or_empty(number: float | None) -> str:
-    """Return points, or nothing where nobody has decided yet."""
+    """Return points as text; empty if they have not been decided yet."""
     return "" if number is None else points(number)

@@ -1,4 +1,4 @@
-"""What exports are made of: a class's submissions with what platforms call them, CSV, and the zip of feedback."""
+"""The common parts of exports: the submissions with the platforms' names, CSV tables, and zips of feedback."""
 
 from __future__ import annotations
 
@@ -15,54 +15,55 @@ from autograder.core.results import SubmissionResult
 
 @dataclass(frozen=True)
 class Entry:
-    """One submission."""
+    """A submission with everything that an export may need."""
 
     student: str
     lab: str
     result: SubmissionResult
     grade: Grade | None = None
-    """None: the gradebook does not have it."""
+    """The grade; None if the gradebook does not have the submission."""
     known: Mapping[str, str] = field(default_factory=dict)
-    """What platforms call the student, by kind, such as `name`, `email`, `canvas_id`."""
+    """The student's names on platforms, by kind, such as `name`, `email`, `canvas_id`."""
     file: str = ""
-    """The path under which a platform gave the notebook out; empty if none did."""
+    """The path of the notebook in the platform's download; empty if it did not come from a platform."""
     late: bool = False
-    """The platform has marked it as late."""
+    """Whether the platform has marked the submission as late."""
     feedback: Path | None = None
-    """The student's page; None: there is none."""
+    """The student's feedback page; None if there is none."""
 
 
 @dataclass
 class Export:
-    """What an export comes to."""
+    """An export, and the students who are not in it."""
 
     content: str | bytes
     left_out: list[str] = field(default_factory=list)
-    """Who is not in it, and why, as sentences."""
+    """Sentences about the students who are not in the export, with the reasons."""
 
 
 Format = Callable[[Sequence[Entry], str], Export]
-"""Makes an export of entries, sorted by lab and student, and the name of the column in the platform's gradebook."""
+"""A function that makes an export from entries, which are sorted by lab and student, and the name of the column in the
+platform's gradebook."""
 
 
 def points(number: float) -> str:
-    """Return points as every table writes them: at most two decimals, none that say nothing."""
+    """Return points in the form of all tables: with at most two decimals and no trailing zeros."""
     return f"{round(number, 2):g}"
 
 
 def scores(entries: Sequence[Entry], left_out: list[str]) -> list[tuple[Entry, str, str]]:
-    """Return each entry that has a score, with it and its maximum.
+    """Return each entry that has a score, with its score and its maximum.
 
-    An undecided submission has no row: an empty cell would take away the score that the platform has.
+    An undecided submission is left out, because an empty cell would delete the score that the platform already has.
 
     Args:
-        entries: of one lab.
-        left_out: gets a sentence about each that has no score.
+        entries: the submissions of one lab.
+        left_out: a list to which a sentence is added for each submission without a score.
     """
     found = []
     for entry in entries:
         if entry.grade is None:
-            left_out.append(f"{entry.student} is not in the gradebook: run autograder grade {entry.lab} once more.")
+            left_out.append(f"{entry.student} is not in the gradebook: run autograder grade {entry.lab} again.")
         elif entry.grade.score is None:
             left_out.append(f"{entry.student} has no score yet: a check waits for your verdict in formgrader.")
         else:
@@ -71,16 +72,16 @@ def scores(entries: Sequence[Entry], left_out: list[str]) -> list[tuple[Entry, s
 
 
 def header(entries: Sequence[Entry], column: str) -> str:
-    """Return the heading of the column of scores: what was asked for, or the lab's name."""
+    """Return the heading for the column of scores: the name that was asked for, or else the lab's name."""
     return column or entries[0].lab
 
 
 _FORMULA = ("=", "+", "-", "@", "\t", "\r")
-"""What makes a spreadsheet take a text for a formula."""
+"""The characters with which a formula in a spreadsheet can begin."""
 
 
 def table(rows: Iterable[Sequence[str]], quote_all: bool = False) -> str:
-    """Return rows as CSV; no text of a student's becomes a formula where somebody opens the file as a spreadsheet."""
+    """Return rows as CSV in which no text of a student can become a formula when a spreadsheet opens the file."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n", quoting=csv.QUOTE_ALL if quote_all else csv.QUOTE_MINIMAL)
     writer.writerows([[_harmless(cell) for cell in row] for row in rows])
@@ -93,16 +94,17 @@ def _harmless(cell: str) -> str:
 
 
 _ALWAYS = (1980, 1, 1, 0, 0, 0)
-"""Date of every file, so that equal pages give equal zips."""
+"""The date of every file in a zip. It is always the same, so that equal pages give equal zips."""
 
 
 def feedback_zip(entries: Sequence[Entry], platform: str, place: Callable[[Entry], str]) -> Export:
-    """Return the pages of a class in a zip.
+    """Return a zip with the feedback pages of a class.
 
     Args:
-        entries: of one lab.
-        platform: that takes it.
-        place: the name of a student's page in it; empty if the platform could not tell whose it is.
+        entries: the submissions of one lab.
+        platform: the platform that will read the zip.
+        place: a function that returns the name of a student's page in the zip; empty if the platform could not assign
+            the page to the student.
     """
     left_out = []
     content = io.BytesIO()
@@ -111,11 +113,11 @@ def feedback_zip(entries: Sequence[Entry], platform: str, place: Callable[[Entry
             name = place(entry)
             if not name:
                 left_out.append(
-                    f"{entry.student}: {platform} could not tell whose page it is. Grade what it gives out,"
-                    " or name its number for the student in roster.csv."
+                    f"{entry.student}: {platform} could not assign the page to a student. Grade the submissions as"
+                    f" {platform} exports them, or put its number for the student into roster.csv."
                 )
             elif entry.feedback is None:
-                left_out.append(f"{entry.student} has no feedback page: run autograder grade {entry.lab} once more.")
+                left_out.append(f"{entry.student} has no feedback page: run autograder grade {entry.lab} again.")
             else:
                 info = zipfile.ZipInfo(name, _ALWAYS)
                 info.compress_type = zipfile.ZIP_DEFLATED

@@ -1,4 +1,4 @@
-"""Gradescope's results.json. Source: Gradescope's "Autograder Specifications"."""
+"""Export for Gradescope: results.json. Source: Gradescope's "Autograder Specifications"."""
 
 from __future__ import annotations
 
@@ -29,8 +29,9 @@ def results_json(full: SubmissionResult, grade: Grade | None = None) -> str:
     """Return the results.json of one submission, as a student may see it.
 
     Args:
-        full: what checking found out.
-        grade: what the gradebook has of it, with points by hand and penalties; None: what checking found counts.
+        full: the result of the checks.
+        grade: the grade in the gradebook, with points by hand and penalties; None if only the result of the checks
+            counts.
     """
     result = result_for(full, "student")
     graded = {cell.grade_id: cell for cell in grade.cells} if grade is not None else {}
@@ -44,7 +45,7 @@ def results_json(full: SubmissionResult, grade: Grade | None = None) -> str:
         tests.append(test)
     if grade is not None and grade.penalty:
         tests.append({"name": "Late submission", "score": round(-grade.penalty, 2), "max_score": 0, "output": ""})
-    # A total of its own: of an undecided check Gradescope must not make up a score.
+    # The total is given explicitly, because Gradescope must not compute a score for an undecided check.
     total = result.points if grade is None else grade.earned
     said = [f"{problem.title}: {reason(problem)}" for problem in result.problems]
     undecided = sum("score" not in test for test in tests)

@@ -1,4 +1,4 @@
-"""The JUnit view, for CI: a suite for each submission, a case for each check and each answer graded by hand."""
+"""Export as JUnit XML for CI: a suite for each submission, and a case for each check and each answer graded by hand."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ _NOT_XML = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]"
 
 
 def to_junit(entries: Sequence[Entry], _: str) -> Export:
-    """Return JUnit XML of a class, as students may see it, with what people graded."""
+    """Return JUnit XML of a class as students may see it, with the points that people gave."""
     return Export(_document([_suite(entry.result, "student", entry.grade) for entry in entries]))
 
 
 def junit_xml(results: Sequence[SubmissionResult], audience: Audience = "student") -> str:
-    """Return JUnit XML: a check that failed is a failure, one that nobody could decide is an error."""
+    """Return JUnit XML in which a failed check is a failure and an undecided check is an error."""
     return _document([_suite(result, audience, None) for result in results])
 
 
@@ -84,5 +84,5 @@ def _text(outcome: Outcome) -> str:
 
 
 def _xml(text: str) -> str:
-    """Replace what XML cannot hold, such as the escape sequences in a program's output."""
+    """Replace characters that XML cannot contain, such as those of escape sequences in a program's output."""
     return _NOT_XML.sub("�", text)

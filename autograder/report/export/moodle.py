@@ -1,4 +1,4 @@
-"""Moodle's assignment: the offline grading worksheet, and the zip of feedback files.
+"""Exports for a Moodle assignment: the offline grading worksheet, and the zip of feedback files.
 
 Sources: Moodle's documentation of both, and `importgradeslib.php` and `importziplib.php` of its published source.
 """
@@ -19,9 +19,10 @@ _GIVEN = re.compile(r".+_\d+_assignsubmission_[a-z]+_?")
 
 
 def to_moodle(entries: Sequence[Entry], _: str) -> Export:
-    """Return the worksheet. Moodle finds a student by `Identifier`, which ends in the number of the submissions' zip.
+    """Return the worksheet, in which Moodle finds a student by `Identifier`.
 
-    It skips a grade that was changed in Moodle after the time in the worksheet, which is that of the export.
+    The identifier ends in the number from the zip of submissions. Moodle skips a grade that was changed in Moodle after
+    the time in the worksheet, which is the time of the export.
     """
     left_out: list[str] = []
     now = datetime.datetime.now(datetime.UTC)
@@ -30,7 +31,7 @@ def to_moodle(entries: Sequence[Entry], _: str) -> Export:
     for entry, score, most in scores(entries, left_out):
         number = entry.known.get("moodle_id", "")
         if not number:
-            left_out.append(f"{entry.student} has no `moodle_id`, by grading Moodle's zip or in roster.csv.")
+            left_out.append(f"{entry.student} has no `moodle_id`: grade Moodle's zip, or add it to roster.csv.")
             continue
         grade = entry.grade
         comments = [cell.comment for cell in grade.cells if cell.comment] if grade is not None else []
@@ -40,13 +41,13 @@ def to_moodle(entries: Sequence[Entry], _: str) -> Export:
 
 
 def to_moodle_feedback(entries: Sequence[Entry], _: str) -> Export:
-    """Return the zip for "Upload multiple feedback files in a zip": folders as in the zip of the submissions."""
+    """Return the zip for "Upload multiple feedback files in a zip", with folders as in the zip of submissions."""
     return feedback_zip(entries, "Moodle", _place)
 
 
 def _place(entry: Entry) -> str:
     number = entry.known.get("moodle_id", "")
-    # Where Moodle gave out files without folders, what stands before their own names is the folder's name.
+    # If Moodle exported files without folders, the text before the files' own names is the folder's name.
     given = next(filter(None, map(_GIVEN.match, entry.file.split("/"))), None)
     name = (entry.known.get("name") or entry.student).replace("_", " ").replace("/", " ")
     folder = given[0] if given else (f"{name}_{number}_assignsubmission_file" if number else "")

@@ -1,5 +1,5 @@
 "use strict";
-// Sorts a table by a column, as numbers where all are numbers, and shows the rows that hold what is searched for.
+// Sorts a table by a column, as numbers if all values are numbers, and shows only rows that contain the search text.
 for (const button of document.querySelectorAll("th button")) {
   button.addEventListener("click", () => {
     const heading = button.parentElement;

@@ -1,6 +1,6 @@
-"""What runs in the process tree of a student's programs: the launcher that starts them, and the probe inside them.
+"""The code that runs in the process tree of a student's programs: the launcher that starts them, and their probe.
 
-Everything here imports the standard library, ROS and itself, and nothing else of the kit: the sandbox shows this
-folder alone. `launcher.py` loads it as a package under a name that no program of a student's has, so the modules
-import each other relatively.
+Modules in this folder import only the standard library, ROS and each other, and nothing else of the kit, because the
+sandbox shows only this folder. They use relative imports, because `launcher.py` loads the folder as a package with a
+name that no student's program has.
 """

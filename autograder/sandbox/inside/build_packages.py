@@ -1,11 +1,12 @@
-"""Builds ROS packages with colcon; what is installed goes to standard output as a tar, what was said to standard error.
+"""Builds ROS packages with colcon. It writes the installed files to stdout as a tar, and all messages to stderr.
 
-setup.py and CMake files are the student's and must not be able to write the tar themselves: its descriptor is not
-handed on, and no process can open it in /proc, as this one is not dumpable. In its sandbox it is the first process, so
-nobody else has it either.
+The setup.py and CMake files are the student's, and they must not be able to write the tar themselves. Therefore its
+descriptor is not inherited, and no process can open it in /proc, because this process is not dumpable. In its sandbox,
+this is the first process, so no other process has the descriptor either.
 
-Usage: `python build_packages.py SRC WORK PREFIX PACKAGE…`. SRC is the folder that holds the packages' sources, WORK an
-empty folder, PREFIX the environment whose `share` holds ament's CMake files. It stands alone, as all in this folder.
+Usage: `python build_packages.py SRC WORK PREFIX PACKAGE…`. SRC is the folder that contains the packages' sources, WORK
+is an empty folder, and PREFIX is the environment whose `share` contains ament's CMake files. Like everything in this
+folder, the module does not depend on the rest of the kit.
 """
 
 import contextlib
@@ -27,12 +28,13 @@ _LIMITS = {
     resource.RLIMIT_NPROC: 256,
     resource.RLIMIT_CORE: 0,
 }
-"""Of each process: a compiler of the generated code takes 300 MiB and two seconds."""
+"""The limits of each process. A compiler of the generated code takes 300 MiB and two seconds."""
 _AT_ONCE = "2"
 _ENTRIES = 30_000
-"""Files and folders that a build may make: each is memory of the kernel's. Interfaces make about 2,500."""
+"""The number of files and folders that a build may create, because each takes memory of the kernel. Interfaces create
+about 2,500."""
 _LOOK = 0.1
-"""Seconds between two looks at how many there are."""
+"""The seconds between two looks at how many there are."""
 _PR_SET_DUMPABLE = 4
 
 _FIX_UPS = """\
@@ -63,15 +65,15 @@ variable_watch(AMENT_EXTENSIONS_rosidl_generate_idl_interfaces _leave_out_unused
 
 
 def _keep_output() -> BinaryIO:
-    """Return standard output as a file that nothing else gets, and lead what prints there to standard error."""
+    """Return stdout as a file that no other process gets, and redirect everything else that prints there to stderr."""
     ctypes.CDLL(None).prctl(_PR_SET_DUMPABLE, 0, 0, 0, 0)
-    out = os.fdopen(os.dup(1), "wb")  # Python's own duplicates are closed in whatever it starts
+    out = os.fdopen(os.dup(1), "wb")  # descriptors that Python duplicates are not inherited by other programs
     os.dup2(2, 1)
     return out
 
 
 def _end_all_if_too_many(work: str, over: threading.Event) -> None:
-    """End everything in this sandbox once there are too many files, until it is over."""
+    """End everything in this sandbox if there are too many files; return when `over` is set."""
     before = os.statvfs(work)
     while not over.wait(_LOOK):
         now = os.statvfs(work)
@@ -79,22 +81,22 @@ def _end_all_if_too_many(work: str, over: threading.Event) -> None:
             print(
                 f"The build was ended: it made more than {_ENTRIES:,} files and folders.", file=sys.stderr, flush=True
             )
-            os.kill(-1, signal.SIGKILL)  # all but this one, the first
+            os.kill(-1, signal.SIGKILL)  # all processes except this one, which is the first
             os._exit(1)
 
 
 def _others() -> int:
-    """How many processes and threads this user has already: the kernel's limit counts them, whatever they are."""
+    """Return how many processes and threads this user has already, because the kernel's limit counts all of them."""
     count = 0
     for pid in filter(str.isdigit, os.listdir("/proc")):
-        with contextlib.suppress(OSError):  # it has ended
+        with contextlib.suppress(OSError):  # the process has ended
             if os.stat(f"/proc/{pid}").st_uid == os.getuid():
                 count += len(os.listdir(f"/proc/{pid}/task"))
     return count
 
 
 def main() -> int:
-    """Build; the status is colcon's."""
+    """Build the packages, and return the exit status of colcon."""
     out = _keep_output()
     source, work, prefix, *packages = sys.argv[1:]
     for name, value in _LIMITS.items():
@@ -103,7 +105,7 @@ def main() -> int:
         value = value if hard == resource.RLIM_INFINITY else min(value, hard)
         resource.setrlimit(name, (value, value))
     for package in packages:
-        # Copied: setup.py of setuptools writes beside itself.
+        # The sources are copied, because a setup.py with setuptools writes files beside itself.
         shutil.copytree(os.path.join(source, package), os.path.join(work, "src", package), symlinks=True)
     fix_ups = os.path.join(work, "fix_ups.cmake")
     with open(fix_ups, "w", encoding="utf-8") as file:
@@ -127,7 +129,7 @@ def main() -> int:
         "-DPython3_EXECUTABLE=" + sys.executable,
     ]  # fmt: skip
     over = threading.Event()
-    if os.getpid() == 1:  # else it is somebody's own computer, and their own files
+    if os.getpid() == 1:  # otherwise the build runs on a student's own computer, with other processes and files
         threading.Thread(target=_end_all_if_too_many, args=(work, over), daemon=True).start()
     built = subprocess.run(command, cwd=work, env=environment, stdin=subprocess.DEVNULL, stdout=sys.stderr, check=False)
     over.set()

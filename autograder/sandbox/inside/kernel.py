@@ -1,4 +1,4 @@
-"""The system calls that Python has no function for, and the numbers that they take."""
+"""The system calls for which Python has no functions, and the numbers for their arguments."""
 
 import contextlib
 import ctypes
@@ -19,10 +19,10 @@ prctl = libc.prctl
 
 
 def checked(result: int) -> None:
-    """Raise what a call has left in errno, unless it returned 0.
+    """Raise the error that a call has left in errno, unless the call returned 0.
 
     Raises:
-        OSError: it did not.
+        OSError: the call did not return 0.
     """
     if result != 0:
         raise OSError(ctypes.get_errno(), os.strerror(ctypes.get_errno()))
@@ -33,7 +33,7 @@ class _FilterProgram(ctypes.Structure):
 
 
 def filter_calls(content: bytes) -> None:
-    """Put this process under a filter of system calls, an array of `struct sock_filter`.
+    """Apply a filter of system calls, which is an array of `struct sock_filter`, to this process.
 
     Raises:
         OSError: the kernel refuses.
@@ -45,14 +45,14 @@ def filter_calls(content: bytes) -> None:
 
 
 def give_up_privileges() -> None:
-    """Give up every capability, in this process and in all that it ever starts, and make sure of it.
+    """Give up every capability, in this process and in all that it starts later, and check that none is left.
 
     Raises:
-        OSError: one is left.
+        OSError: a capability is left.
     """
     number = 0
     while prctl(_PR_CAPBSET_DROP, number, 0, 0, 0) == 0:
-        number += 1  # fails after the last that the kernel knows
+        number += 1  # the call fails after the last capability that the kernel knows
     checked(prctl(_PR_CAP_AMBIENT, _PR_CAP_AMBIENT_CLEAR_ALL, 0, 0, 0))
     header = struct.pack("II", 0x20080522, 0)  # capset(2), version 3
     checked(libc.capset(header, bytes(24)))
@@ -64,7 +64,7 @@ def give_up_privileges() -> None:
 
 
 def limit(name: str, value: int) -> None:
-    """Set a limit of this process, by its name in the `resource` module; one that is lower already stays."""
+    """Set a limit of this process by its name in the `resource` module. A limit that is already lower is kept."""
     which = getattr(resource, name)
     _, hard = resource.getrlimit(which)
     if hard != resource.RLIM_INFINITY:

@@ -1,16 +1,16 @@
 """Starts a student's programs by forking itself, with Python, rclpy and the usual messages already loaded.
 
-Three kinds of process come of this file, each a fork of the one before:
+There are three kinds of processes, each of which is a fork of the one before:
 
-- the launcher, which loads everything once and starts nothing of a student's;
-- for each launch a *first process*, with a process list, a /tmp and a /dev/shm of its own where the kernel gives them
-  (`"namespaces"`), without privileges, and with the limits of a launch. When it ends, all its programs have ended;
-- the programs. They can neither see the launcher nor read, write, stop or end the first process, nor read or write
-  each other's memory.
+- the launcher, which loads everything once and runs none of the student's code;
+- for each launch a *first process*, which has its own process list, /tmp and /dev/shm if the kernel allows it
+  (`"namespaces"`), no privileges, and the limits of a launch. When it has ended, all its programs have ended;
+- the programs. They cannot see the launcher, and cannot read, write, stop or end the first process. They cannot read or
+  write each other's memory either.
 
-Usage: launcher.py FD [SCRATCH]. FD is one end of a SOCK_SEQPACKET pair; what is said on it stands in `requests.py`.
-At the end of its socket each of these processes ends, and takes what is below it along. The launcher removes the
-folder SCRATCH, unless the process that started it still lives.
+Usage: launcher.py FD [SCRATCH]. FD is one end of a SOCK_SEQPACKET pair; `requests.py` describes the messages on it. The
+launcher and each first process end, with all their descendants, when their socket is closed. The launcher then removes
+the folder SCRATCH, unless the process that started it is still alive.
 """
 
 import importlib
@@ -24,7 +24,7 @@ _NAME = "_autograder_inside"
 
 
 def _parts(*names: str) -> list[Any]:
-    """Load the folder of this file as a package, wherever it lies, and return modules of it."""
+    """Load the folder of this file as a package, wherever it is, and return modules of it."""
     folder = os.path.dirname(os.path.abspath(__file__))
     spec = importlib.util.spec_from_file_location(
         _NAME, os.path.join(folder, "__init__.py"), submodule_search_locations=[folder]

@@ -1,6 +1,7 @@
-"""What the launcher does, and the first process of each launch, which starts the programs and tells how they end.
+"""The work of the launcher, and of the first process of each launch.
 
-The launcher makes these first processes, and ends everything at the end of its socket.
+The launcher creates these first processes, and ends everything when its socket is closed. A first process starts the
+programs of its launch, and reports how they end.
 """
 
 import contextlib
@@ -27,15 +28,15 @@ from .kernel import (
 from .requests import Launch, Start, answer, hand_over
 
 _EXITING = 4
-"""The kernel's flag of a process that is about to be gone (`PF_EXITING`)."""
+"""The kernel's flag for a process that is about to end (`PF_EXITING`)."""
 
 _PARENT = os.getppid()
-"""Who started the launcher; this module is loaded before anything that takes time."""
+"""The process that started the launcher. The value is reliable because this module is loaded first, without delay."""
 
 
 def serve_launches(channel: socket.socket, scratch: str) -> Launch:
-    """Start the first process of each launch that is asked for. Returns only in such a process."""
-    signal.signal(signal.SIGCHLD, signal.SIG_IGN)  # nobody asks how a first process ended
+    """Start the first process of each requested launch. This returns only in such a process."""
+    signal.signal(signal.SIGCHLD, signal.SIG_IGN)  # the exit status of a first process is not needed
     while True:
         packet, passed, _, _ = socket.recv_fds(channel, 1 << 20, 1)
         if not packet:
@@ -52,7 +53,10 @@ def serve_launches(channel: socket.socket, scratch: str) -> Launch:
 
 
 def _fork_first_process(launch: Launch) -> None:
-    """Become the first process of a launch: by one more fork, since a process never changes its own PID namespace."""
+    """Return only in the first process of a launch.
+
+    This needs one more fork, because a process cannot change its own PID namespace.
+    """
     try:
         if launch.namespaces:
             checked(libc.unshare(CLONE_NEWPID | CLONE_NEWNS))
@@ -70,7 +74,7 @@ def _fork_first_process(launch: Launch) -> None:
             own_mounts.close_settings()
             give_up_privileges()
         _, most = resource.getrlimit(resource.RLIMIT_NOFILE)
-        if resource.RLIM_INFINITY != most < launch.limits["RLIMIT_NOFILE"]:  # right programs would lack them
+        if resource.RLIM_INFINITY != most < launch.limits["RLIMIT_NOFILE"]:  # correct programs could fail
             raise OSError(f"this machine allows a process only {most} open files")
         for name, value in launch.limits.items():
             limit(name, value)
@@ -82,7 +86,10 @@ def _fork_first_process(launch: Launch) -> None:
 
 
 def _end_everything(scratch: str) -> None:
-    """End every program and then this process. Where no PID namespace does it, descendants are found one by one."""
+    """End every program and then this process.
+
+    If this is not the first process of a PID namespace, which ends with it, all descendants are found and killed here.
+    """
     me = os.getpid()
     while me != 1:
         parents = _parents()
@@ -94,13 +101,17 @@ def _end_everything(scratch: str) -> None:
         for pid in family - {me}:
             with contextlib.suppress(ProcessLookupError, PermissionError):
                 os.kill(pid, signal.SIGKILL)
-    if scratch and not _parent_lives():  # whoever lives looks after its own folder
+    if scratch and not _parent_lives():  # a parent that is alive removes its folder itself
         shutil.rmtree(scratch, ignore_errors=True)
     os._exit(0)
 
 
 def _parent_lives() -> bool:
-    """Whether who started the launcher goes on. Its socket is closed a moment before its children are given away."""
+    """Whether the process that started the launcher continues to run.
+
+    The state of that process is checked, too, because when it ends, its socket is closed a moment before its children
+    get another parent.
+    """
     if os.getppid() != _PARENT:
         return False
     try:
@@ -112,7 +123,7 @@ def _parent_lives() -> bool:
 
 
 def _parents() -> dict[int, int]:
-    """Every living process and its parent."""
+    """Return every living process and its parent."""
     parents: dict[int, int] = {}
     for entry in os.listdir("/proc"):
         with contextlib.suppress(OSError, ValueError, IndexError):
@@ -124,11 +135,11 @@ def _parents() -> dict[int, int]:
 
 
 def serve_programs(launch: Launch) -> Start:
-    """Answer, as the first process of a launch, until its end. Returns only in a program's process."""
+    """Serve requests as the first process of a launch until its end. This returns only in a program's process."""
     channel = launch.channel
     children: dict[int, int] = {}
     wake_read, wake_write = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # of what a program may send it, the only one that would end it
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the only signal from a program that would end this process
     signal.signal(signal.SIGCHLD, lambda *_: None)
     signal.set_wakeup_fd(wake_write, warn_on_full_buffer=False)
     poll = select.poll()
@@ -163,7 +174,7 @@ def _end(children: dict[int, int]) -> None:
 
 
 def _fork(channel: socket.socket, start: Start, children: dict[int, int]) -> int:
-    """Fork, and say what came of it; return what `fork` did, -1 if it failed."""
+    """Fork and report the result on the channel. Return the result of `fork`, or -1 if it failed."""
     parent = os.getpid()
     try:
         child = os.fork()

@@ -1,4 +1,4 @@
-"""A /tmp, a /dev/shm and a /proc of a process tree's own, in a mount namespace of its own."""
+"""Gives a process tree its own /tmp, /dev/shm and /proc, in its own mount namespace."""
 
 import os
 import re
@@ -18,11 +18,11 @@ from .kernel import (
 
 
 def make(disk: int, inodes: int) -> None:
-    """Mount an empty /tmp and /dev/shm, and a /proc that shows this PID namespace alone.
+    """Mount an empty /tmp and /dev/shm, and a /proc that shows only this PID namespace.
 
     Args:
-        disk: bytes that each of the first two may hold.
-        inodes: files and folders that each of them may hold; 0 for any number.
+        disk: the size in bytes of /tmp and of /dev/shm.
+        inodes: the largest number of files and folders in each of these two; 0 for no limit.
 
     Raises:
         OSError: the kernel refuses.
@@ -37,9 +37,9 @@ def make(disk: int, inodes: int) -> None:
 
 
 def close_settings() -> None:
-    """Make the kernel's settings read-only: some belong to the namespaces, and would be the programs' own.
+    """Make the kernel's settings read-only, because programs could change those that belong to their namespaces.
 
-    Below such a /proc, no further namespace can have one.
+    After that, no nested namespace can mount its own /proc.
 
     Raises:
         OSError: the kernel refuses.
@@ -50,7 +50,10 @@ def close_settings() -> None:
 
 
 def _python_below(place: str) -> tuple[list[str], list[tuple[str, str]], list[tuple[str, bool, int]]]:
-    """Folders, links and mounts below a place: where the environment itself lies there, Python must stay in sight."""
+    """Return the folders, links and mounts below a place.
+
+    They have to be restored if the virtual environment itself is below this place, so that Python stays available.
+    """
     with open("/proc/self/mountinfo", encoding="utf-8", errors="surrogateescape") as table:
         lines = [line.split(" ")[4] for line in table]
     mounts = {re.sub(r"\\([0-7]{3})", lambda code: chr(int(code[1], 8)), line) for line in lines}
@@ -71,7 +74,7 @@ def _python_below(place: str) -> tuple[list[str], list[tuple[str, str]], list[tu
 
 
 def _put_back(folders: list[str], links: list[tuple[str, str]], held: list[tuple[str, bool, int]]) -> None:
-    """Make what `_python_below` found once more, read-only as it was."""
+    """Restore the folders, links and mounts that `_python_below` found, read-only as they were."""
     for folder in folders:
         os.mkdir(folder, 0o755)
     for target, link in links:

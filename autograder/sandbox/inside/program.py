@@ -1,4 +1,4 @@
-"""Becoming a program: a forked process turns into the one that `python NAME.py` would be, and runs the file."""
+"""Turns a forked process into one like that of `python NAME.py`, and runs the file."""
 
 import builtins
 import contextlib
@@ -22,16 +22,16 @@ from .requests import Start
 from .thread_stacks import answer
 
 _SHUT_DOWN_WITHIN = 1.0
-"""Seconds that are given to rclpy's thread, which takes milliseconds."""
+"""The seconds to wait for rclpy's thread, which normally takes milliseconds."""
 
 
 def interrupt(number: int, frame: FrameType | None) -> None:
-    """Raise KeyboardInterrupt, as Python does, once rclpy has done what it does at this signal.
+    """Raise KeyboardInterrupt, as Python does, after rclpy has handled this signal.
 
-    At SIGINT a thread of rclpy's shuts the context down, while Python raises KeyboardInterrupt in the main thread.
-    Whichever comes second finds the work done. So `rclpy.shutdown()` after the exception mostly fails and sometimes
-    does not, and even `rclpy.try_shutdown()` fails once in a while, between its question and its deed. Here the
-    shutdown always comes first.
+    At SIGINT, a thread of rclpy shuts the context down, while Python raises KeyboardInterrupt in the main thread. The
+    order of the two is not defined. So `rclpy.shutdown()` after the exception usually fails, but sometimes does not,
+    and even `rclpy.try_shutdown()` occasionally fails, because the context can be shut down between its check and its
+    call. With this handler, rclpy's shutdown always comes first.
     """
     with contextlib.suppress(Exception):
         deadline = time.monotonic() + _SHUT_DOWN_WITHIN
@@ -41,9 +41,9 @@ def interrupt(number: int, frame: FrameType | None) -> None:
 
 
 def _about_to_shut_down() -> bool:
-    """Whether rclpy handles the signal, and its default context is still up.
+    """Whether rclpy handles the signal, and its default context is not shut down yet.
 
-    Without a lock: the main thread may hold any of them while this interrupts it.
+    This takes no lock, because the main thread, which it interrupts, may hold any of them.
     """
     signals, utilities = sys.modules.get("rclpy.signals"), sys.modules.get("rclpy.utilities")
     context = getattr(utilities, "g_default_context", None)
@@ -55,23 +55,23 @@ def _about_to_shut_down() -> bool:
 
 
 _EVENTS, _STACKS = 3, 4
-"""The descriptors that the probe and the stacks are written to."""
+"""The descriptors for the output of the probe and for the stacks."""
 
 _OWN = os.path.dirname(os.path.abspath(__file__)) + os.sep
 
 
 def become(start: Start) -> None:
-    """Turn this forked child into the process that the program expects: descriptors, limits, environment."""
+    """Set up this forked process as a program expects it: its descriptors, limits and environment."""
     os.setsid()
     if not start.hidden:
         prctl(PR_SET_DUMPABLE, 1)
     _take_descriptors(start)
     with contextlib.suppress(OSError):
         os.sched_setaffinity(0, start.cpus)
-    if len(start.cpus) < start.cores:  # rclpy takes as many threads as this says: the same number on every machine
+    if len(start.cpus) < start.cores:  # rclpy uses this number of threads, which must be the same on every machine
         pretended = set(range(start.cores))
         os.sched_getaffinity = lambda _pid: pretended
-    os.cpu_count = lambda: start.cores  # it counts the machine's CPUs otherwise, whatever the process may use
+    os.cpu_count = lambda: start.cores  # otherwise it counts all CPUs of the machine, even those not usable here
     os.environ.clear()
     os.environ.update(start.env)
     os.chdir(start.folder)
@@ -87,7 +87,7 @@ def become(start: Start) -> None:
 
 
 def _take_descriptors(start: Start) -> None:
-    """Put the program's descriptors where it looks for them, and close all others."""
+    """Move the program's descriptors to the numbers that it expects, and close all others."""
     spare = [os.dup(descriptor) for descriptor in (start.output, start.events, start.stacks)]
     nothing = os.open(os.devnull, os.O_RDONLY)
     moved = [fcntl.fcntl(descriptor, fcntl.F_DUPFD_CLOEXEC, 64) for descriptor in (nothing, *spare)]
@@ -100,10 +100,10 @@ def _take_descriptors(start: Start) -> None:
 
 
 def run(start: Start) -> None:
-    """Run the program as `python NAME.py` would: its own `__main__`, its own frames in a traceback."""
+    """Run the program as `python NAME.py` does, with its own `__main__`, and only its own frames in a traceback."""
     sys.argv = [start.path, *start.args]
     sys.orig_argv = [sys.executable, *sys.argv]
-    # Not before: what the launcher loads is never one of a student's files.
+    # This is done only now, so that the launcher never loads one of the student's files.
     sys.path.insert(0, os.path.dirname(start.path))
     linecache.clearcache()
     importlib.invalidate_caches()
@@ -124,16 +124,17 @@ def run(start: Start) -> None:
 
 
 def _use_package(prefix: str) -> None:
-    """Make an installed ROS package usable, as sourcing its workspace would have before the start.
+    """Make an installed ROS package usable, as if its workspace had been sourced before the start.
 
-    Its libraries are loaded at once: the loader reads its search path when a process begins, and this one is a fork.
+    The package's libraries are loaded immediately, because the dynamic loader reads its search path only when a process
+    starts, and this process is a fork.
     """
     version = f"python{sys.version_info.major}.{sys.version_info.minor}"
     sys.path.insert(1, os.path.join(prefix, "lib", version, "site-packages"))
     folder = os.path.join(prefix, "lib")
     libraries = sorted(name for name in os.listdir(folder) if name.endswith(".so")) if os.path.isdir(folder) else []
     waiting = [os.path.join(folder, name) for name in libraries]
-    for _ in libraries:  # one needs another, so they are tried until no more of them loads
+    for _ in libraries:  # libraries depend on each other, so the remaining ones are tried again
         waiting = [path for path in waiting if not _loads(path)]
 
 
@@ -165,7 +166,7 @@ def _print_own_frames_of_thread(args: threading.ExceptHookArgs) -> None:
 
 
 def _leave_out_of_tracebacks() -> None:
-    """Whoever prints or logs a traceback, such as rclpy's action server: no frame of the probe is in it."""
+    """Remove the kit's frames from all tracebacks that are printed or logged, for example by rclpy's action server."""
     as_before = traceback.TracebackException.__init__
 
     def without_kit(self: Any, kind: Any, error: Any, trace: Any, *args: Any, **kwargs: Any) -> None:
@@ -177,7 +178,7 @@ def _leave_out_of_tracebacks() -> None:
 
 
 def _without_kit(trace: types.TracebackType | None) -> types.TracebackType | None:
-    """The traceback without the frames of the launcher and the probe."""
+    """Return the traceback without the frames of the launcher and the probe."""
     kept: list[types.TracebackType] = []
     while trace is not None:
         if not trace.tb_frame.f_code.co_filename.startswith(_OWN):

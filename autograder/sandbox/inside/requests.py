@@ -1,10 +1,10 @@
-"""What is said on the sockets: JSON, one packet each, with descriptors beside it.
+"""The messages on the sockets. Each is one packet of JSON, which may be accompanied by descriptors.
 
-To the launcher, with one end of a further SOCK_SEQPACKET pair, on which the first process of the new launch answers:
+To the launcher, with one end of another SOCK_SEQPACKET pair, on which the first process of the new launch answers:
     {"namespaces", "disk", "inodes", "limits", "filter", "program_filter"}
-To a first process, with the descriptors (output, events, stacks):
+To a first process, with the descriptors for output, events and stacks:
     {"id", "path", "folder", "args", "env", "cpus", "cores"}
-Its answers: {"first": true} with its pidfd, {"ready": true} or {"broken": why}, {"started": id} with a pidfd,
+From a first process: {"first": true} with its pidfd, {"ready": true} or {"broken": why}, {"started": id} with a pidfd,
     {"failed": id, "why"}, {"ended": id, "status"}.
 """
 
@@ -16,13 +16,13 @@ from typing import Any
 
 
 class Launch:
-    """A launch that was asked for, and the socket on which its first process answers."""
+    """A requested launch, and the socket on which its first process answers."""
 
     def __init__(self, packet: bytes, channel: socket.socket) -> None:
         """Read the request.
 
         Raises:
-            KeyError: it lacks something.
+            KeyError: the request is incomplete.
         """
         request = json.loads(packet)
         self.channel = channel
@@ -35,13 +35,13 @@ class Launch:
 
 
 class Start:
-    """A program that was asked for, and the descriptors that came with it."""
+    """A program whose start was requested, and the descriptors that came with the request."""
 
     def __init__(self, packet: bytes, descriptors: list[int], launch: Launch) -> None:
-        """Read the request; the rest holds for the whole launch.
+        """Read the request. Other values are those of the whole launch.
 
         Raises:
-            KeyError: it lacks something.
+            KeyError: the request is incomplete.
         """
         request = json.loads(packet)
         self.id: int = request["id"]
@@ -53,14 +53,14 @@ class Start:
         self.cores: int = request["cores"]
         self.limits = launch.limits
         self.filter = launch.program_filter
-        # From the other programs of the launch: its memory and its settings. Without namespaces the limits of memory
-        # could not be held: who counts it is no more than its equal there.
+        # Whether the program's memory and settings in /proc are hidden from the other programs of the launch. Without
+        # namespaces they cannot be hidden, because the process that measures its memory has no more rights than they.
         self.hidden = launch.namespaces
         self.output, self.events, self.stacks = descriptors
 
 
 def answer(channel: socket.socket, said: dict[str, Any]) -> None:
-    """Send an answer. Ends this process if nobody is left to answer to."""
+    """Send an answer. If nobody receives answers any more, end this process."""
     try:
         channel.send(json.dumps(said).encode())
     except OSError:
@@ -68,7 +68,7 @@ def answer(channel: socket.socket, said: dict[str, Any]) -> None:
 
 
 def hand_over(channel: socket.socket, said: dict[str, Any], handle: int) -> None:
-    """Send an answer with a pidfd, if the kernel takes it, and close the pidfd."""
+    """Send an answer with a pidfd, if the kernel accepts it, and close the pidfd."""
     with contextlib.suppress(OSError):
         socket.send_fds(channel, [json.dumps(said).encode()], [handle])
     os.close(handle)

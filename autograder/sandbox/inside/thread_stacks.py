@@ -1,8 +1,8 @@
-"""Where a program's threads are, written when the grader asks for it by a signal.
+"""Writes where a program's threads are when the grader requests it by a signal.
 
-A thread of its own answers. It holds the interpreter's lock while it writes, so that no thread runs meanwhile. Were the
-stacks written by the signal's handler, which takes no lock, then a thread that returns or ends at that moment would
-free what the handler reads, and the program would be ended by signal 11 for being looked at.
+A separate thread answers. It holds the interpreter's lock while it writes, so that no other thread runs meanwhile. If a
+signal handler, which takes no lock, wrote the stacks, a thread that returns or ends at that moment could free data that
+the handler reads, and the program would be ended by signal 11 only because it was observed.
 """
 
 import _thread
@@ -11,20 +11,20 @@ import os
 import signal
 
 STACK_SIGNAL = signal.SIGRTMIN + 10
-"""What `sandbox/running_program.py` asks with."""
+"""The signal by which `sandbox/running_program.py` requests the stacks."""
 
 END = b"\n=\n"
-"""What follows an answer."""
+"""The end of an answer."""
 
 
 def answer(descriptor: int) -> None:
-    """Begin to answer on this descriptor, in a thread that Python's `threading` does not know of."""
-    signal.pthread_sigmask(signal.SIG_BLOCK, [STACK_SIGNAL])  # in the threads of the program, too
+    """Begin to answer on this descriptor, in a thread that Python's `threading` does not know."""
+    signal.pthread_sigmask(signal.SIG_BLOCK, [STACK_SIGNAL])  # all threads of the program inherit this
     _thread.start_new_thread(_answer, (descriptor,))
 
 
 def _answer(descriptor: int) -> None:
-    signal.pthread_sigmask(signal.SIG_BLOCK, signal.valid_signals())  # the program's own go to its own threads
+    signal.pthread_sigmask(signal.SIG_BLOCK, signal.valid_signals())  # other signals go to the program's own threads
     while True:
         signal.sigwait([STACK_SIGNAL])
         faulthandler.dump_traceback(descriptor, all_threads=True)

@@ -1,4 +1,4 @@
-"""Loading, once and before any fork, what every program needs."""
+"""Loads what every program needs, once and before any fork."""
 
 import contextlib
 import functools
@@ -13,12 +13,12 @@ from .probe import attach, rclpy_names
 
 
 def keep_answers(client_class: Any) -> None:
-    """Let an answer wait until the request that it belongs to has been noted, for every action client.
+    """Make every action client process a response only after it has registered the request.
 
-    The client sends a request, and only then notes that it waits for the answer. When another thread spins the node,
-    the answer may be looked at in between: rclpy ignores it with a warning, and the future never ends (ros2/rclpy issue
-    1123; versions after 7.1 hold a lock). How often that happens depends on how busy the machine is, and a verdict must
-    not.
+    The client sends a request, and only then registers that it waits for the response. If another thread spins the
+    node, the response may be processed in between: rclpy ignores it with a warning, and the future is never done
+    (ros2/rclpy issue 1123; versions after 7.1 hold a lock). How often that happens depends on how busy the machine is,
+    and a verdict must not depend on that.
 
     Args:
         client_class: rclpy's `ActionClient`.
@@ -40,7 +40,7 @@ def keep_answers(client_class: Any) -> None:
     @functools.wraps(execute)
     async def execute_after(*args: Any, **kwargs: Any) -> Any:
         with asking:
-            pass  # what was being asked has been noted
+            pass  # all requests that were being sent are registered now
         return await execute(*args, **kwargs)
 
     client_class.execute = execute_after
@@ -71,24 +71,26 @@ def warm_up() -> None:
     """Load what programs need, without joining a ROS domain."""
     prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
     # The ROS libraries' tracer (LTTng) starts threads when it is loaded, and ends them when the process exits. A fork
-    # has not got them, and crashes at its very end. Handlers run last in first out: this one, from before anything
-    # was loaded, runs after every destructor of C++ objects and before the libraries' own finish.
+    # does not have these threads, and crashes when it exits. Exit handlers run in reverse order. This one is registered
+    # before anything is loaded, so it runs after all destructors of C++ objects and before the libraries' own
+    # finalization.
     libc.on_exit(libc._exit, None)
-    gc.disable()  # of what is loaded here nothing is garbage
+    gc.disable()  # nothing that is loaded here is garbage
     load_ros()
     with contextlib.suppress(Exception):
         attach.prepare()
-    with contextlib.suppress(Exception):  # the probe says what of rclpy has moved
+    with contextlib.suppress(Exception):  # the probe reports what has changed in rclpy
         keep_answers(sys.modules["rclpy.action"].ActionClient)
     keep_shared()
-    # After the imports: no program can trace a process of these, or open their memory or descriptors, from here on.
+    # From here on, no program can trace this process or its forks, or open their memory or descriptors. This is done
+    # after the imports.
     prctl(PR_SET_DUMPABLE, 0)
 
 
 def load_ros() -> None:
     """Load rclpy, the usual messages, and the middleware."""
-    # The message packages look for their own generator, and go on without: with the parser of interface files behind
-    # it, it takes as long to load as numpy.
+    # The message packages try to load their own generator, but work without it. It is blocked here because it takes as
+    # long to load as numpy, together with the parser of interface files that it needs.
     sys.modules[_GENERATOR] = None  # type: ignore[assignment]
     for name in _MODULES:
         with contextlib.suppress(ImportError):
@@ -99,12 +101,13 @@ def load_ros() -> None:
         rclpy.get_rmw_implementation_identifier()  # loads the middleware
         for name in _TYPES:
             module, kind = name.split(":")
-            # Private to the message packages' generator; without it the first message loads it, in every program.
+            # This method is private to the message packages' generator. Without this call, the first message would load
+            # the type support in every program.
             getattr(importlib.import_module(module), kind).__class__.__import_type_support__()
     del sys.modules[_GENERATOR]
 
 
 def keep_shared() -> None:
-    """Keep what is loaded by now in memory that forks share."""
-    gc.freeze()  # the collector would write to every object, and so unshare every page
+    """Keep everything that is loaded so far in memory that forks share."""
+    gc.freeze()  # otherwise the collector would write to every object, so that no page stays shared
     gc.enable()

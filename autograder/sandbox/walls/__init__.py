@@ -1,1 +1,1 @@
-"""The walls between programs: namespaces (bubblewrap), Landlock, and the filter of system calls."""
+"""The means that isolate programs: namespaces (bubblewrap), Landlock, and the filter of system calls."""

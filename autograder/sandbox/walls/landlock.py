@@ -1,6 +1,6 @@
-"""Reduced isolation: the kernel's Landlock hides files and signals where there are no user namespaces.
+"""Reduced isolation: if there are no user namespaces, the kernel's Landlock restricts access to files and signals.
 
-It hides neither the network nor the process list. Run as a module it confines itself and becomes another program:
+It hides neither the network nor the process list. Run as a module, it confines itself and becomes another program:
 `python -m autograder.sandbox.walls.landlock READ_ONLY… -- WRITABLE… -- COMMAND…`.
 """
 
@@ -18,11 +18,11 @@ from autograder.sandbox.inside.kernel import filter_calls
 from autograder.sandbox.walls import seccomp
 
 NEEDED_VERSION = 6
-"""The first that also keeps signals and abstract sockets inside."""
+"""The first version that also restricts signals and abstract sockets."""
 
 _CREATE_RULESET, _ADD_RULE, _RESTRICT_SELF = 444, 445, 446
 _EXECUTE, _WRITE_FILE, _READ_FILE, _READ_DIR = 1 << 0, 1 << 1, 1 << 2, 1 << 3
-_ALL_FILES = (1 << 16) - 1  # all accesses of the file system that version 5 and later know
+_ALL_FILES = (1 << 16) - 1  # all kinds of file-system access in version 5 and later
 _FILE_ONLY = _EXECUTE | _WRITE_FILE | _READ_FILE | 1 << 14 | 1 << 15
 _READ = _EXECUTE | _READ_FILE | _READ_DIR
 _SET_SECUREBITS, _ROOT_IS_NOTHING = 28, 0x2F
@@ -33,12 +33,12 @@ _libc = ctypes.CDLL(None, use_errno=True)
 
 
 def version() -> int:
-    """Return the kernel's version of Landlock; 0 if it has none."""
+    """Return the kernel's version of Landlock, or 0 if it has none."""
     return max(0, int(_libc.syscall(_CREATE_RULESET, None, ctypes.c_size_t(0), 1)))
 
 
 def confined(command: Sequence[str], folder: Path, scratch: Path) -> list[str]:
-    """Return `command` so that it sees Python, ROS and `folder`, and writes only to `scratch`."""
+    """Return a command that runs `command` with access to Python, ROS and `folder`, and writing only to `scratch`."""
     readable = [*SYSTEM_FOLDERS, *SYSTEM_FILES, *map(str, python_places().paths), str(folder), "/proc", str(INSIDE)]
     return [
         sys.executable, "-I", "-c", f"import sys; sys.path.append({str(HERE.parent.parent)!r}); "
@@ -48,7 +48,7 @@ def confined(command: Sequence[str], folder: Path, scratch: Path) -> list[str]:
 
 
 def confine(readable: Sequence[str], writable: Sequence[str]) -> None:
-    """Put this process, and all that it starts, under Landlock and the filter of system calls.
+    """Confine this process, and everything that it starts, with Landlock and the filter of system calls.
 
     Raises:
         OSError: the kernel refuses.
@@ -65,7 +65,7 @@ def confine(readable: Sequence[str], writable: Sequence[str]) -> None:
             _checked(_libc.syscall(_ADD_RULE, ruleset, 1, rule, 0))
             os.close(descriptor)
     if os.geteuid() == 0:
-        # Root keeps no capability through the coming exec: some open what Landlock closes.
+        # Root must keep no capability after the following exec, because some of them bypass Landlock.
         _checked(_libc.prctl(_SET_SECUREBITS, _ROOT_IS_NOTHING, 0, 0, 0))
     _checked(_libc.prctl(38, 1, 0, 0, 0))
     _checked(_libc.syscall(_RESTRICT_SELF, ruleset, 0))
@@ -80,7 +80,7 @@ def _checked(result: int) -> int:
 
 
 def main() -> None:
-    """Confine this process, and become the command."""
+    """Confine this process, and run the command in it."""
     readable, rest = _split(sys.argv[1:])
     writable, command = _split(rest)
     confine(readable, writable)

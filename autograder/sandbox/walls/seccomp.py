@@ -1,8 +1,8 @@
-"""The system calls that a student's program is refused, as a filter that the kernel takes.
+"""The system calls that are refused to a student's program, as a filter for the kernel.
 
-A list of what is denied, not of what is allowed: Python and DDS use most of the rest, and namespaces, capabilities and
-limits are the wall. Denied is what passes those: memory that no limit counts, looking into other processes, new
-namespaces, mounts, and the kernel's rarely used corners.
+The filter lists what is denied, not what is allowed, because Python and DDS use most of the other calls, and programs
+are isolated mainly by namespaces, capabilities and limits. It denies what these do not prevent: memory that no limit
+counts, access to other processes, new namespaces, mounts, and rarely used parts of the kernel.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import struct
 
 from autograder.core.errors import KitError
 
-_CALLS = {  # x86-64, the only architecture that the ROS wheels exist for
+_CALLS = {  # x86-64, the only architecture for which the ROS wheels exist
     "shmget": 29, "shmat": 30, "shmctl": 31, "shmdt": 67, "semget": 64, "semop": 65, "semctl": 66, "semtimedop": 220,
     "msgget": 68, "msgsnd": 69, "msgrcv": 70, "msgctl": 71, "mq_open": 240, "memfd_create": 319, "memfd_secret": 447,
     "ptrace": 101, "process_vm_readv": 310, "process_vm_writev": 311, "process_madvise": 440, "pidfd_getfd": 438,
@@ -29,27 +29,27 @@ _CALLS = {  # x86-64, the only architecture that the ROS wheels exist for
     "iopl": 172, "ioperm": 173, "personality": 135, "uselib": 134, "lookup_dcookie": 212, "vhangup": 153,
     "fanotify_init": 300, "modify_ldt": 154, "mbind": 237, "set_mempolicy": 238,
     "migrate_pages": 256, "move_pages": 279, "vmsplice": 278, "tee": 276, "open_tree_attr": 467,
-    # Each rule of Landlock is memory that no limit counts, and what io_setup takes is the whole machine's.
+    # Each rule of Landlock takes memory that no limit counts, and what io_setup takes is shared by the whole machine.
     "landlock_create_ruleset": 444, "landlock_add_rule": 445, "landlock_restrict_self": 446, "io_setup": 206,
 }  # fmt: skip
 _WITH_ARGUMENT = [  # (call, argument, value)
-    # On the first process: slowed down or limited, it would make failing look like our defect.
+    # Calls on the first process: if a program slowed it down or limited it, a failure would look like our defect.
     (302, 0, 1), (203, 0, 1), (142, 0, 1), (144, 0, 1), (314, 0, 1),  # prlimit64, sched_setaffinity, …param, …attr
-    (141, 1, 1), (141, 0, 2), (251, 1, 1), (251, 0, 3),  # setpriority and ioprio_set, of it or of all of a user's
-    # fcntl's locks of parts of a file: each costs the kernel memory that no limit counts.
+    (141, 1, 1), (141, 0, 2), (251, 1, 1), (251, 0, 3),  # setpriority, ioprio_set: on it, or on a user
+    # fcntl's locks on parts of a file: each costs the kernel memory that no limit counts.
     (72, 1, 6), (72, 1, 7), (72, 1, 37), (72, 1, 38),
 ]  # fmt: skip
 _CLONE, _FORK, _VFORK, _CLONE3, _SOCKET, _SOCKETPAIR = 56, 57, 58, 435, 41, 53
-_NAMESPACE_FLAGS = 0x7E020000  # every CLONE_NEW* that clone takes
+_NAMESPACE_FLAGS = 0x7E020000  # every CLONE_NEW* flag of clone
 _THREAD_FLAG, _SHARED_FILES_FLAG = 0x10000, 0x400
 _UNIX, _IPV4, _IPV6, _NETLINK = 1, 2, 10, 16
 _DATAGRAM, _ROUTE = 2, 0
-_SETSOCKOPT, _SOL_SOCKET, _BUFFER_SIZES = 54, 1, (7, 8, 32, 33)  # SO_SNDBUF, SO_RCVBUF, and by force
+_SETSOCKOPT, _SOL_SOCKET, _BUFFER_SIZES = 54, 1, (7, 8, 32, 33)  # SO_SNDBUF, SO_RCVBUF, and their *FORCE variants
 _SOL_IPV6, _FLOW_LABELS = 41, 32
 
 _LOAD, _AND, _EQUAL, _SET, _AT_LEAST, _RETURN = 0x20, 0x54, 0x15, 0x45, 0x35, 0x06
 _NUMBER, _ARGUMENTS = 0, 16
-"""Where the number of a call lies, and where its arguments begin: eight bytes each, the lower half first."""
+"""The offset of a call's number, and that of its arguments, which have eight bytes each, with the lower half first."""
 _ALLOW, _ERRNO, _KILL = 0x7FFF0000, 0x00050000, 0x80000000
 _ARCHITECTURE = 0xC000003E
 
@@ -75,10 +75,11 @@ def filter_program() -> bytes:
     for number, argument, value in _WITH_ARGUMENT:
         program += [_step(_EQUAL, number, 0, 4), _step(_LOAD, _ARGUMENTS + 8 * argument), _step(_EQUAL, value, 0, 1)]
         program += [_REFUSE, _step(_LOAD, _NUMBER)]
-    # A flow label outlives its socket, and so its launch: a program could count the launches.
+    # A flow label continues to exist after its socket and its launch, so a program could use it to count the launches.
     program += [_step(_EQUAL, _SETSOCKOPT, 0, 6), _step(_LOAD, _ARGUMENTS + 8), _step(_EQUAL, _SOL_IPV6, 0, 3)]
     program += [_step(_LOAD, _ARGUMENTS + 16), _step(_EQUAL, _FLOW_LABELS, 0, 1), _REFUSE, _step(_LOAD, _NUMBER)]
-    # Sockets keep the buffers they are born with, and are told otherwise: what lies in them is in no limit.
+    # Calls that set the size of a socket's buffers have no effect, although they report success, because no limit
+    # counts what is in these buffers.
     sizes = [_step(_EQUAL, option, len(_BUFFER_SIZES) - place, 0) for place, option in enumerate(_BUFFER_SIZES)]
     checks = [
         _step(_LOAD, _ARGUMENTS + 8),
@@ -95,7 +96,10 @@ def filter_program() -> bytes:
 
 
 def _socket_checks() -> list[bytes]:
-    """Unix sockets; UDP; and netlink for listing the interfaces. TCP's buffers are megabytes that no limit counts."""
+    """Return checks that allow Unix sockets, UDP, and netlink for listing the network interfaces.
+
+    TCP is refused, because its buffers take megabytes that no limit counts.
+    """
     return [
         _step(_LOAD, _ARGUMENTS),
         _step(_EQUAL, _UNIX, 10, 0), _step(_EQUAL, _IPV4, 3, 0), _step(_EQUAL, _IPV6, 2, 0),
@@ -108,10 +112,10 @@ def _socket_checks() -> list[bytes]:
 
 
 def no_processes() -> bytes:
-    """Return a further filter, for one program of a student's: it may start threads, but no process.
+    """Return an additional filter for one student's program, which may then start threads, but no processes.
 
-    A node needs none, and the processes of a fork bomb, hundreds at once, take the CPUs from every other submission
-    for seconds before any limit ends them.
+    A node needs no other processes, and the hundreds of processes of a fork bomb take the CPUs from all other
+    submissions for seconds before a limit ends them.
 
     Raises:
         KitError: this machine is not x86-64.
@@ -119,18 +123,18 @@ def no_processes() -> bytes:
     program = _beginning()
     for number in (_FORK, _VFORK):
         program += [_step(_EQUAL, number, 0, 1), _REFUSE]
-    # A thread with open files of its own would multiply what their limit allows.
+    # A thread with its own table of open files would multiply the number of files that the limit allows.
     program += [_step(_EQUAL, _CLONE, 0, 4), _step(_LOAD, _ARGUMENTS)]
     program += [_step(_SET, _THREAD_FLAG, 0, 1), _step(_SET, _SHARED_FILES_FLAG, 1, 0), _REFUSE]
     return b"".join([*program, _step(_RETURN, _ALLOW)])
 
 
 def _beginning() -> list[bytes]:
-    """What every filter begins with; the number of the call is loaded after it."""
+    """Return the beginning of every filter, which ends with loading the number of the call."""
     if platform.machine() != "x86_64":
         raise KitError(f"The sandbox's filter of system calls is written for x86_64, not {platform.machine()}.")
     return [
         _step(_LOAD, 4), _step(_EQUAL, _ARCHITECTURE, 1, 0), _step(_RETURN, _KILL),
         _step(_LOAD, _NUMBER), _step(_AT_LEAST, 0x40000000, 0, 1), _step(_RETURN, _KILL),  # the x32 calls
-        _step(_EQUAL, _CLONE3, 0, 1), _step(_RETURN, _ERRNO | errno.ENOSYS),  # its flags are out of reach: use clone
+        _step(_EQUAL, _CLONE3, 0, 1), _step(_RETURN, _ERRNO | errno.ENOSYS),  # no filter sees its flags: use clone
     ]  # fmt: skip

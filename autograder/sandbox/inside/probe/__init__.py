@@ -1,12 +1,13 @@
-"""Notes what a program does with rclpy, as JSON lines: for hints only, never for points; a program can forge them.
+"""Notes what a program does with rclpy, as JSON lines. They are used for hints only, never for points.
 
-It runs inside the student's process and must never change what the program does, or end it. So every note is made in
-a `quiet` block, the wrapped function is called with its own arguments, and what it returns or raises goes on as it is.
-Wrappers are installed once, in the launcher; a forked program only says where to write. What cannot be wrapped in some
-version of rclpy is said by a `probe_failed` event, and then nothing is concluded from what the others say.
+A program can forge the notes. The probe runs inside the student's process and must never change what the program does,
+or end it. Therefore every note is made in a `quiet` block, the wrapped function is called with unchanged arguments, and
+its result or exception is passed on unchanged. The wrappers are installed once, in the launcher; a forked program only
+sets where to write. If something cannot be wrapped in a version of rclpy, a `probe_failed` event says so, and then
+nothing is concluded from the other events.
 
-There are two kinds of lines. *Events* happen: an error in a callback, a wrong return value. *Records* stand for things
-(a node, an executor, a timer, a call that may block) with what has become of them so far: how often, on how many
-threads, since when. A record has a `key` and is written again when it has changed, soon but not at once; only its last
-line counts. `events.py` defines both; `autograder/diagnosis/inside.py` reads them.
+There are two kinds of lines. An *event* is something that happens, such as an error in a callback or a wrong return
+value. A *record* describes the current state of a thing (a node, an executor, a timer, a call that may block): how
+often it ran, on how many threads, since when. A record has a `key` and is written again soon after it has changed. Only
+its last line counts. `events.py` defines both kinds, and `autograder/diagnosis/inside.py` reads them.
 """

@@ -1,4 +1,4 @@
-"""Attaching the probe: to rclpy once, in the launcher; to a program's pipe after the fork."""
+"""Attaches the probe: to rclpy once, in the launcher, and to a program's pipe after the fork."""
 
 import atexit
 import importlib
@@ -31,7 +31,7 @@ _failed: list[str] = []
 
 
 def prepare() -> list[str]:
-    """Put the notes around rclpy's functions; return what of rclpy cannot be watched, a sentence each."""
+    """Wrap rclpy's functions, and return one sentence for each part of rclpy that cannot be watched."""
     rclpy: Any = importlib.import_module("rclpy")
     for name in _MODULES:
         importlib.import_module(f"rclpy.{name}")
@@ -45,7 +45,7 @@ def prepare() -> list[str]:
 
 
 def begin(descriptor: int, folder: str) -> None:
-    """Begin to write to a descriptor; the program's own lines are those of files in `folder`."""
+    """Begin to write to a descriptor. The student's own lines are those of files in `folder`."""
     open_channel(descriptor)
     student_lines.own_files_are_in(folder)
     for what in _failed:
@@ -57,5 +57,5 @@ def begin(descriptor: int, folder: str) -> None:
 
 
 def note_memory_error() -> None:
-    """Say that the program ends for want of memory."""
+    """Note that the program ends because it ran out of memory."""
     emit(events.MemoryFailed())

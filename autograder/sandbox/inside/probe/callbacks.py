@@ -1,4 +1,4 @@
-"""Callbacks while they run: on which thread, how they end, what they return, what they await, and which calls block."""
+"""Watches running callbacks: their threads, how they end, what they return and await, and which calls block."""
 
 import functools
 import inspect
@@ -17,25 +17,25 @@ from .writing import PAUSE, emit, emit_once, ledger, quiet
 
 
 class ActionCallback(NamedTuple):
-    """What is known of a callback of an action server."""
+    """The information about a callback of an action server."""
 
     thing: Thing
     expected: type | None
-    """What it must return."""
+    """The type that it must return."""
     node: "weakref.ref[Any]"
 
 
 action_callbacks: dict[Any, ActionCallback] = {}
-"""Callback of an action server -> what is known of it."""
+"""The information about each callback of an action server."""
 
 asked_by: "weakref.WeakKeyDictionary[Any, int]" = weakref.WeakKeyDictionary()
-"""Future of a service call -> number of the client."""
+"""For the future of each service call: the number of the client."""
 
 _by_line: dict[tuple[str, ...], Thing] = {}
 
 
 class _OnThread:
-    """While a callback is on a thread; an error that leaves it is noted."""
+    """A block in which a thread runs a callback. An exception that leaves the callback is noted."""
 
     def __init__(self, thing: Thing, executor: Executor | None) -> None:
         self.thing, self.executor = thing, executor
@@ -67,13 +67,13 @@ class _OnThread:
 
 
 class _Steps:
-    """Awaits a coroutine callback; between its steps the thread is not inside the callback."""
+    """Awaits a coroutine callback. Between its steps, the thread is not inside the callback."""
 
     def __init__(self, coroutine: Any, thing: Thing, executor: Executor | None) -> None:
         self.coroutine, self.thing, self.executor = coroutine, thing, executor
 
     def __await__(self) -> Any:
-        # rclpy asks a coroutine that awaits again and again, without a pause, so most of these steps must cost little.
+        # rclpy resumes an awaiting coroutine continuously, without a pause, so most of these steps must be cheap.
         steps, sent, thing, look = self.coroutine.__await__(), None, self.thing, 0.0
         while True:
             try:
@@ -99,7 +99,7 @@ class _Steps:
 
 
 async def await_or_execute(callback: Any, *args: Any) -> Any:
-    """As rclpy's own function of this name, with a note of what goes on."""
+    """Do the same as rclpy's own function of this name, and note the run of the callback."""
     taken, here.taken = here.taken, None
     thing, executor = taken or _of_an_action(callback)
     run = thing.begin()
@@ -121,9 +121,10 @@ async def await_or_execute(callback: Any, *args: Any) -> Any:
 
 
 def _of_an_action(callback: Any) -> tuple[Thing, Executor | None]:
-    """A callback of an action server, and its executor; or of something that rclpy does not let us see.
+    """Return the thing and the executor of an action server's callback.
 
-    The latter is not written down, only used on this thread.
+    For a callback of something that cannot be watched, return a new thing that is not written, but only used on this
+    thread.
     """
     with quiet():
         known = action_callbacks[callback]
@@ -152,7 +153,7 @@ def _bad_return(kind: str, callback: Any, result: Any, expected: type) -> None:
 
 
 def noted(kind: str, callback: Callable[..., Any], node: str, expected: type | None) -> Callable[..., Any]:
-    """The callback with notes; `expected` is the type that it must return."""
+    """Return a wrapper that notes the runs of a callback; `expected` is the type that the callback must return."""
     where = callback_line(callback)
     key = (kind, node, where.line)
     if key not in _by_line:
@@ -180,7 +181,7 @@ def noted(kind: str, callback: Callable[..., Any], node: str, expected: type | N
 
 
 def watch_blocking(rclpy: Any) -> None:
-    """Wrap the calls that wait for an answer, a service, a rate or the end."""
+    """Wrap the functions that wait for a response, a service or a rate, and those that shut down."""
     wrap_blocking(rclpy.client.Client, "call", "client.call", seen=True)
     wrap_blocking(rclpy.client.Client, "wait_for_service", "wait_for_service", seen=True)
     wrap_blocking(rclpy.action.ActionClient, "send_goal", "action_client.send_goal", seen=True)
@@ -199,7 +200,7 @@ def watch_blocking(rclpy: Any) -> None:
 
 
 def watch_callbacks(rclpy: Any) -> None:
-    """Take the place of what runs callbacks, and let tasks be seen."""
+    """Replace the function that runs callbacks, and wrap the creation of tasks."""
     for module in rclpy_names.callers_of_callbacks(rclpy):
         if not hasattr(module, rclpy_names.RUN_CALLBACK):
             raise AttributeError(f"{module.__name__}.{rclpy_names.RUN_CALLBACK}")
@@ -218,7 +219,7 @@ def watch_callbacks(rclpy: Any) -> None:
 
 
 def watch_threads() -> None:
-    """Note what ends a thread of the program's own."""
+    """Note exceptions that end a thread which the program started itself."""
     before = threading.excepthook
 
     def hook(args: Any) -> None:

@@ -1,4 +1,4 @@
-"""What a program's probe writes: one class for each kind of line. The diagnosis reads the lines into the same classes.
+"""The lines that a program's probe writes, with one class for each kind. The diagnosis reads them into these classes.
 
 Times are seconds of the system's monotonic clock, which is the same in every process of a machine. Fields that have a
 default may be missing in a line: a program can forge its lines.
@@ -23,7 +23,7 @@ class Where:
 
 @dataclass(frozen=True, kw_only=True)
 class Attached:
-    """The probe works."""
+    """The probe is attached and works."""
 
     e: Literal["attached"] = "attached"
 
@@ -50,7 +50,7 @@ class CallbackError(Where):
     e: Literal["callback_error"] = "callback_error"
     kind: str = ""
     name: str = ""
-    """Full name of the topic or service, if it has one."""
+    """The full name of the topic or service; empty if there is none."""
     when: float = 0.0
     type: str
     text: str = ""
@@ -103,7 +103,7 @@ class Ran:
 
     e: Literal["ran"] = "ran"
     runs: list[tuple[int, float, float, int]]
-    """Number of the thing, begin, end, and thread; a message begins and ends at the same time."""
+    """The number of the thing, the begin, the end, and the thread. A message begins and ends at the same time."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -119,29 +119,29 @@ class Awaits(Where):
     """The line where a coroutine callback waits; empty if it does not wait."""
 
     client: int = 0
-    """The client whose answer it awaits, if it awaits one."""
+    """The number of the client whose response it awaits, if it awaits one."""
     since: float = 0.0
 
 
 @dataclass(frozen=True, kw_only=True)
 class ThingMade(Where):
-    """What is known of a thing when it is made; `line` is where its callback begins."""
+    """The information about a thing when it is created; `line` is where its callback begins."""
 
     kind: str
     name: str = ""
-    """Full name on the graph."""
+    """The full name on the graph."""
     given: str = ""
     """The name in the code, before namespace and remap rules are applied."""
     node: str = ""
     made: str = ""
-    """The line that made it."""
+    """The line that created it."""
     group: str = ""
     group_id: int = 0
     default_group: bool = False
     period: float = 0.0
     cancelled: bool = False
     cancelled_in: str = ""
-    """The line that cancelled it last, also if it has been reset since."""
+    """The line that cancelled it last, even if it has been reset since then."""
     cancelled_at: float = 0.0
     destroyed: bool = False
 
@@ -153,23 +153,24 @@ class Thing(ThingMade):
     e: Literal["thing"] = "thing"
     id: int
     runs: int = 0
-    """How often its callback began; of a publisher: messages, of a client: requests, of an action server: feedback."""
+    """How often its callback began. For a publisher, this is the number of messages, for a client that of requests, and
+    for an action server that of feedback messages."""
     done: int = 0
-    """How often its callback ended; of a client: answers taken."""
+    """How often its callback ended. For a client, this is the number of responses that were taken."""
     raised: int = 0
     most: int = 0
-    """The largest number of its runs that were under way at once."""
+    """The largest number of its runs at the same time."""
     last: float = 0.0
     """When it last began."""
     spent: float = 0.0
-    """Seconds that its complete runs took together."""
+    """The seconds that its completed runs took together."""
     running: list[tuple[float, int]] = field(default_factory=list)
-    """The runs that are under way: since when, and on which thread."""
+    """The current runs: since when each is running, and on which thread."""
     threads: int = 0
-    """On how many threads it ran; of a publisher: from how many threads it was used."""
+    """The number of threads on which it ran, or from which a publisher was used."""
     awaits: Awaits = Awaits()
     awaited: str = ""
-    """The line where a run of it last awaited."""
+    """The line in which one of its runs last awaited something."""
 
     @property
     def exclusive(self) -> bool:
@@ -178,82 +179,82 @@ class Thing(ThingMade):
 
     @property
     def has_callback(self) -> bool:
-        """Whether an executor runs a callback of the student's for it."""
+        """Whether an executor runs a callback for it."""
         return self.kind in ("timer", "subscription", "service")
 
     @property
     def takes_time(self) -> bool:
-        """Whether its runs last so long that whatever waits for their end notices it."""
+        """Whether its runs take so long that whatever waits for their end notices it."""
         return bool(self.running) or self.spent > _NOTICED * self.done
 
 
 @dataclass(frozen=True, kw_only=True)
 class Call(Where):
-    """A call that may block, from one line."""
+    """The calls in one line of a function that may block."""
 
     e: Literal["call"] = "call"
     what: str
-    """client.call, wait_for_service, action_client.send_goal, rate.sleep, spin or shutdown."""
+    """One of client.call, wait_for_service, action_client.send_goal, rate.sleep, spin and shutdown."""
     in_callback: bool
     callback: int = 0
     target: int = 0
     begun: int
     ended: int
     vain: int = 0
-    """How often it spun until a future was done, and came back before that."""
+    """How often it should have spun until a future was done, but returned before that."""
     since: float = 0.0
     """When it last began."""
     thread: int = 0
 
     @property
     def blocks(self) -> bool:
-        """Whether it has not come back."""
+        """Whether a call has not returned."""
         return self.begun > self.ended
 
 
 @dataclass(frozen=True, kw_only=True)
 class ExecutorSeen:
-    """An executor."""
+    """The state of an executor."""
 
     e: Literal["executor"] = "executor"
     id: int
     type: str = ""
     threads: int | None = None
-    """Of a multi-threaded one."""
+    """The number of threads of a multi-threaded executor; None for other executors."""
     threads_given: bool | None = None
     nodes: list[str] = field(default_factory=list)
     spins: int = 0
     spinning: bool = False
     main: bool = False
-    """The program's main thread is in its `spin`, which goes on until the end."""
+    """Whether the program's main thread is in its `spin`, which does not return before shutdown."""
     busy: int = 0
-    """How many callbacks are on its threads now."""
+    """How many callbacks its threads are running now."""
     most: int = 0
-    """The largest number of callbacks that were on its threads at once."""
+    """The largest number of callbacks that its threads were running at once."""
 
     @property
     def size(self) -> int:
-        """How many callbacks it can run at once."""
+        """The number of callbacks that it can run at once."""
         return self.threads or 1
 
 
 @dataclass(frozen=True, kw_only=True)
 class NodeSeen:
-    """A node, from the end of `Node.__init__` on."""
+    """The state of a node, which is known from the end of `Node.__init__` on."""
 
     e: Literal["node"] = "node"
     name: str
     made: float = 0.0
     spun: float = 0.0
-    """When it was last seen in an executor that was spinning; 0: never."""
+    """When it was last seen in a spinning executor; 0 if never."""
     destroyed: bool = False
     foreign: bool = False
-    """It is in an executor that the probe does not watch."""
+    """Whether it is in an executor that the probe does not watch."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class ParameterSeen:
-    """A parameter of a node."""
+    """The state of a parameter of a node."""
 
     e: Literal["parameter"] = "parameter"
     node: str
@@ -266,7 +267,7 @@ class ParameterSeen:
 
 
 Record = Thing | Call | ExecutorSeen | NodeSeen | ParameterSeen
-"""What is known of a thing so far: written again whenever it has changed."""
+"""The current state of a thing. A record is written again whenever it has changed."""
 
 Event = (
     Attached

@@ -1,6 +1,6 @@
-"""Every private name of rclpy that is used inside a program, and whether the installed rclpy still has them.
+"""All private names of rclpy that are used inside a program, and a check that the installed rclpy still has them.
 
-Written for rclpy 7.1, the one of Jazzy. What rclpy promises to everyone is used where it is needed.
+They are those of rclpy 7.1, which belongs to Jazzy. Public names of rclpy are not listed here.
 """
 
 import inspect
@@ -8,15 +8,15 @@ from collections.abc import Iterator
 from typing import Any
 
 TAKES = ("_take_timer", "_take_subscription", "_take_service")
-"""Methods of `Executor` that take what is ready and return the coroutine function that runs its callback."""
+"""The methods of `Executor` that take a ready entity and return the coroutine function that runs its callback."""
 TAKE_ANSWER = "_take_client"
 SET_PARAMETERS = "_set_parameters_atomically"
-"""Of `Node`: what every way of setting parameters comes to."""
+"""The method of `Node` that every way of setting parameters calls in the end."""
 ACTION_REQUESTS = ("send_goal_async", "_cancel_goal_async", "_get_result_async")
-"""Methods of `ActionClient` that send a request and note that its answer is waited for."""
+"""The methods of `ActionClient` that send a request and register that its response is expected."""
 REGISTER_TRANSITION = "_LifecycleNodeMixin__register_callback"
 RUN_CALLBACK = "await_or_execute"
-"""What runs a callback: a function, imported by name into each module that uses it."""
+"""The function that runs a callback. Each module that uses it imports it by name."""
 
 
 def callers_of_callbacks(rclpy: Any) -> tuple[Any, ...]:
@@ -25,28 +25,28 @@ def callers_of_callbacks(rclpy: Any) -> tuple[Any, ...]:
 
 
 def nodes_of(executor: Any) -> list[Any]:
-    """Return an executor's nodes; its own `get_nodes` would wait for its lock."""
+    """Return an executor's nodes. The executor's own `get_nodes` would wait for its lock."""
     return list(executor._nodes)
 
 
 def thread_count(executor: Any) -> int | None:
-    """Return how many threads a multi-threaded executor has."""
+    """Return how many threads a multi-threaded executor has; None for another executor."""
     count: int | None = getattr(getattr(executor, "_executor", None), "_max_workers", None)
     return count
 
 
 def is_of_a_rate(group: Any, node: Any) -> bool:
-    """Whether a callback group is the one of the timers below the `Rate`s of a node."""
+    """Whether a callback group is that of the timers of a node's `Rate` objects."""
     return group is not None and group is getattr(node, "_rate_group", None)
 
 
 def action_callbacks(server: Any) -> tuple[Any, Any, Any, Any]:
-    """Return what runs a goal of an action server, what decides about one, what cancels one, what has accepted one."""
+    """Return the execute, goal, cancel and accepted callbacks of an action server."""
     return server._execute_callback, server._goal_callback, server._cancel_callback, server._handle_accepted_callback
 
 
 def server_parts(server: Any) -> tuple[Any, Any]:
-    """Return the node of an action server, and its action class."""
+    """Return the node and the action class of an action server."""
     return server._node, server.action_type
 
 
@@ -61,9 +61,9 @@ def lifecycle_state(node: Any) -> str:
 
 
 def moved(rclpy: Any) -> list[str]:
-    """Return a sentence for each of these names that the installed rclpy does not have, or has otherwise.
+    """Return a sentence for each of these names that is missing or different in the installed rclpy.
 
-    Asked before anything is wrapped.
+    Call this before anything is wrapped.
     """
     return [
         f"The probe uses {name} of rclpy, which the installed version {what}." for name, what in _differences(rclpy)
@@ -87,7 +87,7 @@ def _differences(rclpy: Any) -> Iterator[tuple[str, str]]:
         yield f"Node.{SET_PARAMETERS}", "does not have"
     if not hasattr(rclpy.lifecycle.node._rclpy.LifecycleStateMachine, "current_state"):
         yield "LifecycleStateMachine.current_state", "does not have"
-    # What an object only gets when it is made is found among the names that the code which makes it uses.
+    # Attributes that an object gets when it is created are looked for in the names that the creating code uses.
     for owner, method, name in (
         (rclpy.executors.Executor, "__init__", "_nodes"),
         (rclpy.executors.MultiThreadedExecutor, "__init__", "_executor"),

@@ -1,4 +1,4 @@
-"""The records of things and executors, and what each thread of the program is doing."""
+"""The records of things and executors, and the current activity of each thread of the program."""
 
 import _thread
 import dataclasses
@@ -12,26 +12,26 @@ from .writing import ledger, quiet
 
 
 class Thing:
-    """A timer, subscription, service, client, publisher or action server, or another kind of callback."""
+    """The record of a timer, subscription, service, client, publisher or action server, or of another callback."""
 
     dirty = False
 
     def __init__(self, about: events.ThingMade) -> None:
-        """Begin with no run; `about` may change."""
+        """Begin without runs; `about` can be replaced later."""
         self.number = next(ledger.numbers)
         self.key = f"thing{self.number}"
         self.about = about
         self.runs = self.done = self.raised = self.most = 0
         self.last = 0.0
         self.running: dict[int, tuple[float, int]] = {}
-        """Run -> since when, and on which thread it began."""
+        """For each current run: when it began, and on which thread."""
         self.threads: set[int] = set()
         self.awaits = events.Awaits()
         self.awaited = ""
         self.spent = 0.0
 
     def event(self) -> events.Thing:
-        """Return its line as it is now."""
+        """Return the record's line in its current state."""
         return events.Thing(
             id=self.number,
             **vars(self.about),
@@ -48,7 +48,7 @@ class Thing:
         )
 
     def begin(self) -> int:
-        """Note that a run of it begins; return its number."""
+        """Note that a run begins, and return the number of the run."""
         with ledger.lock:
             self.runs += 1
             run = self.runs
@@ -60,7 +60,7 @@ class Thing:
         return run
 
     def end(self, run: int, raised: bool) -> None:
-        """Note that a run of it is over."""
+        """Note that a run has ended."""
         with ledger.lock:
             now = time.monotonic()
             began, thread = self.running.pop(run)
@@ -71,7 +71,7 @@ class Thing:
         ledger.touch(self)
 
     def count(self) -> None:
-        """Note one more message published, or request sent."""
+        """Note that one more message was published, or one more request was sent."""
         with ledger.lock:
             self.runs += 1
             self.last = time.monotonic()
@@ -80,19 +80,19 @@ class Thing:
         ledger.touch(self)
 
     def note(self, **changes: Any) -> None:
-        """Change what is known about it."""
+        """Change the information about the thing."""
         self.about = dataclasses.replace(self.about, **changes)
         ledger.touch(self)
 
 
 def thing_of(entity: Any) -> Thing | None:
-    """Return the record of an object of rclpy, if it is a thing and is known."""
+    """Return the record of an object of rclpy if it is a known thing; otherwise None."""
     found = ledger.known.get(entity)
     return found if isinstance(found, Thing) else None
 
 
 def group_of(group: Any, node: Any) -> dict[str, Any]:
-    """Return what a thing's record says of its callback group, as fields of `ThingMade`."""
+    """Return the information about a thing's callback group, as fields of `ThingMade`."""
     if group is None:
         return {}
     return {
@@ -103,23 +103,23 @@ def group_of(group: Any, node: Any) -> dict[str, Any]:
 
 
 def node_name(node: Any) -> str:
-    """Return a node's full name; "" where it does not say."""
+    """Return a node's full name, or "" if the node cannot return it."""
     with quiet():
         return str(node.get_fully_qualified_name())
     return ""
 
 
 _MOST = 8
-"""Executors that are written whenever anything is."""
+"""The number of executors whose records are written whenever any record is written."""
 
 
 class Executor:
-    """An executor: which nodes it holds, whether it is spun, how many callbacks it ran at once."""
+    """The record of an executor: which nodes it contains, whether it is spinning, how many callbacks it ran at once."""
 
     dirty = False
 
     def __init__(self, executor: Any) -> None:
-        """Begin with one that was just made."""
+        """Begin with an executor that was just created."""
         self.number = next(ledger.numbers)
         self.key = f"executor{self.number}"
         self.executor = weakref.ref(executor)
@@ -127,7 +127,7 @@ class Executor:
         self.spins = self.spinning = self.main = self.busy = self.most = 0
 
     def event(self) -> events.ExecutorSeen:
-        """Return its line as it is now."""
+        """Return the record's line in its current state."""
         executor = self.executor()
         return events.ExecutorSeen(
             id=self.number,
@@ -143,14 +143,14 @@ class Executor:
         )
 
     def step(self, change: int) -> None:
-        """Note that a callback came onto a thread of it (1), or left it (-1)."""
+        """Note that one of its threads begins (1) or stops (-1) running a callback."""
         with ledger.lock:
             self.busy += change
             if self.busy > self.most:
                 self.most = self.busy
 
     def spin(self, change: int, long: bool = False) -> None:
-        """Note that something began to spin it (1), or ended that (-1), or that its nodes have changed (0)."""
+        """Note that it begins to spin (1), that it stops spinning (-1), or that its nodes have changed (0)."""
         with ledger.lock:
             if long and threading.current_thread() is threading.main_thread():
                 self.main += change
@@ -174,7 +174,7 @@ class Executor:
 
 
 def executor_of(executor: Any) -> Executor:
-    """Return the record of an executor, made now if there is none."""
+    """Return the record of an executor, and create it if there is none."""
     known: Executor | None = ledger.known.get(executor)
     if known is None:
         known = Executor(executor)
@@ -185,16 +185,17 @@ def executor_of(executor: Any) -> Executor:
 
 
 class ThreadState(threading.local):
-    """What this thread is doing."""
+    """The current activity of this thread."""
 
     callback: "Thing | None" = None
-    """The callback that it runs."""
+    """The callback that the thread is running."""
     taken: Any = None
-    """(thing, executor) of the callback that rclpy is about to run."""
+    """The thing and the executor of the callback that rclpy is about to run."""
     depth = 0
-    """How many noted calls of rclpy are on the stack since the innermost callback began: rclpy calls itself."""
+    """The number of noted calls on the stack since the innermost callback began. It is more than 1 if rclpy calls
+    itself."""
     building = False
-    """Inside `Node.__init__`: what is made there is rclpy's own."""
+    """Whether the thread is inside `Node.__init__`. Things that are created there are rclpy's own."""
 
 
 here = ThreadState()

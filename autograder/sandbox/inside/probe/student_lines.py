@@ -1,4 +1,4 @@
-"""Lines of the student's own files: which one is being run, raised, awaited, or begins a callback."""
+"""Finds lines in the student's own files: the running line, one that raised or awaits, or where a callback begins."""
 
 import inspect
 import linecache
@@ -11,16 +11,16 @@ from .events import Where
 
 class _Own:
     folder = "\0"
-    """Begins the path of every file of the student's."""
+    """The beginning of the path of every student's file."""
 
 
 def own_files_are_in(folder: str) -> None:
-    """Say where the student's files are."""
+    """Set the folder of the student's files."""
     _Own.folder = folder.rstrip("/") + "/"
 
 
 def own_line() -> Where:
-    """Where in the student's own files this thread is."""
+    """Return the line of the student's own files that this thread is executing."""
     frame: Any = sys._getframe(1)
     while frame is not None:
         if frame.f_code.co_filename.startswith(_Own.folder):
@@ -30,7 +30,10 @@ def own_line() -> Where:
 
 
 def error_line(error: BaseException) -> Where:
-    """The innermost line of the student's files that an exception has passed, and the one in another file before it."""
+    """Return the innermost line of the student's files in an exception's traceback.
+
+    If another of the student's files called the file of that line, the line of that call is included.
+    """
     passed: list[tuple[str, int]] = []
     trace = error.__traceback__
     while trace is not None:
@@ -45,7 +48,7 @@ def error_line(error: BaseException) -> Where:
 
 
 def callback_line(callback: Any) -> Where:
-    """Where a callback of the student's begins."""
+    """Return the line in which a student's callback begins."""
     function = inspect.unwrap(getattr(callback, "__func__", callback))
     code = getattr(function, "__code__", None)
     if code is None or not code.co_filename.startswith(_Own.folder):
@@ -54,7 +57,7 @@ def callback_line(callback: Any) -> Where:
 
 
 def awaited_line(coroutine: Any) -> tuple[Where, Any]:
-    """The student's line that awaits, and the object whose `__await__` it has come to, if any."""
+    """Return the student's line that awaits something, and the object whose `__await__` is running, if there is one."""
     found, target = nowhere(), None
     inner = coroutine
     while inner is not None:
@@ -69,7 +72,7 @@ def awaited_line(coroutine: Any) -> tuple[Where, Any]:
 
 
 def nowhere() -> Where:
-    """No line of the student's."""
+    """Return an empty place, which is in none of the student's lines."""
     return Where()
 
 

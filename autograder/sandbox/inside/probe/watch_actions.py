@@ -1,4 +1,4 @@
-"""Action servers: their callbacks, the feedback they publish, and goals that are left without an end."""
+"""Watches action servers: their callbacks, the feedback that they publish, and goals that never end."""
 
 import functools
 import weakref
@@ -16,11 +16,12 @@ KINDS = ("execute", "goal", "cancel", "accepted")
 """The callbacks of an action server, in the order of `rclpy_names.action_callbacks`."""
 
 _LOOKED_AT = 30
-"""How many feedback messages of an action server are looked at: often the last one only has a whole number."""
+"""The number of feedback messages of an action server that are checked. More than one is checked because often only the
+last one has an integer."""
 
 
 def watch_actions(rclpy: Any) -> None:
-    """Wrap how action servers are made, and what is done with their goals."""
+    """Wrap the creation of action servers, and the functions that execute goals and publish feedback."""
     server_class, goal_class = rclpy.action.ActionServer, rclpy.action.server.ServerGoalHandle
 
     def made(_: None, server: Any, node: Any, action_type: Any, *args: Any, **kwargs: Any) -> None:
@@ -40,7 +41,7 @@ def watch_actions(rclpy: Any) -> None:
                 _add(kind, callback, expected, server, node)
 
     def scheduled(server: Any, _goal: Any, callback: Any = None) -> None:
-        # A goal may be executed by another callback than the one that the server was made with.
+        # A goal may be executed by another callback than the one with which the server was created.
         if callback is not None and callback not in action_callbacks:
             node, action_type = rclpy_names.server_parts(server)
             _add("execute", callback, action_type.Result, server, node)
@@ -62,7 +63,7 @@ def watch_actions(rclpy: Any) -> None:
             raise
         if thing is not None:
             thing.count()
-            if thing.runs <= _LOOKED_AT:  # a number of the wrong type is sent as another one, without an error
+            if thing.runs <= _LOOKED_AT:  # a number of the wrong type is sent as a different number, without an error
                 with quiet():
                     note_misfit("feedback", thing.about.name, feedback, server.action_type.Feedback)
 
@@ -70,7 +71,7 @@ def watch_actions(rclpy: Any) -> None:
 
 
 def _full_name(node: Any, given: Any) -> str:
-    """An action's name on the graph: the one of its services, without their ending."""
+    """Return an action's name on the graph, which is the name of its services without their ending."""
     with quiet():
         return str(node.resolve_service_name(f"{given}/_action/send_goal")).removesuffix("/_action/send_goal")
     return ""

@@ -1,4 +1,4 @@
-"""Executors: which are made, which nodes they get, when they are spun, which callbacks they take."""
+"""Watches executors: their creation, the nodes that they get, when they spin, and which callbacks they take."""
 
 import functools
 from typing import Any
@@ -10,7 +10,7 @@ from .writing import ledger, quiet
 
 
 def watch_executors(rclpy: Any) -> None:
-    """Wrap how executors are made, filled and spun."""
+    """Wrap the functions that create executors, add nodes to them, and spin them."""
     base = rclpy.executors.Executor
 
     def made(_result: None, executor: Any, *_args: Any, **_kwargs: Any) -> None:
@@ -48,7 +48,7 @@ def watch_executors(rclpy: Any) -> None:
 
 
 def _wrap_take(base: Any, name: str) -> None:
-    """Let the callback that rclpy takes off its wait set be known by the thing it belongs to."""
+    """Wrap a function that takes a ready callback, so that the thing to which the callback belongs is known."""
     original = getattr(base, name)
 
     @functools.wraps(original)
@@ -73,7 +73,7 @@ def _wrap_take(base: Any, name: str) -> None:
 
 
 def _wrap_take_answer(base: Any) -> None:
-    """Count the answers that a client gets."""
+    """Count the responses that a client gets."""
     original = getattr(base, rclpy_names.TAKE_ANSWER)
 
     @functools.wraps(original)

@@ -1,4 +1,4 @@
-"""Messages: how many are published, and which field is wrong when one cannot be sent."""
+"""Watches messages: how many are published, and which field is wrong if a message cannot be sent."""
 
 import functools
 from typing import Any
@@ -10,7 +10,7 @@ from .writing import emit_once, quiet
 
 
 def watch_messages(rclpy: Any) -> None:
-    """Wrap what sends a message, a response or a request."""
+    """Wrap the functions that send a message, a response or a request."""
     publish = rclpy.publisher.Publisher.publish
 
     @functools.wraps(publish)
@@ -56,7 +56,7 @@ def watch_messages(rclpy: Any) -> None:
 
 
 def note_misfit(kind: str, name: str, message: Any, expected: type) -> None:
-    """Write which field of a message is not of its type, or that the whole message is none of `expected`."""
+    """Write which field of a message has a value of the wrong type, or that the message is not an `expected` object."""
     if isinstance(message, expected):
         found = _misfit(message, "")
     else:
@@ -76,7 +76,7 @@ def note_misfit(kind: str, name: str, message: Any, expected: type) -> None:
 
 
 def _misfit(message: Any, path: str) -> tuple[str, str, Any] | None:
-    """The first field whose value is not of its type: its path, the type, the value."""
+    """Return the path, the type and the value of the first field whose value has the wrong type; None if none has."""
     for name, kind in message.get_fields_and_field_types().items():
         value = getattr(message, name)
         if _is_a(value, kind):
@@ -89,7 +89,7 @@ def _misfit(message: Any, path: str) -> tuple[str, str, Any] | None:
 
 
 def _is_a(value: Any, kind: str) -> bool:
-    """Whether it is a message of the type that a field wants, such as `geometry_msgs/Point`."""
+    """Whether a value is a message of the type that a field requires, such as `geometry_msgs/Point`."""
     return hasattr(value, "get_fields_and_field_types") and type(value).__name__ == kind.rpartition("/")[2]
 
 

@@ -1,4 +1,4 @@
-"""Nodes, what is made for them, their parameters, and their lifecycle."""
+"""Watches nodes, the things that are created for them, their parameters, and their lifecycle."""
 
 import functools
 import time
@@ -15,12 +15,12 @@ from .writing import emit_once, ledger, quiet
 
 
 class Node:
-    """A node, from the end of `Node.__init__` on."""
+    """The record of a node, which is created at the end of `Node.__init__`."""
 
     dirty = False
 
     def __init__(self, node: Any) -> None:
-        """Begin with one that was just made."""
+        """Begin with a node that was just created."""
         self.key = f"node{next(ledger.numbers)}"
         self.node = weakref.ref(node)
         self.name = node_name(node)
@@ -29,7 +29,7 @@ class Node:
         self.destroyed = False
 
     def event(self) -> events.NodeSeen:
-        """Return its line as it is now."""
+        """Return the record's line in its current state."""
         executor = getattr(self.node(), "executor", None)
         return events.NodeSeen(
             name=self.name,
@@ -41,7 +41,7 @@ class Node:
 
 
 def watch_nodes(rclpy: Any) -> None:
-    """Wrap how nodes are made and destroyed, and how they come to an executor."""
+    """Wrap the functions that create and destroy nodes, and the setting of a node's executor."""
     node_class = rclpy.node.Node
     init = node_class.__init__
 
@@ -75,7 +75,7 @@ def watch_nodes(rclpy: Any) -> None:
 
 
 def watch_things(rclpy: Any) -> None:
-    """Wrap how a node's timers, subscriptions, publishers, services and clients are made and destroyed."""
+    """Wrap the functions that create and destroy a node's timers, subscriptions, publishers, services and clients."""
     node_class = rclpy.node.Node
     for method, kind, name_of in (
         ("create_timer", "timer", lambda entity, node: ""),
@@ -131,12 +131,12 @@ def _thing_made(kind: str, name_of: Callable[[Any, Any], str]) -> Callable[..., 
 
 
 class Parameter:
-    """A parameter of a node: declared, read and set how often, and when last."""
+    """A parameter of a node: whether it is declared, and how often and when it was last read and set."""
 
     dirty = False
 
     def __init__(self, node: str, name: str) -> None:
-        """Begin with one that nothing has happened to."""
+        """Begin with a parameter that was neither declared nor used."""
         self.key = f"parameter{next(ledger.numbers)}"
         self.node, self.name = node, name
         self.declared = False
@@ -144,7 +144,7 @@ class Parameter:
         self.last_get = self.last_set = 0.0
 
     def event(self) -> events.ParameterSeen:
-        """Return its line as it is now."""
+        """Return the record's line in its current state."""
         return events.ParameterSeen(
             node=self.node,
             name=self.name,
@@ -168,7 +168,7 @@ def _parameter(node: Any, name: str) -> Parameter:
 
 
 def watch_parameters(rclpy: Any) -> None:
-    """Wrap how parameters are declared, read and set."""
+    """Wrap the functions that declare, read and set parameters."""
 
     def declared(_result: Any, node: Any, name: Any, *_args: Any, **_kwargs: Any) -> None:
         if not here.building and isinstance(name, str):
@@ -224,7 +224,7 @@ def _wrap_callbacks(node_class: Any, moment: str) -> None:
 
 
 def watch_lifecycle(rclpy: Any) -> None:
-    """Wrap the registering of transitions' callbacks, and lifecycle publishers."""
+    """Wrap the registration of transition callbacks, and the functions of lifecycle publishers."""
     mixin = rclpy.lifecycle.LifecycleNodeMixin
     register = getattr(mixin, rclpy_names.REGISTER_TRANSITION)
 

@@ -1,4 +1,4 @@
-"""Putting a note around a function of rclpy, which goes on to do what it did, and noting how often one blocks."""
+"""Wraps functions of rclpy so that calls are noted, without a change to what the functions do."""
 
 import _thread
 import functools
@@ -15,7 +15,11 @@ from .writing import ledger, quiet
 def wrap(
     owner: Any, name: str, before: Callable[..., Any] | None = None, after: Callable[..., Any] | None = None
 ) -> None:
-    """Replace `owner.name` by itself with a note before it and one after it has returned (its result first)."""
+    """Wrap `owner.name` so that `before` is called first, and `after` when it has returned.
+
+    `before` gets the arguments of the call, and `after` gets the result and the arguments. `before` is left out if the
+    call comes from another noted call of rclpy.
+    """
     original = getattr(owner, name)
 
     @functools.wraps(original)
@@ -38,12 +42,12 @@ def wrap(
 
 
 class Call:
-    """A call that may block, by its line."""
+    """The record of the calls in one line of a function that may block."""
 
     dirty = False
 
     def __init__(self, what: str, target: int, where: events.Where, callback: Thing | None) -> None:
-        """Begin with none; `target` is the number of the thing that is called."""
+        """Begin without calls; `target` is the number of the thing that is called."""
         self.key = f"call{next(ledger.numbers)}"
         self.what, self.target, self.where, self.callback = what, target, where, callback
         self.begun = self.ended = self.vain = 0
@@ -51,7 +55,7 @@ class Call:
         self.thread = 0
 
     def event(self) -> events.Call:
-        """Return its line as it is now."""
+        """Return the record's line in its current state."""
         return events.Call(
             what=self.what,
             in_callback=self.callback is not None,
@@ -66,14 +70,14 @@ class Call:
         )
 
     def begin(self) -> None:
-        """Note that it begins once more."""
+        """Note that a call begins."""
         with ledger.lock:
             self.begun += 1
             self.since, self.thread = time.monotonic(), _thread.get_ident()
         ledger.touch(self)
 
     def end(self, vain: bool) -> None:
-        """Note that it came back; `vain` if what it was to wait for had not come."""
+        """Note that a call has returned; `vain` says that it did so before the awaited event had happened."""
         with ledger.lock:
             self.ended += 1
             self.vain += vain
@@ -84,7 +88,7 @@ _calls: dict[tuple[Any, ...], Call] = {}
 
 
 def _call(what: str, target: Any) -> Call:
-    """The record of a call from the line where this thread is, in the callback that it runs."""
+    """Return the record of a call from the current line and callback of this thread, and create it if necessary."""
     where, thing = own_line(), None
     with quiet():
         thing = thing_of(target)
@@ -97,7 +101,7 @@ def _call(what: str, target: Any) -> Call:
 
 
 def _not_done(*arguments: Any) -> bool:
-    """Whether there is a future among these, and it has no result."""
+    """Whether one of these arguments is a future that is not done."""
     return any(hasattr(each, "add_done_callback") and not each.done() for each in arguments)
 
 
@@ -109,15 +113,15 @@ def wrap_blocking(
     seen: bool = False,
     long: bool = False,
 ) -> None:
-    """As `wrapping.wrap`, for a call that may block.
+    """Wrap a function that may block so that its calls are noted.
 
     Args:
-        owner: what has the function.
-        name: its name there.
-        what: what the event calls it.
-        spins: returns the executor that it spins, from its arguments.
-        seen: it is noted outside a callback as well.
-        long: it spins until the end.
+        owner: the module or class that has the function.
+        name: the name of the function in it.
+        what: the name of the function in the record.
+        spins: returns the executor that the function spins, given its arguments.
+        seen: whether calls outside callbacks are noted as well.
+        long: whether the function spins until shutdown.
     """
     original = getattr(owner, name)
 

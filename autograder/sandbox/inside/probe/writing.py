@@ -1,4 +1,4 @@
-"""How notes are written: events at once, records of things by a thread of their own when they have changed."""
+"""Writes the notes: events immediately, and changed records of things by a separate thread."""
 
 import _thread
 import contextlib
@@ -14,26 +14,27 @@ from typing import Any, Protocol
 from . import events
 
 _MOST = 500
-"""Events of one program; what it repeats is noted once. Records of things: no more either."""
+"""The largest number of events of one program, and of its records. Repeated events are written only once."""
 
 _MOST_RUNS = 2000
-"""Runs of callbacks, and messages sent, that are written down one by one: for pictures. The others are only counted."""
+"""The number of runs of callbacks, and of messages sent, that are written individually, for pictures. Further ones are
+only counted."""
 
 _RUNS_OF_A_LINE = 60
-"""So many are shorter than `_WHOLE`."""
+"""The number of runs in a line, which is then shorter than `_WHOLE`."""
 
 PAUSE = 0.25
-"""Seconds between two writings of the records that have changed."""
+"""The seconds between two writings of changed records."""
 
 _WHOLE = 4000
-"""Bytes that a pipe takes whole or not at all."""
+"""The bytes that a pipe accepts either completely or not at all."""
 
 quiet = functools.partial(contextlib.suppress, Exception)
-"""A block in which nothing that goes wrong reaches the program."""
+"""A block whose exceptions do not reach the program."""
 
 
 class _Channel:
-    """Where events go, and how many more do."""
+    """The descriptor to which events are written, and how many more may be written."""
 
     def __init__(self) -> None:
         self.descriptor = -1
@@ -54,12 +55,12 @@ def _line_of(event: events.Event, **more: str) -> bytes:
 
 
 def open_channel(descriptor: int) -> None:
-    """Write to this descriptor from now on."""
+    """Set the descriptor to which events are written from now on."""
     _channel.descriptor = descriptor
 
 
 def emit(event: events.Event) -> None:
-    """Write one event, or drop it: a full pipe must not hold up the program."""
+    """Write one event, or drop it if the pipe is full, because a full pipe must not block the program."""
     if _channel.descriptor < 0 or _channel.left <= 0:
         return
     _channel.left -= 1
@@ -68,7 +69,7 @@ def emit(event: events.Event) -> None:
 
 
 def emit_once(event: events.Event) -> None:
-    """Write an event unless the same was written before."""
+    """Write an event unless an equal one was written before."""
     key = tuple(str(value) for value in vars(event).values())
     if key not in _channel.once:
         _channel.once.add(key)
@@ -76,29 +77,30 @@ def emit_once(event: events.Event) -> None:
 
 
 class Record(Protocol):
-    """What is known of a thing so far."""
+    """The current state of a thing."""
 
     key: str
     dirty: bool
 
     def event(self) -> events.Record:
-        """Return its line as it is now."""
+        """Return the record's line in its current state."""
 
 
 class Ledger:
-    """The things that are known, and the thread that writes down what has changed.
+    """The known things, and the thread that writes changed records.
 
-    The thread sleeps until something changes. It is none of `threading`'s, so that a program counts only its own.
+    The thread sleeps until something changes. It is not created with `threading`, so that a program that counts its
+    threads does not find it.
     """
 
     def __init__(self) -> None:
-        """Begin with none; the thread starts with the first change."""
+        """Begin without records. The thread starts at the first change."""
         self.lock = threading.Lock()
         self.numbers = itertools.count(1)
         self.known: weakref.WeakKeyDictionary[Any, Any] = weakref.WeakKeyDictionary()
-        """Object of rclpy -> its record."""
+        """The record of each known object of rclpy."""
         self.always: list[Record] = []
-        """Records that change with every callback, and are written whenever anything is."""
+        """Records that change with every callback, and are written whenever any record is written."""
         self._records: list[Record] = []
         self._changed: dict[str, Record] = {}
         self._ran: list[tuple[int, float, float, int]] = []
@@ -108,19 +110,19 @@ class Ledger:
         self._started = False
 
     def add(self, record: Record, of: Any = None) -> None:
-        """Take up a record; `of` is the object of rclpy that it stands for."""
+        """Add a record; `of` is the object of rclpy that it describes."""
         if len(self._records) < _MOST:
             self._records.append(record)
             if of is not None:
                 self.known[of] = record
-            # At once: what the graph shows of a thing must find it known here.
+            # It is written immediately, because a thing that appears on the graph must already be known here.
             try:
                 os.write(_channel.descriptor, _line_of(record.event(), key=record.key))
             except OSError:
                 self.touch(record)
 
     def touch(self, record: Record) -> None:
-        """Say that a record has changed."""
+        """Note that a record has changed."""
         if record.dirty or _channel.descriptor < 0:
             return
         record.dirty = True
@@ -130,11 +132,11 @@ class Ledger:
         if start:
             _thread.start_new_thread(self._write_on, ())
         if self._wake.locked():
-            with contextlib.suppress(RuntimeError):  # another thread was faster
+            with contextlib.suppress(RuntimeError):  # another thread has already released it
                 self._wake.release()
 
     def ran(self, number: int, began: float, ended: float, thread: int) -> None:
-        """Note one run of a thing's callback, or one message sent; the caller holds the lock."""
+        """Note one run of a thing's callback, or one message that was sent. The caller holds the lock."""
         if self._runs_left > 0:
             self._runs_left -= 1
             self._ran.append((number, round(began, 4), round(ended, 4), thread))
@@ -146,7 +148,7 @@ class Ledger:
             time.sleep(PAUSE)
 
     def write(self) -> None:
-        """Write what has changed, in pieces that the pipe takes whole."""
+        """Write everything that has changed, in pieces that the pipe accepts completely."""
         with self.lock:
             changed, self._changed = self._changed, {}
             ran, self._ran = self._ran, []
@@ -154,7 +156,7 @@ class Ledger:
         piece = b""
         for record in changed.values():
             with quiet():
-                record.dirty = False  # before it is read: what changes from here on is written the next time
+                record.dirty = False  # set before the record is read, so that later changes are written next time
                 line = _line_of(record.event(), key=record.key)
                 if len(piece) + len(line) > _WHOLE:
                     os.write(_channel.descriptor, piece)
