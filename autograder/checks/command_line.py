@@ -80,9 +80,16 @@ class CommandLine:
             table = student_yaml.read(current.check.use(self.file), table=True)
         except Refused as error:
             raise Refused(replace(error.reason, hint=error.reason.hint or "Write `entry: words`.")) from None
-        text = table.get(self.entry) if isinstance(table, dict) else None
+        if table and not isinstance(table, dict):
+            raise Refused(
+                UNANSWERED(
+                    f"In `{self.file}` nothing begins with `{self.entry}:`, so the words there belong to no line.",
+                    f"Write `{self.entry}:` in front of the words.",
+                )
+            )
+        text = table.get(self.entry) if table else None
         if text is None or text == "?":
-            near = nearest(self.entry, map(str, table)) if isinstance(table, dict) and text is None else None
+            near = nearest(self.entry, map(str, table)) if table and text is None else None
             raise Refused(
                 UNANSWERED(
                     f"`{self.entry}` in `{self.file}` has no answer yet."

@@ -89,6 +89,18 @@ def _twins(scene: Scene, name: str) -> set[str]:
     }
 
 
+def _deeper(wanted: str, there: Sequence[str]) -> str:
+    """What to leave out where every node of the wanted name is below the wanted namespace; empty if one is not."""
+    space, base = wanted.rpartition("/")[0], wanted.rpartition("/")[2]
+    if not all(name.startswith(f"{space}/") and name.endswith(f"/{base}") for name in there):
+        return ""
+    more = ", ".join(dict.fromkeys(f"`{name[len(space) : -len(base) - 1]}`" for name in there))
+    return (
+        f"The node should be in `{space or '/'}`, and something adds {more} to that: a rule for `__ns`, or in a launch "
+        "file `namespace` or `push_ros_namespace`. Leave it out."
+    )
+
+
 def _given_as_a_parameter(scene: Scene, insides: Sequence[Inside], wanted: str) -> Reason | None:
     """Return why a name that was given with `-p` to one of these programs does not exist."""
     pairs = zip(scene.insides, scene.parameter_rules, strict=False)
@@ -140,7 +152,8 @@ def why_no_node(scene: Scene, wanted: str) -> Reason:
     if there:
         return NAMESPACE(
             f"The node `{base}` exists, but in another namespace: {', '.join(f'`{name}`' for name in there)}.",
-            "Set the namespace when the node starts: with `-r __ns:=/name`, or in a launch file with `namespace` or "
+            _deeper(wanted, there)
+            or "Set the namespace when the node starts: with `-r __ns:=/name`, or in a launch file with `namespace` or "
             "with `push_ros_namespace` above the node in the same group. In a launch file, each of these adds a level. "
             "The namespace applies to every node that does not set its own.",
         )

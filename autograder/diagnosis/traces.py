@@ -15,7 +15,7 @@ PARAMETER_NOT_DECLARED = Kind("parameter-not-declared", "the error is a Paramete
 PARAMETER_TYPE = Kind("parameter-type", "the error is an InvalidParameterTypeException", Group.PROGRAM)
 REFUSED_CALL = Kind("refused-call", "the error is the system's refusal of a call", Group.PROGRAM)
 BUILTIN_CALLBACK = Kind(
-    "builtin-callback", "rclpy found no signature of a callback that is not a Python function", Group.PROGRAM
+    "builtin-callback", "rclpy found no signature of a callback, which is a function written in C", Group.PROGRAM
 )
 NOT_COPIED = Kind(
     "not-copied",
@@ -119,8 +119,8 @@ KNOWN_ERRORS = (
     (
         "no signature found for builtin",
         BUILTIN_CALLBACK,
-        "rclpy takes only functions and methods written in Python as callbacks: put the call into a `def` or a "
-        "`lambda` of your own.",
+        "rclpy looks at the parameters of a callback. Some of Python's own functions, such as the `append` of a deque, "
+        "do not tell theirs: put the call into a `def` or a `lambda` of your own.",
     ),
     (
         "'NoneType' object is not callable",

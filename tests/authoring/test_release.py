@@ -53,6 +53,15 @@ def test_every_answer_that_names_a_file_still_does_when_blank(lab: str) -> None:
 
 
 @pytest.mark.parametrize("lab", LABS)
+def test_no_table_of_answers_is_worth_more_than_a_tenth_of_a_labs_points(lab: str) -> None:
+    cells = json.loads((ROOT / "solutions" / lab / f"{lab}.ipynb").read_text(encoding="utf-8"))["cells"]
+    marks = [cell["metadata"].get("nbgrader", {}) for cell in cells]
+    whole = sum(mark["points"] for mark in marks if mark.get("grade"))  # what is graded by hand, too
+    tables = {check.grade_id: check.points for check in load_lab(ROOT, lab).checks if "answers(" in check.source}
+    assert {name: points for name, points in tables.items() if (points or 0) > whole / 10} == {}
+
+
+@pytest.mark.parametrize("lab", LABS)
 def test_a_check_is_folded_below_a_sentence_that_says_what_it_looks_at(lab: str) -> None:
     cells = json.loads((ROOT / "labs" / lab / f"{lab}.ipynb").read_text(encoding="utf-8"))["cells"]
     for above, cell in pairwise(cells):

@@ -90,6 +90,13 @@ def test_words_that_are_not_expected_are_told_what_to_write_in_their_place(table
     assert hint in caught.value.reason.hint
 
 
+def test_words_without_the_name_of_their_line_are_told_what_is_missing(table: Path) -> None:
+    table.write_text("-r a:=b -p c:=1\n")
+    with pytest.raises(Refused, match="nothing begins with `front:`") as caught:
+        command_line("rules.yaml", "front").words()
+    assert "in front of the words" in caught.value.reason.hint
+
+
 def test_a_missing_table_is_told(table: Path) -> None:
     with pytest.raises(Refused, match=r"%%file rules\.yaml"):
         command_line("rules.yaml", "front").words()

@@ -148,4 +148,4 @@ def test_a_node_that_lies_a_namespace_too_deep_is_found_beside_another_run_of_it
         found = autograder.diagnosis.why_no_node(ros._running.scene(), "/car/left")
     current.check.close()
     assert found.code == "namespace" and "another namespace: `/car/car/left`." in found.because
-    assert "adds a level" in found.hint
+    assert "something adds `/car` to that" in found.hint

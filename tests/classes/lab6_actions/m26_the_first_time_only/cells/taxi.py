@@ -1,0 +1,66 @@
+import threading
+import time
+
+import rclpy
+from rclpy.action import ActionServer, CancelResponse, GoalResponse
+from rclpy.executors import ExternalShutdownException, MultiThreadedExecutor
+from rclpy.node import Node
+from test_msgs.action import Fibonacci
+
+
+class Taxi(Node):
+    def __init__(self):
+        super().__init__("taxi")
+        self.declare_parameter("block", 0.5)  # seconds
+        self.block = self.get_parameter("block").value
+        self.current = None  # the handle of the goal that counts
+        self.lock = threading.Lock()
+        self.server = ActionServer(
+            self,
+            Fibonacci,
+            "drive",
+            self.execute,
+            goal_callback=self.decide,
+            handle_accepted_callback=self.accepted,
+        )
+
+    def decide(self, goal):
+        return GoalResponse.ACCEPT if goal.order > 0 else GoalResponse.REJECT
+
+    def accepted(self, goal_handle):
+        """A goal was accepted; `goal_handle.execute()` starts to execute it."""
+        old, self.current = self.current, goal_handle
+        if old is not None and old.is_active:
+            time.sleep(2 * self.block)
+        with self.lock:
+            if old is not None and old.is_active:
+                old.abort()
+        goal_handle.execute()
+
+    def execute(self, goal_handle):
+        driven = []
+        while len(driven) < goal_handle.request.order:
+            time.sleep(self.block)
+            with self.lock:
+                if not goal_handle.is_active:
+                    return Fibonacci.Result(sequence=driven)
+                driven.append(len(driven) + 1)
+                goal_handle.publish_feedback(Fibonacci.Feedback(sequence=driven))
+        with self.lock:
+            if goal_handle.is_active:
+                goal_handle.succeed()
+        return Fibonacci.Result(sequence=driven)
+
+
+def main():
+    rclpy.init()
+    executor = MultiThreadedExecutor(num_threads=4)
+    executor.add_node(Taxi())
+    try:
+        executor.spin()
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    rclpy.try_shutdown()
+
+
+main()
