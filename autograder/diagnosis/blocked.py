@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 from autograder.diagnosis.inside import Inside, called
 from autograder.diagnosis.sources import Place
 from autograder.graph.names import nearest
@@ -48,7 +50,7 @@ BUSY_WAIT = Kind(
 WRONG_TYPE = Kind("wrong-type", "the end, or the service that is asked, is there with another type", Group.NAMES)
 WAITS_FOR_LOCK = Kind(
     "waits-for-lock",
-    "a callback has not returned, and its thread is waiting for a lock; or two callbacks take the same lock",
+    "a callback has not returned; its thread waits for a lock or a semaphore; or two callbacks take the same lock",
     Group.BLOCKED,
 )
 
@@ -57,6 +59,8 @@ STUCK_AFTER = 1.5
 
 ONE_LOCK = "Callbacks that take the same lock run one after another, no matter which groups and threads they have."
 
+_WITH_A_LIMIT = "Wait with a time limit, and check whether the server is available."
+_LIMITED = re.compile(r"wait_for_service\(\s*[^)\s]")
 _OWN_GROUP = "Give the client, or the callback that waits, a callback group of its own."
 
 
@@ -111,11 +115,21 @@ def waits_for_a_service(inside: Inside) -> Reason | None:
         lasting = call.blocks or (call.what == "wait_for_service" and call.begun > 1)
         services = inside.observer.services()
         if lasting and client.name and client.name not in services:
-            limit = (
-                " If the service may be missing, wait with `timeout_sec`." if call.what == "wait_for_service" else ""
-            )
-            return _nobody_offers(client, services, f"{_at(inside, call)}this call waits for ", limit)
+            said = f"{_at(inside, call)}this call waits for "
+            return _nobody_offers(client, services, said, *_without_waiting(call))
     return None
+
+
+def _without_waiting(call: Call) -> tuple[str, str]:
+    """Return what to do if a service is missing: in addition to another name, and if no name is similar."""
+    if call.in_callback:
+        held = "A callback that waits holds up the others: ask `service_is_ready()`, and go on if it says no."
+        return f" {held}", held
+    if _LIMITED.search(call.code):
+        return "", "The call has a time limit: look how long it is, and how often the program makes such a call."
+    if call.what == "wait_for_service":
+        return " If the service may be missing, wait with `timeout_sec`.", _WITH_A_LIMIT
+    return "", _WITH_A_LIMIT
 
 
 def asks_nobody(inside: Inside) -> Reason | None:
@@ -145,14 +159,16 @@ def asks_another_type(inside: Inside) -> Reason | None:
     return None
 
 
-def _nobody_offers(client: Thing, services: dict[str, list[str]], said: str, else_do: str = "") -> Reason:
+def _nobody_offers(
+    client: Thing, services: dict[str, list[str]], said: str, else_do: str = "", alone: str = _WITH_A_LIMIT
+) -> Reason:
     own = ("rcl_interfaces/", "type_description")  # the services that every node offers by default
     close = nearest(client.name, [n for n, types in services.items() if not types[0].startswith(own)])
     given = f" (`{client.given}` in the code)" if client.given and client.given != client.name else ""
     return WAITS_FOR_SERVICE(
         f"{said}the service `{client.name}`{given}, but no node offers this service"
         + (f"; the nearest name is `{close}`." if close else "."),
-        "Wait with a time limit, and check whether the server is available."
+        alone
         if not close
         else "The name in the code begins with a slash, so the namespace does not apply to it. Remove the slash."
         if client.given.startswith("/") and close.endswith(client.given)
@@ -265,12 +281,20 @@ def takes_turn(inside: Inside) -> Reason | None:
     for thing, since, _ in _stuck(inside):
         for _, thread in thing.running:
             place = inside.turn(thread)
-            if place:
+            if not place:
+                continue
+            what = inside.source.taken(place.first)
+            noun = inside.source.noun(what)
+            waits = f"`{inside.name}`: {called(thing)} has been waiting in {place} for {since:.1f} s, because "
+            if line := inside.held_since(thread, what):
                 return WAITS_FOR_LOCK(
-                    f"`{inside.name}`: {called(thing)} has been waiting in {place} for {since:.1f} s, because the lock "
-                    "that it needs is not free.",
-                    ONE_LOCK,
+                    f"{waits}it already holds this {noun}, which it took in line {line}: it waits for itself.",
+                    "Take it only once, or use a `threading.RLock`, which one thread may take again.",
                 )
+            return WAITS_FOR_LOCK(
+                f"{waits}{f'the {noun} that it needs' if noun else 'what it takes there'} is not free.",
+                ONE_LOCK if noun == "lock" else "Whoever takes it has to release it, also after an error.",
+            )
     return None
 
 

@@ -132,6 +132,11 @@ class Inside:
         """Return where in the student's own code this thread waits to take a lock or the like."""
         return self.source.turn(self.name, [stacks.get(thread, []) for stacks in self.stacks]) if self.stacks else None
 
+    def held_since(self, thread: int, what: str) -> int:
+        """The line since which this thread, which waits to take a thing, holds this thing itself; 0 if none is seen."""
+        looks = [stacks.get(thread, []) for stacks in self.stacks]
+        return self.source.held_since(self.name, looks, what)
+
     def main_place(self) -> sources.Place | None:
         """Return where the program's main thread is in the student's own code."""
         return self.source.place(self.name, [next(reversed(stacks.values()), []) for stacks in self.stacks], True)

@@ -6,7 +6,7 @@ import ast
 from collections.abc import Sequence
 
 from autograder.arguments import remap_rules, rule_effect
-from autograder.arguments.rule_effect import ABSOLUTE_NAME, TOPIC_NAME
+from autograder.arguments.rule_effect import ABSOLUTE_NAME, RULE_WITHOUT_MATCH, TOPIC_NAME
 from autograder.diagnosis.blocked import WRONG_TYPE
 from autograder.diagnosis.chain import inside_reason, reason_inside
 from autograder.diagnosis.inside import Inside
@@ -245,8 +245,11 @@ def why_no_endpoint(scene: Scene, topic: str, msg_type: type | None, kind: str, 
     }
     twins = _twins(scene, topic)
     near = [name for name in (meant or used) if not {node_of(end) for end in reach(name)} <= twins]
-    found = _idle_rule(scene, topic, node) or taken_away(scene, topic, kind, node)
-    found = found or not_made_yet(scene, topic, kind, node) or _elsewhere(scene, topic, kind, near)
+    found = _idle_rule(scene, topic, node)
+    unmade = taken_away(scene, topic, kind, node) or not_made_yet(scene, topic, kind, node)
+    if unmade and (found is None or found.kind is RULE_WITHOUT_MATCH):  # no rule matches what does not exist yet
+        found = unmade
+    found = found or _elsewhere(scene, topic, kind, near)
     if found:
         return found
     opposite = observer.subscriptions(topic) if kind == "publisher" else observer.publishers(topic)
@@ -348,7 +351,7 @@ def taken_away(scene: Scene, topic: str, kind: str, node: str) -> Reason | None:
 def not_made_yet(scene: Scene, topic: str, kind: str, node: str) -> Reason | None:
     """Must have seen: a line in a method of the source that creates such an end, and no end created there."""
     for inside in scene.inside_of(node) if node else scene.insides:
-        for method, call in _makers(inside, topic, kind) if inside.alive else []:
+        for method, call in _makers(inside, _before_rules(scene, inside, topic), kind) if inside.alive else []:
             code = inside.source.line(call.lineno)
             return NOT_MADE_YET(
                 f"The code creates the {kind} on `{topic}` in `{method}`, line {call.lineno} (`{code}`), but the "
@@ -358,8 +361,20 @@ def not_made_yet(scene: Scene, topic: str, kind: str, node: str) -> Reason | Non
     return None
 
 
-def _makers(inside: Inside, topic: str, kind: str) -> list[tuple[str, ast.Call]]:
-    """Return the calls that would create this end and have created none, each with its method.
+def _before_rules(scene: Scene, inside: Inside, topic: str) -> list[str]:
+    """Return the full names that the program's rules change to this topic, and the topic itself."""
+    rules = map(remap_rules.parse, dict(zip(scene.insides, scene.rules, strict=False)).get(inside, ()))
+    return [topic] + [
+        rule_effect.full_name(rule.left, node)
+        for rule in rules
+        if rule and rule.renames_topics
+        for node in inside.nodes
+        if rule_effect.full_name(rule.right, node) == topic
+    ]
+
+
+def _makers(inside: Inside, topics: list[str], kind: str) -> list[tuple[str, ast.Call]]:
+    """Return the calls that would create an end on one of these topics and have created none, each with its method.
 
     Calls in `__init__` are left out.
     """
@@ -368,7 +383,7 @@ def _makers(inside: Inside, topic: str, kind: str) -> list[tuple[str, ast.Call]]
     for method, call in inside.source.method_calls():
         made = isinstance(call.func, ast.Attribute) and call.func.attr in _MAKERS[kind]
         names = [word.value for word in call.args if isinstance(word, ast.Constant) and isinstance(word.value, str)]
-        named = any(topic.endswith("/" + name.lstrip("~/")) for name in names)
+        named = any(topic.endswith("/" + name.lstrip("~/")) for name in names for topic in topics)
         if made and named and used.isdisjoint(range(call.lineno, (call.end_lineno or 0) + 1)) and method != "__init__":
             found.append((method, call))
     return found

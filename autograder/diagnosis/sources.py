@@ -22,6 +22,9 @@ Stacks = dict[int, list[Frame]]
 _TAKING = ("acquire", "__enter__", "wait")
 """The functions of `threading` in which a thread waits for a lock or the like."""
 
+_NOUNS = {"Lock": "lock", "RLock": "lock", "Semaphore": "semaphore", "BoundedSemaphore": "semaphore"}
+"""What `threading` makes for callbacks to take, and what that is called."""
+
 _THREAD = re.compile(r"Thread 0x([0-9a-f]+)")
 _WRITER = "Current thread"
 _FRAME = re.compile(r'\s+File "(.*)", line (\d{1,9}) in (.*)')
@@ -144,10 +147,44 @@ class Source:
         (number,) = numbers
         return Place(number, number, self.line(number), "", "")
 
-    def locks(self, line: int) -> dict[str, int]:
-        """Return the locks that the function beginning in a line takes (`with self.lock`), and in which line each.
+    def taken(self, line: int) -> str:
+        """What is taken in a line, such as `self.lock`."""
+        return self._takes(self._tree).get(line, "")
 
-        Locks that are taken by the functions it calls in the same file are included.
+    def noun(self, what: str) -> str:
+        """What a thing that is taken is called: a lock or a semaphore; empty if the source does not show it."""
+        made = self._made(what)
+        return _NOUNS.get(_called(made), "") if made else ""
+
+    def single(self, what: str) -> bool:
+        """Whether only one thread at a time can hold this: a lock, or a semaphore of 1."""
+        made = self._made(what)
+        if made is None or _called(made) not in _NOUNS:
+            return False
+        numbers = [*made.args, *(keyword.value for keyword in made.keywords)]
+        return all(isinstance(one, ast.Constant) and one.value == 1 for one in numbers)
+
+    def held_since(self, name: str, looks: Sequence[list[Frame]], what: str) -> int:
+        """The line of the `with` by which a thread that waits for a thing holds this thing already; 0 if none is seen.
+
+        A `threading.RLock` may be taken twice by one thread.
+        """
+        made = self._made(what)
+        if not self.single(what) or made is None or _called(made) == "RLock":
+            return 0
+        lines = [[frame[1] for frame in frames if frame[0].endswith(f"/{name}.py")] for frames in looks]
+        held = [
+            node.lineno
+            for node in ast.walk(self._tree)
+            if isinstance(node, ast.With) and what in {ast.unparse(item.context_expr) for item in node.items}
+            if all(any(node.body[0].lineno <= line <= (node.end_lineno or 0) for line in each) for each in lines)
+        ]
+        return min(held, default=0) if lines else 0
+
+    def locks(self, line: int) -> dict[str, int]:
+        """Return what the function beginning in a line takes for itself alone (`with self.lock`), and in which lines.
+
+        What the functions that it calls in the same file take is included.
         """
         functions = {node.name: node for node in ast.walk(self._tree) if isinstance(node, ast.FunctionDef)}
         begun = [f for f in functions.values() if min([f.lineno, *(d.lineno for d in f.decorator_list)]) == line]
@@ -159,7 +196,7 @@ class Source:
         ]
         found: dict[str, int] = {}
         for function in [*called, *begun]:
-            found |= {what: number for number, what in self._takes(function).items()}
+            found |= {what: number for number, what in self._takes(function).items() if self.single(what)}
         return found
 
     def late_name(self, line: int) -> str:
@@ -188,6 +225,16 @@ class Source:
             for call in ast.walk(method)
             if isinstance(call, ast.Call)
         ]
+
+    def _made(self, what: str) -> ast.Call | None:
+        """The call that makes a thing (`self.lock = threading.Lock()`), if the source makes it in one place only."""
+        given = [node for node in ast.walk(self._tree) if isinstance(node, (ast.Assign, ast.AnnAssign))]
+        made = [
+            node.value
+            for node in given
+            if what in {ast.unparse(one) for one in (node.targets if isinstance(node, ast.Assign) else [node.target])}
+        ]
+        return made[0] if len(made) == 1 and isinstance(made[0], ast.Call) else None
 
     @staticmethod
     def _takes(tree: ast.AST) -> dict[int, str]:
@@ -225,3 +272,8 @@ class Source:
             and all(node.lineno <= line <= (node.end_lineno or 0) for line in lines)
         ]
         return min(loops, key=lambda node: (node.end_lineno or 0) - node.lineno, default=None)
+
+
+def _called(call: ast.Call) -> str:
+    """The last word of what is called: `Lock` of `threading.Lock()`."""
+    return getattr(call.func, "attr", "") or getattr(call.func, "id", "")

@@ -93,8 +93,7 @@ def why_other_target(built: Built, name: str, wanted: str = "") -> Reason | None
         because = f"The entry point `{name}` leads to `{target}`, which has no `:` between module and function."
     elif not path:
         because = f"The entry point names the module `{module}`, and no such module is installed."
-        where = "Only the folders of code that `packages` in setup.py names are installed."
-        return ENTRY_POINT_TARGET(because, where)
+        return ENTRY_POINT_TARGET(because, _where_it_is(built, module, function))
     elif not re.search(defined, built.text(path), re.MULTILINE):
         because = f"The entry point names `{function}`, and the module `{module}` has no function of that name."
     elif wanted and target != wanted:
@@ -102,6 +101,22 @@ def why_other_target(built: Built, name: str, wanted: str = "") -> Reason | None
     else:
         return None
     return ENTRY_POINT_TARGET(because)
+
+
+def _where_it_is(built: Built, module: str, function: str) -> str:
+    """What to write for a module that is not installed under this name."""
+    paths = [path.rpartition("/site-packages/")[2] for path in built.files if "/site-packages/" in path]
+    modules = [path.removesuffix(".py").replace("/", ".") for path in paths if path.endswith(".py")]
+    modules = [name for name in modules if not name.endswith("__init__")]
+    plain = module.removesuffix(".py")
+    if plain in modules:
+        return f"A module is named without `.py`: `{plain}:{function}`."
+    same = [name for name in modules if name.rpartition(".")[2] == plain.rpartition(".")[2]]
+    if same:
+        return f"With the folder that it is in, it is `{same[0]}:{function}`."
+    if any(name.partition(".")[0] == module.partition(".")[0] for name in modules):
+        return f"These modules are installed: {', '.join(f'`{name}`' for name in modules[:6])}."
+    return "Only the folders of code that `packages` in setup.py names are installed."
 
 
 def _entry_points(built: Built) -> dict[str, str]:

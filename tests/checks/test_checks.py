@@ -76,6 +76,8 @@ def test_a_right_node_earns_the_points_under_names_and_values_that_vary(grade: G
          'ros.node("/talker").expect_log("tick", within=6)', "no-log", "was printed, not logged"),
         ("self.count += 1", "self.count += 1; self.get_logger().info('tick')",
          'ros.node("/talker").expect_log("tick", level="WARN", within=6)', "no-log", "at level INFO, not at WARN"),
+        ("self.count += 1", "self.count += 1; self.get_logger().debug('tick')",
+         'ros.node("/talker").expect_log("tick", within=2)', "no-log", "logs at level DEBUG"),
         ("self.count += 1", "self.count += 1; rclpy.logging.get_logger('mine').info('tick')",
          'ros.node("/talker").expect_log("tick", within=6)', "no-log", "by a logger called `mine`"),
         ('"chatter", 10', '"chatter", rclpy.qos.qos_profile_sensor_data',

@@ -147,7 +147,19 @@ CASES: dict[str, tuple[dict[str, str], str, str, str]] = {
         changed(SENSORS, "setup.py", ".sensor:main", ".sensors:main"),
         RUNS,
         "entry-point-target",
-        ".sensors`",
+        "These modules are installed: `lost_module.sensor`",
+    ),
+    "module_with_py": (
+        changed(SENSORS, "setup.py", ".sensor:main", ".sensor.py:main"),
+        RUNS,
+        "entry-point-target",
+        "named without `.py`: `module_with_py.sensor:main`",
+    ),
+    "module_without_folder": (
+        changed(SENSORS, "setup.py", "NAME.sensor:main", "sensor:main"),
+        RUNS,
+        "entry-point-target",
+        "it is `module_without_folder.sensor:main`",
     ),
     "other_function": (
         changed(SENSORS, "setup.py", ":main", ":rclpy"),

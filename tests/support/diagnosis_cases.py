@@ -5,7 +5,7 @@ from __future__ import annotations
 import textwrap
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from rclpy.duration import Duration
 from rclpy.qos import DurabilityPolicy, LivelinessPolicy, QoSProfile
@@ -189,6 +189,12 @@ def gate(self, request, response):
 
 def no_end(scene: Scene, name: str) -> Reason | None:
     return diagnosis.why_no_endpoint(scene, f"/{name}/more", String, "publisher", f"/{name}")
+
+
+def no_end_under_a_rule(scene: Scene, name: str) -> Reason | None:
+    """As if the program had been given a rule for what it makes in `on_activate`."""
+    ruled = replace(scene, rules=[["~/more:=path"]] * len(scene.programs))
+    return diagnosis.why_no_endpoint(ruled, "/path", String, "publisher", f"/{name}")
 
 
 LATER = "def {}(self, state):\n    self.more = self.create_publisher(String, '~/more', 10)\n{}"
@@ -405,6 +411,21 @@ CASES = {
         never=("taken-away",),
         ask=no_end,
     ),
+    "makes_it_in_activate_under_a_rule": Case(
+        methods=LATER.format("on_activate", SUCCESS),
+        main=TRIGGER,
+        base="LifecycleNode",
+        says="not-made-yet",
+        because="in `on_activate`, line",
+        never=("rule-without-match",),
+        ask=no_end_under_a_rule,
+    ),
+    "no_end_for_a_rule": Case(
+        says="rule-without-match",
+        because="nothing is called",
+        never=("not-made-yet",),
+        ask=no_end_under_a_rule,
+    ),
     "made_it_and_took_it_away": Case(
         TALK,
         LATER.format("on_configure", "    self.destroy_publisher(self.more)\n" + SUCCESS),
@@ -453,6 +474,29 @@ CASES = {
         says="waits-for-lock",
         because="with self.lock:",
         never=("stuck-callback",),
+    ),
+    "takes_the_lock_twice": Case(
+        "self.lock = threading.Lock()\n" + TALK + "self.create_timer(0.05, self.work)\n",
+        "def work(self):\n    with self.lock:\n        self.more()\n\n"
+        "def more(self):\n    with self.lock:\n        pass\n",
+        says="waits-for-lock",
+        because="it already holds this lock",
+        never=("stuck-callback",),
+    ),
+    "takes_another_lock": Case(
+        "self.lock, self.other = threading.Lock(), threading.Lock()\nself.other.acquire()\n"
+        + TALK
+        + "self.create_timer(0.05, self.work)\n",
+        "def work(self):\n    with self.lock:\n        self.more()\n\n"
+        "def more(self):\n    with self.other:\n        pass\n",
+        says="waits-for-lock",
+        because="what it takes there is not free",
+    ),
+    "never_gets_the_semaphore": Case(
+        "self.some = threading.Semaphore(2)\n" + TALK + "self.create_timer(0.05, self.work)\n",
+        "def work(self):\n    self.some.acquire()\n",
+        says="waits-for-lock",
+        because="because the semaphore that it needs is not free",
     ),
     "holds_the_lock": Case(
         "self.lock = threading.Lock()\nself.create_timer(0.05, self.work)\n",
@@ -504,6 +548,17 @@ CASES = {
         says="waits-for-service",
         because="`/gate`",
         never=("stuck-in-init",),
+    ),
+    "waits_long_for_nobody": Case(
+        "self.create_client(Trigger, '/parking').wait_for_service(timeout_sec=60.0)\n",
+        says="waits-for-service",
+        because="how long it is",
+    ),
+    "waits_in_a_callback": Case(
+        "client = self.create_client(Trigger, '/zzz')\n"
+        "self.create_timer(0.05, lambda: client.wait_for_service(timeout_sec=0.3))\n",
+        says="waits-for-service",
+        because="ask `service_is_ready()`",
     ),
     "waits_for_the_second": Case(
         SERVER + "self.clients_ = [self.create_client(Trigger, name) for name in ('~/gate', '~/door')]\n",
@@ -822,6 +877,13 @@ CASES = {
         says="waits-for-lock",
         because="take the same `self.lock`",
         ask=together(),
+    ),
+    "a_semaphore_for_two": Case(
+        "self.some = threading.Semaphore(2)\n" + TWO.format(OWN, OWN),
+        "def slow(self):\n    with self.some:\n        time.sleep(0.1)\n",
+        THREADS.format(4),
+        ask=together(),
+        never=("waits-for-lock",),
     ),
     "a_lock_for_each": Case(
         "self.one, self.other = threading.Lock(), threading.Lock()\n"

@@ -291,7 +291,7 @@ class Node(Discovery):
         found = diagnosis.program_trouble(scene) or diagnosis.inside_reason(scene)
         if not found and not times and not instead:
             found = diagnosis.nothing_due(scene, self.name)
-        often = {0: instead or "No such message was logged.", 1: "It was logged once."}
+        often = {0: instead or f"No such message was logged.{_unheard(scene)}", 1: "It was logged once."}
         return found or NO_LOG(often.get(times, f"It was logged {times} times."))
 
     def _said_instead(self, text: str, level: str, node: str) -> str:
@@ -315,3 +315,14 @@ class Node(Discovery):
                     f"is called `{node}`, with its namespace, and `self.get_logger()` returns it."
                 )
         return ""
+
+
+def _unheard(scene: diagnosis.Scene) -> str:
+    """Say, where a program's source logs at level DEBUG, that such lines do not come out by default."""
+    for inside in scene.insides:
+        if line := inside.source.calls("debug"):
+            return (
+                f" Line {line} of `{inside.name}` logs at level DEBUG, and by default a logger puts out only INFO and "
+                "what is more severe."
+            )
+    return ""

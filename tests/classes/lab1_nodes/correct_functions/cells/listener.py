@@ -22,6 +22,7 @@ class Listener(Node):
         for _ in range(expected, number):
             self.missing += 1
         if number != expected:
+            self.get_logger().warning(f"before {number} I have heard {expected - 1}: a gap")
             self.lost.publish(Int64(data=self.missing))
         self.last = number
 

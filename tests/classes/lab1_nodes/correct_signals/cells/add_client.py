@@ -1,5 +1,6 @@
 %%node add_client
 import sys
+import time
 
 import rclpy
 from rclpy.node import Node
@@ -18,9 +19,9 @@ class AddClient(Node):
 
 def ask(node):
     """Ask for the sum, log what came of it, and return the exit status."""
-    left = node.server_within
-    while left > 0 and not node.client.wait_for_service(timeout_sec=0.1):
-        left -= 0.1
+    until = time.monotonic() + node.server_within
+    while time.monotonic() < until and not node.client.wait_for_service(timeout_sec=0.1):
+        pass
     if not node.client.service_is_ready():
         node.get_logger().error("no server")
         return 1

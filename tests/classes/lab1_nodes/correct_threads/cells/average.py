@@ -18,7 +18,7 @@ class Average(Node):
 
     def mean(self, request, response):
         found = self.mean_now
-        return Trigger.Response(success=found is not None, message="нет чисел" if found is None else str(found))
+        return Trigger.Response(success=found is not None, message="нет чисел" if found is None else f"{found:.15e}")
 
 
 def main():
