@@ -44,9 +44,8 @@ def run_class(
         on_result: a function that is called in this thread with each result as it arrives.
         on_start: a function that is called in any thread with each student whose submission starts to run.
         tried: whether the results do not count yet. They are then stored separately, and a later run uses them.
-        canaries: known answers that run among the class. All results are stored separately until all canaries have run.
-            Results of submissions that ran beside a canary that flipped are doubtful, and a later run does not use them
-            unless the settings say so.
+        canaries: known answers that run among the class. Until all of them have run, results are stored separately.
+            Results beside a canary that flipped are doubtful; a later run uses them only if the settings say so.
 
     Raises:
         KitError: the course's executor cannot be used.
