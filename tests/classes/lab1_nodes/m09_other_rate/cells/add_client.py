@@ -18,7 +18,7 @@ class AddClient(Node):
 
 def ask(node):
     """Ask for the sum, log what came of it, and return the exit status."""
-    if not node.client.wait_for_service(timeout_sec=4.0):
+    if not node.client.wait_for_service(timeout_sec=8.0):
         node.get_logger().error("no server")
         return 1
     future = node.client.call_async(BasicTypes.Request(int32_value=node.a, int64_value=node.b))
