@@ -21,7 +21,7 @@ def course_root(named: Path | None = None) -> Path:
     if named is not None:
         return _named(named)
     for folder in (Path.cwd(), *Path.cwd().parents, ROOT):
-        if is_course(folder):
+        if _is_course(folder):
             return folder
     raise KitError(
         "There is no course here: no folder with labs in `solutions` or `labs`.",
@@ -41,14 +41,14 @@ def trusted_course(named: Path | None) -> Path:
     own = ROOT / KIT_FOLDER if is_students_kit() else ROOT
     if named is not None:
         return _named(named)
-    if not is_course(own):
+    if not _is_course(own):
         raise KitError("The kit was installed without a course of its own.", "Name yours: --course FOLDER")
     return own
 
 
 def _named(folder: Path) -> Path:
     root = folder.resolve()
-    if not is_course(root):
+    if not _is_course(root):
         needs = "It needs a folder `solutions` (or `labs`) with NAME/NAME.ipynb."
         raise KitError(f"There is no course in {root}.", needs)
     return root
@@ -60,7 +60,7 @@ def is_students_kit() -> bool:
     Such a kit has two courses. The student works in `labs/`. The labs below `kit/` are as they were handed out, and
     their checks are run.
     """
-    return is_course(ROOT / KIT_FOLDER)
+    return _is_course(ROOT / KIT_FOLDER)
 
 
 def book_of_kit() -> Path | None:
@@ -69,7 +69,7 @@ def book_of_kit() -> Path | None:
     return folder if is_students_kit() and (folder / "index.html").is_file() else None
 
 
-def is_course(folder: Path) -> bool:
+def _is_course(folder: Path) -> bool:
     """Return whether a folder has a course's settings or a lab. Many folders called `labs` hold something else."""
     return (folder / SETTINGS_FILE).is_file() or any(
         path.stem == path.parent.name for name in ("solutions", "labs") for path in (folder / name).glob("*/*.ipynb")

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import shlex
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -17,7 +16,6 @@ from typing import Any
 from autograder.core.errors import KitError
 from autograder.core.files import signature
 from autograder.course.lab import Lab, lab_names, load_lab
-from autograder.course.paths import is_course
 from autograder.reasons import Group, Kind
 from autograder.submission.answers import Submission, take_answers, take_files, take_own_files
 from autograder.submission.notebook_file import UnreadableError, cells_of, grade_ids_in, problem
@@ -78,11 +76,9 @@ def lab_of(notebook: Path, name: str | None, root: Path) -> Lab:
     best = max(labs, key=lambda lab: len(ids & lab.answers.keys()), default=None)
     # At least half of the answers must be there, because two courses may use the same grade_id.
     if best is None or 2 * len(ids & best.answers.keys()) < max(1, len(best.answers)):
-        here = next((one for one in (Path.cwd(), *Path.cwd().parents) if is_course(one) and one != root), None)
         raise KitError(
-            f"{notebook.name} does not belong to a lab of the course in {root}, which has {', '.join(names)}.",
-            f"If it belongs to the course that you are in, add: --course {shlex.quote(str(here))}"
-            if here is not None
-            else "Name the lab: --lab NAME, or another course: --course FOLDER",
+            f"{notebook.name} does not belong to a lab of this course.",
+            "Name the lab: --lab NAME, or another course, also if you are in its folder: --course FOLDER. "
+            f"Labs in {root}: {', '.join(names)}.",
         )
     return best
