@@ -32,7 +32,7 @@ node.create_timer(0.1, lambda: ticks.publish(Int64(data=7)), MutuallyExclusiveCa
 node.create_timer(0.4, tells("slow", 0.3), MutuallyExclusiveCallbackGroup())
 node.create_timer(0.2, tells("read", 0.05), apart)
 node.create_timer(0.2, tells("write", 0.05), apart)
-node.create_timer(0.2, tells("itself", 0.3), together)
+node.create_timer(0.2, tells("itself", 0.6), together)
 print("it runs", flush=True)
 rclpy.spin(node, MultiThreadedExecutor(8))
 """
