@@ -41,7 +41,6 @@ ONE_NAME_FOR_ALL = Kind(
 )
 SERVICE_NAME = Kind("service-name", "a service with a similar name is offered", Group.NAMES)
 
-_LETTER_BY_LETTER = "Compare the two names letter by letter, namespace included."
 _EVERY_NODES = ("/rosout", "/parameter_events")
 _MAKERS = {
     "publisher": ("create_publisher", "create_lifecycle_publisher"),
@@ -315,15 +314,36 @@ def _elsewhere(scene: Scene, topic: str, kind: str, names: list[str]) -> Reason 
     if not close:
         return None
     said = f"There is no {kind} on `{topic}`; the nearest topic with one is"
-    return _misspelt(scene, kind, close, said, TOPIC_NAME)
+    return _misspelt(scene, kind, topic, close, said, TOPIC_NAME)
 
 
-def _misspelt(scene: Scene, kind: str, close: str, said: str, missing: Kind) -> Reason:
-    """Return the reason if there is only a similar name, which ends the sentence `said`."""
+def _misspelt(scene: Scene, kind: str, wanted: str, close: str, said: str, missing: Kind) -> Reason:
+    """Return the reason if instead of `wanted` there is only a similar name, which ends the sentence `said`."""
     made = _made_as(scene, kind, close)
     given = made[0].given if made else ""
     in_code = f" (`{given}` in the code)" if given and given != close else ""
-    return missing(f"{said} `{close}`{in_code}.", _LETTER_BY_LETTER)
+    return missing(f"{said} `{close}`{in_code}.", _what_differs(scene.observer.nodes(), wanted, close))
+
+
+def _what_differs(nodes: Sequence[str], wanted: str, close: str) -> str:
+    """Return advice about the difference between the expected name and a similar one, chosen by what it is."""
+    if close.endswith(wanted):
+        return (
+            f"`{close.removesuffix(wanted)}` is too much. If it is the namespace in which the node was started: a name "
+            "with a leading slash is absolute, and a namespace does not change it."
+        )
+    if wanted.endswith(close):
+        return f"`{wanted.removesuffix(close)}` is missing in front of it."
+    old, new = close.split("/"), wanted.split("/")
+    places = [place for place, parts in enumerate(zip(old, new, strict=False)) if parts[0] != parts[1]]
+    if len(old) != len(new) or len(places) != 1:
+        return "Compare the two names part by part, namespace included."
+    place = places[0]
+    differs = f"They differ in one part: it has to be `{new[place]}` and is `{old[place]}`."
+    if place < len(new) - 1 and "/".join(new[: place + 1]) in nodes:
+        rest = "/".join(new[place + 1 :])
+        return f"{differs} `{new[place]}` is the name of the node, and a private name, `~/{rest}`, follows it."
+    return differs
 
 
 def why_no_service(scene: Scene, name: str, srv_type: type) -> Reason:
@@ -343,7 +363,7 @@ def why_no_service(scene: Scene, name: str, srv_type: type) -> Reason:
     close = nearest(name, [n for n in names if n not in elsewhere])
     if close and close != name:
         said = f"There is no service `{name}`; the nearest name on the graph is"
-        return _misspelt(scene, "service", close, said, SERVICE_NAME)
+        return _misspelt(scene, "service", name, close, said, SERVICE_NAME)
     return inside_reason(scene) or NO_SERVICE(f"No node offers the service `{name}`.")
 
 

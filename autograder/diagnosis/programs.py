@@ -113,10 +113,12 @@ def _why_over(inside: Inside) -> str:
     if not spins or "spin" in spins:
         return "`spin()` runs until the program is stopped or shuts itself down." if spins else ""
     name, number = spins.popitem()
-    returns = "runs at most one callback" if name == "spin_once" else "spins until its future is done"
+    line = f"Line {number} (`{inside.source.line(number)}`)"
+    if name == "spin_once":
+        return f"{line} runs at most one callback and then returns. Use `spin()`, which runs until the program is stopped."
     return (
-        f"Line {number} (`{inside.source.line(number)}`) {returns} and then returns. Use `spin()`, which runs until "
-        "the program is stopped."
+        f"{line} spins until its future is done and then returns. Look at what completes this future, and when. If "
+        "nothing should end the program but a signal, use `spin()`."
     )
 
 

@@ -657,6 +657,31 @@ def test_names_keep_their_capitals_and_an_end_that_is_not_there_has_its_nearest_
     assert failure(result).code == "topic-name" and "`/camRaw/Image`" in failure(result).because
 
 
+OTHERS = {  # the name in the code, the expected one, and what the hint says
+    "talker/say": ("/robot/speaker/say", "and a private name, `~/say`, follows it"),
+    "halt/now": ("/robot/halt/soon", "it has to be `soon` and is `now`."),
+    "stop_now": ("/stop_now", "`/robot` is too much."),
+    "/rest/now": ("/robot/rest/now", "Remove the slash"),
+    "turn/lleft/now": ("/robot/turn/now", "part by part"),
+}
+
+
+def test_a_name_that_differs_comes_with_what_differs(grade: Grade) -> None:
+    ends = "".join(f'        self.create_publisher(String, "{name}", 10)\n' for name in OTHERS)
+    lines = [
+        f'    with ros.part("{name}"):\n        ros.topic("{wanted}", String).expect_publisher(within=1)'
+        for name, (wanted, _) in OTHERS.items()
+    ]
+    result = grade(
+        'with launch("talker", namespace="/robot", name="speaker") as ros:\n'
+        + "\n".join(lines)
+        + f"\nros.score({dict.fromkeys(OTHERS, 0.4)})",
+        talker__py=TALKER.replace("        self.create_service", ends + "        self.create_service", 1),
+    )
+    hints = {outcome.part: outcome.hint for outcome in result.outcomes if outcome.status is Status.FAILED}
+    assert [name for name, (_, hint) in OTHERS.items() if hint not in hints[name]] == []
+
+
 @pytest.mark.parametrize(
     ("line", "said"),
     [

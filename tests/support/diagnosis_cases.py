@@ -1002,6 +1002,13 @@ CASES = {
         because="`) runs at most one callback and then returns",
         ask=trouble,
     ),
+    "exits_after_future": Case(
+        main="def spin(it):\n    rclpy.spin_until_future_complete(it, rclpy.Future(), timeout_sec=0.1)\nspin(node)",
+        says="exited",
+        because="Look at what completes this future",
+        ask=trouble,
+        never=("not-spinning",),
+    ),
     "exits_unspun": Case(main="pass", says="not-spinning", ask=trouble, never=("exited",)),
     "undeclared": Case(
         "self.get_parameter('rate')\n", says="parameter-not-declared", ask=trouble, never=("parameter-type", "crashed")
