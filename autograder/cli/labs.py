@@ -68,9 +68,11 @@ def new_lab(
         print(path)
     where = f" --course {shlex.quote(str(course))}" if course else ""
     print(
-        "\nThe lab holds a small example that works: the program `greeter`, a table, and a check for each. Replace them with"
-        "\nyour own, and then also what requirements.yaml and canaries.yaml say, because they name the example's sentences"
-        f"\nand answers.\n\nNext, and after each change:\n  {_command()} lint {name}{where}\n  {_command()} release {name}{where}"
+        "\nThe lab holds a small example that works: the program `greeter`, a table, and a check"
+        "\nfor each. Replace them with your own. Then change requirements.yaml and canaries.yaml,"
+        "\nwhich name the example's sentences and answers."
+        f"\n\nNext, and after each change:\n  {_command()} lint {name}{where}"
+        f"\n  {_command()} release {name}{where}"
     )
 
 
