@@ -24,7 +24,7 @@ Click on the name of a lab to open it, and work through it from the top: run eac
 begins with `%%node NAME` or `%%file NAME` writes your program or file. The check below it runs the program and says
 at once what works, and what does not work and why.
 
-| Lab | About |
+| Lab | What to expect |
 |---|---|
 """
 
@@ -38,9 +38,10 @@ _BOTTOM = """
   graded; a file that you put into that folder yourself stays there, but is not handed in.
 - `%%node?` and `%%file?` show an example. The tab key completes the names of your programs after `launch("`, commands
   and what is on the graph after `%ros2`, and what a launch can do after `ros.`.
-- `%lab` at the end of a lab shows what is done and what is open.
+- `%lab` at the end of a lab shows what is done and what is still open.
 - To hand in a lab, save the notebook and hand in this file, which has the ending `.ipynb`. In a terminal, `autograder
-  submit NOTEBOOK` puts a copy with a receipt into the folder `handed_in`, and says what you should know before.
+  submit NOTEBOOK` first tells you if something is wrong with the notebook, and then puts a copy with a receipt into the
+  folder `handed_in`.
 """
 
 

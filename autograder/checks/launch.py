@@ -17,7 +17,7 @@ from autograder.checks import contradictions, current, outcomes, picture_data
 from autograder.checks.building import why_no_package, why_not_found
 from autograder.checks.command_line import CommandLine
 from autograder.checks.launch_file import LaunchFile
-from autograder.checks.misuse import Misuse, refuse_text
+from autograder.checks.misuse import Misuse, refuse_other_class, refuse_text
 from autograder.checks.program import Program, file_of, refuse_to_start, why_missing, words_of
 from autograder.checks.robot import Log, Robot, end_robot, log_of, try_out
 from autograder.checks.ros import Ros
@@ -49,10 +49,12 @@ class Launch(Ros):
         """Use `launch` or `launch_file`."""
         super().__init__(RunningLaunch())
         refuse_text("launch", listen=listen, serve=serve, lifecycle=lifecycle)
+        self._listen, self._serve, self._lifecycle = list(listen), list(serve), list(lifecycle)
+        for topic, msg_type in self._listen:
+            refuse_other_class(f'launch: listen, "{topic}"', msg_type, "message")
         self._packages = [*packages, *(file.packages() if file else ())]
         self._running.described = list(nodes)
         self._file = file
-        self._listen, self._serve, self._lifecycle = list(listen), list(serve), list(lifecycle)
         self._group: RunningPrograms | None = None
         self._robot: Robot | None = None
         self._entered = self._over = False

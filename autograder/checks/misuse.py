@@ -4,11 +4,19 @@ from __future__ import annotations
 
 import inspect
 import linecache
+import re
 import traceback
 from collections.abc import Callable, Mapping
 from typing import Any
 
 _TIMES = ("within", "for_seconds")
+
+_CLASSES = {
+    "message": ("msg", "get_fields_and_field_types"),
+    "service": ("srv", "Response"),
+    "action": ("action", "Feedback"),
+}
+"""For each kind of interface its module in a package, and what every class of this kind has."""
 
 
 class Misuse(Exception):
@@ -47,6 +55,29 @@ def refuse_text(of: str, **lists: object) -> None:
     for name, value in lists.items():
         if isinstance(value, str):
             raise Misuse(f"{of}: {name}={value!r} is one text; write a list, [...].")
+
+
+def refuse_other_class(of: str, given: object, kind: str) -> None:
+    """Look for something else where the class of an interface belongs, such as its name as a text.
+
+    Args:
+        of: what is called.
+        given: what should be the class.
+        kind: `message`, `service` or `action`.
+
+    Raises:
+        Misuse: it is not such a class.
+    """
+    module, has = _CLASSES[kind]
+    if isinstance(given, type) and hasattr(given, has):
+        return
+    if isinstance(given, str):
+        *package, name = re.split(r"[./]", given)
+        imported = f"from {package[0] if package else 'PACKAGE'}.{module} import {name}"
+        raise Misuse(f"{of}: {given!r} is a text; write the {kind} class {name} without quotes, after `{imported}`.")
+    name = given.__name__ if isinstance(given, type) else repr(given)
+    which = f"{'an' if kind == 'action' else 'a'} {kind} class"
+    raise Misuse(f"{of}: {name:.80} is not {which}; write one that is imported from `PACKAGE.{module}`.")
 
 
 def refuse_times(method: Callable[..., Any]) -> Callable[[tuple[Any, ...], Mapping[str, Any]], None]:

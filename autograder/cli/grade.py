@@ -175,7 +175,7 @@ def _show(run: ClassRun, paths: CoursePaths, lab: str, as_json: bool) -> None:
         return
     screen = console()
     by_hand = {student: _by_hand(grade) for student, grade in run.by_student.items()}
-    screen.print(class_view(run.results, by_hand))
+    screen.print(class_view(run.results, by_hand, screen.width))
     undecided = undecided_view(run.results)
     if undecided is not None:
         screen.print()

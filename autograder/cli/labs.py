@@ -35,10 +35,13 @@ def new_course(
             f"\nThe folder could not be registered as a course of yours ({error.filename}: {error.strerror}), so"
             f" nbgrader's own commands will ignore its settings. Once it can be written, run: autograder trust {folder}"
         )
-    command = (
-        "autograder" if shutil.which("autograder") else shlex.quote(str(Path(sys.executable).with_name("autograder")))
-    )
-    print(f"\nNext:\n  cd {shlex.quote(str(folder))}\n  {command} lint {FIRST_LAB}\n  {command} release")
+    print(f"\nNext:\n  cd {shlex.quote(str(folder))}\n  {_command()} lint {FIRST_LAB}\n  {_command()} release")
+
+
+def _command() -> str:
+    """The kit's command, as it can be typed here."""
+    here = str(Path(sys.executable).with_name("autograder"))
+    return "autograder" if shutil.which("autograder") else shlex.quote(here)
 
 
 @app.command()
@@ -63,6 +66,14 @@ def new_lab(
 
     for path in write(course_root(course), name):
         print(path)
+    where = f" --course {shlex.quote(str(course))}" if course else ""
+    print(
+        "\nThe lab holds a small example that works: the program `greeter`, a table, and a check"
+        "\nfor each. Replace them with your own. Then change requirements.yaml and canaries.yaml,"
+        "\nwhich name the example's sentences and answers."
+        f"\n\nNext, and after each change:\n  {_command()} lint {name}{where}"
+        f"\n  {_command()} release {name}{where}"
+    )
 
 
 @app.command()

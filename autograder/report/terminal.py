@@ -194,22 +194,29 @@ def why_lost(result: SubmissionResult) -> str:
     return ""
 
 
-def class_view(results: Sequence[SubmissionResult], by_hand: Mapping[str, str]) -> RenderableType:
+_NARROW = 100
+"""The columns of a terminal below which the table of a class has no room for reasons, so they follow it."""
+
+
+def class_view(results: Sequence[SubmissionResult], by_hand: Mapping[str, str], width: int) -> RenderableType:
     """Return a class as a table: a row for each student, a symbol for each check, and why points were lost.
 
     Args:
         results: the results of the class.
         by_hand: for each student, the points that people gave and what waits for them, in words.
+        width: the columns of the terminal. On a narrow one the reasons stand below the table, where nothing is cut.
     """
+    narrow = width < _NARROW
     checks = results[0].checks if results else []
-    table = Table(box=None, header_style="bold", padding=(0, 1), pad_edge=False, expand=True)
+    table = Table(box=None, header_style="bold", padding=(0, 1), pad_edge=False, expand=not narrow)
     table.add_column("student", no_wrap=True, max_width=26)
     table.add_column(f"checks 1-{len(checks)}", no_wrap=True)
     table.add_column("points", justify="right", no_wrap=True)
     if any(by_hand.values()):
         table.add_column("by hand", no_wrap=True)
     table.add_column("status", no_wrap=True)
-    table.add_column("why points were lost", ratio=1, no_wrap=True, overflow="ellipsis")
+    if not narrow:
+        table.add_column("why points were lost", ratio=1, no_wrap=True, overflow="ellipsis")
     for result in results:
         status = class_status(result)
         table.add_row(
@@ -218,10 +225,19 @@ def class_view(results: Sequence[SubmissionResult], by_hand: Mapping[str, str]) 
             f"{result.points:g}/{result.max_points:g}",
             *([by_hand.get(result.student, "")] if any(by_hand.values()) else []),
             Text(f"{SYMBOL[status]} {_WORD[status]}", STYLE[status]),
-            Text(why_lost(result)),
+            *([] if narrow else [Text(why_lost(result))]),
         )
-    legend = Text("\n".join(_legend(checks)), style="dim")
-    return Group(table, Text(), legend)
+    below = [Text(), _reasons(results)] if narrow and any(map(why_lost, results)) else []
+    return Group(table, *below, Text(), Text("\n".join(_legend(checks)), style="dim"))
+
+
+def _reasons(results: Sequence[SubmissionResult]) -> Table:
+    """Return a line for each student who lost points, with the whole reason."""
+    table = Table("student", "why points were lost", box=None, header_style="bold", padding=(0, 1), pad_edge=False)
+    for result in results:
+        if why := why_lost(result):
+            table.add_row(Text(plain(result.student)), Text(why))
+    return table
 
 
 def _marks(checks: Sequence[CheckResult]) -> Text:

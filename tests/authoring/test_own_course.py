@@ -79,7 +79,8 @@ def course(environment: Environment, tmp_path_factory: pytest.TempPathFactory) -
     root = tmp_path_factory.mktemp("own") / "my course"
     next_ = environment.run(root.parent, "autograder", "new", "course", root)
     assert f"  cd '{root}'\n" in next_
-    environment.run(root, "autograder", "new", "lab", LAB)
+    told = environment.run(root, "autograder", "new", "lab", LAB)
+    assert "the program `greeter`" in told and "canaries.yaml" in told and f"autograder lint {LAB}\n" in told
     told = environment.run(root, "autograder", "release")
     assert f"{LAB} → {root}/labs/{LAB}" in told
     return root

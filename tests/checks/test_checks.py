@@ -706,8 +706,15 @@ def test_a_name_that_differs_comes_with_what_differs(grade: Grade) -> None:
         ('launch("talker", ros_arguments="-r a:=b")', "ros_arguments='-r a:=b' is one text"),
         ('launch("talker", lifecycle="/talker")', "lifecycle='/talker' is one text"),
         ("ros.require(ros.graph.nodes, 'There is a node')", "call it"),
-        ('ros.topic("/chatter", "std_msgs/String").expect_publisher()', "is not a message class"),
-        ('ros.publisher("/chatter", "std_msgs/String").open()', "line 2"),  # raised far inside of rclpy
+        ('ros.topic("/chatter", "String").expect_publisher()', "the message class String without quotes"),
+        ('ros.topic("/chatter", "std_msgs/msg/String").listen()', "`from std_msgs.msg import String`"),
+        ('ros.topic("/chatter", Trigger).listen()', "Trigger is not a message class"),
+        ('ros.publisher("/chatter", String(data="x")).open()', "is not a message class"),
+        ('ros.service("/add", "Trigger").expect()', "`from PACKAGE.srv import Trigger`"),
+        ('ros.service("/add", Trigger.Request).expect()', "Trigger_Request is not a service class"),
+        ('ros.server("/gate", "Trigger", print)', "the service class Trigger without quotes"),
+        ('ros.action("/dock", "Fibonacci").send_goal(1)', "`from PACKAGE.action import Fibonacci`"),
+        ('launch("talker", listen=[("/chatter", "String")])', "listen, \"/chatter\": 'String' is a text"),
     ],
 )
 def test_what_a_lab_author_gets_wrong_is_refused_with_its_line_and_is_no_students_failure(

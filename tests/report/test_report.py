@@ -221,15 +221,24 @@ def test_thirty_students_are_readable_at_120_columns() -> None:
     checks = [check(3, outcome(Status.PASSED), grade_id=f"c{number}") for number in range(9)]
     checks.append(check(0, outcome(Status.FAILED, because="It waits without end. " * 20), grade_id="c9"))
     class_ = [result(*checks, student=f"student_with_long_name_{number}") for number in range(30)]
-    lines = text_of(class_view(class_, {})).rstrip().split("\n")
+    lines = text_of(class_view(class_, {}, 120)).rstrip().split("\n")
     rows = [line for line in lines if line.startswith("student_with")]
     assert len(rows) == 30 and max(map(len, lines)) <= 120
     assert all("27/30" in row and "✗ failed" in row and "It waits without end" in row for row in rows)
 
 
+def test_on_a_narrow_terminal_the_reasons_stand_whole_below_the_table() -> None:
+    why = "The subscription requests `reliable`, and the publisher offers only best effort, so nothing can arrive."
+    checks = [check(0, outcome(Status.FAILED, because=why), grade_id="c0")]
+    class_ = [result(*checks, student="ann"), result(check(3, outcome(Status.PASSED)), student="bob")]
+    lines = text_of(class_view(class_, {"ann": "2 of 5 points"}, 80), 80).rstrip().split("\n")
+    assert max(map(len, lines)) <= 80
+    assert why in " ".join(" ".join(lines).split()) and [line[:3] for line in lines].count("bob") == 1
+
+
 def test_the_class_table_tells_part_of_the_points_from_none() -> None:
     checks = [check(points, outcome(Status.FAILED), grade_id=f"c{points}") for points in (1, 0)]
-    (row,) = [line for line in text_of(class_view([result(*checks, student="ann")], {})).split("\n") if "ann" in line]
+    (row,) = [line for line in text_of(class_view([result(*checks)], {}, 120)).split("\n") if "ann" in line]
     assert "◑✗" in row
 
 
@@ -240,7 +249,7 @@ def test_undecided_checks_are_listed_for_the_instructor() -> None:
     assert "bob: The talker: The observer died." in text_of(undecided_view([decided, undecided]))
     unread = [check(None, outcome(Status.UNKNOWN, because="It is no notebook."), grade_id=name) for name in "abc"]
     assert "eve: everything: It is no notebook." in text_of(undecided_view([result(*unread, student="eve")]))
-    assert "?" in text_of(class_view([undecided], {}))
+    assert "?" in text_of(class_view([undecided], {}, 120))
 
 
 def test_junit_counts_failures_and_errors() -> None:

@@ -9,7 +9,7 @@ from autograder.checks import outcomes
 from autograder.checks.expect.discovery import Discovery
 from autograder.checks.expect.expectations import WITHIN
 from autograder.checks.message_text import set_fields
-from autograder.checks.misuse import Misuse
+from autograder.checks.misuse import Misuse, refuse_other_class
 from autograder.checks.running_launch import RunningLaunch
 from autograder.checks.waiting import waits_for
 from autograder.graph.services import ServiceMissing
@@ -31,6 +31,7 @@ class Action(Discovery):
     def __init__(self, running: RunningLaunch, name: str, action_type: type) -> None:
         """Ask about the action of this name and class."""
         super().__init__(running, name)
+        refuse_other_class(f'ros.action("{name}")', action_type, "action")
         self._type = action_type
 
     @waits_for("the action `{name}`")

@@ -10,6 +10,7 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from autograder import diagnosis
 from autograder.checks.expect.discovery import Discovery
 from autograder.checks.expect.expectations import WITHIN
+from autograder.checks.misuse import refuse_other_class
 from autograder.checks.running_launch import RunningLaunch
 from autograder.checks.scoring import asked
 from autograder.checks.waiting import waits_for
@@ -28,6 +29,7 @@ class Publisher(Discovery):
     ) -> None:
         """Describe the publisher; it is made when it is first used."""
         super().__init__(running, topic)
+        refuse_other_class(f'ros.publisher("{topic}")', msg_type, "message")
         self._type = msg_type
         self._qos = qos if isinstance(qos, QoSProfile) else QoSProfile(depth=qos)
 

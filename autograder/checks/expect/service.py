@@ -15,7 +15,7 @@ from autograder.checks.expect.discovery import Discovery
 from autograder.checks.expect.expectations import WITHIN
 from autograder.checks.expect.meanwhile import Meanwhile
 from autograder.checks.expect.topic import Topic
-from autograder.checks.misuse import Misuse
+from autograder.checks.misuse import Misuse, refuse_other_class
 from autograder.checks.running_launch import RunningLaunch
 from autograder.checks.scoring import asked
 from autograder.checks.waiting import waits_for
@@ -32,6 +32,7 @@ class Service(Discovery):
     def __init__(self, running: RunningLaunch, name: str, srv_type: type) -> None:
         """Ask about the service of this name and class."""
         super().__init__(running, name)
+        refuse_other_class(f'ros.service("{name}")', srv_type, "service")
         self._type = srv_type
 
     @waits_for("the service `{name}`")
@@ -150,6 +151,8 @@ class Server(Meanwhile):
             Misuse: nothing is offered under this name, and no answer was given.
         """
         super().__init__(running, name)
+        if srv_type is not None:
+            refuse_other_class(f'ros.server("{name}")', srv_type, "service")
         if srv_type is not None and answer is not None:
             running.offered[name] = OfferedService(running.observer, name, srv_type, answer, delay)
         elif name not in running.offered:

@@ -17,7 +17,7 @@ from autograder.checks.expect.endpoints import End, Sources
 from autograder.checks.expect.expectations import GONE_WITHIN, WITHIN, objection
 from autograder.checks.expect.rates import RATE
 from autograder.checks.message_text import in_words, int_in_float, shorten
-from autograder.checks.misuse import Misuse
+from autograder.checks.misuse import Misuse, refuse_other_class
 from autograder.checks.running_launch import RunningLaunch
 from autograder.checks.waiting import waits_for
 from autograder.diagnosis.callbacks import MESSAGE_FIELD
@@ -115,6 +115,8 @@ class Topic(Sources):
     def __init__(self, running: RunningLaunch, name: str, msg_type: type | None = None) -> None:
         """Ask about the topic of this name; most questions need the class of its messages."""
         super().__init__(running, name)
+        if msg_type is not None:
+            refuse_other_class(f'ros.topic("{name}")', msg_type, "message")
         self._type = msg_type
 
     @property

@@ -18,7 +18,7 @@ class AddClient(Node):
 
 
 def ask(node):
-    """Ask for the sum, log what came of it, and return the exit status."""
+    """Request the sum, log the outcome, and return the exit status."""
     if not node.client.wait_for_service(timeout_sec=node.server_within):
         node.get_logger().error("no server")
         return 1

@@ -18,7 +18,7 @@ class AddClient(Node):
 
 
 def ask(node):
-    """Ask for the sum, log what came of it, and return the exit status."""
+    """Request the sum, log the outcome, and return the exit status."""
     until = time.monotonic() + node.server_within
     while time.monotonic() < until and not node.client.wait_for_service(timeout_sec=0.1):
         pass

@@ -17,7 +17,7 @@ class AddClient(Node):
 
 
 def ask(node):
-    """Ask for the sum, log what came of it, and return the exit status."""
+    """Request the sum, log the outcome, and return the exit status."""
     while not node.client.wait_for_service(timeout_sec=0.2):
         node.get_logger().info("waiting")
     future = node.client.call_async(BasicTypes.Request(int32_value=node.a, int64_value=node.b))

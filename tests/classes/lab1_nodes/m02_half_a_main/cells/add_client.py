@@ -17,7 +17,7 @@ class AddClient(Node):
 
 
 def ask(node):
-    """Ask for the sum, log what came of it, and return the exit status."""
+    """Request the sum, log the outcome, and return the exit status."""
     future = node.client.call_async(BasicTypes.Request(int32_value=node.a, int64_value=node.b))
     rclpy.spin_until_future_complete(node, future, timeout_sec=node.answer_within)
     if not future.done():

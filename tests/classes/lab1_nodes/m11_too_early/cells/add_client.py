@@ -17,7 +17,7 @@ class AddClient(Node):
 
 
 def ask(node):
-    """Ask for the sum, log what came of it, and return the exit status."""
+    """Request the sum, log the outcome, and return the exit status."""
     request = BasicTypes.Request(int32_value=node.a, int64_value=node.b)
     future = node.client.call_async(request)
     if not node.client.wait_for_service(timeout_sec=node.server_within):

@@ -26,7 +26,7 @@ class Caller(Node):
             self.reply.publish(String(data=self.future.result().message))
 
     def on_request(self, _):
-        """Ask the gate; publish the message of its response on `reply`."""
+        """Call the gate, and publish the message of its response on `reply`."""
         self.future = self.gate.call_async(Trigger.Request())
 
 

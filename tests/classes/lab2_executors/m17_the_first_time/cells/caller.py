@@ -22,7 +22,7 @@ class Caller(Node):
         self.ticks.publish(Int64(data=self.count))
 
     def on_request(self, _):
-        """Ask the gate; publish the message of its response on `reply`."""
+        """Call the gate, and publish the message of its response on `reply`."""
         future = self.gate.call_async(Trigger.Request())
         future.add_done_callback(self.on_response)
 

@@ -13,7 +13,7 @@ class CameraDemo(Node):
         self.declare_parameter("camera_rate", 10)  # images per second, an integer
         self.declare_parameter("camera_frame", "camera_frame")
         self.stopped = False
-        # Make self.images (Image) and self.status (String), and subscribe self.on_stop (Bool)
+        # Create self.images (Image) and self.status (String), and subscribe with self.on_stop (Bool)
         self.images = self.create_publisher(Image, "camera/image_color", 10)
         self.status = self.create_publisher(String, "camera_demo/status", 10)
         self.create_subscription(Bool, "emergency_stop", self.on_stop, 10)

@@ -13,7 +13,7 @@ class CameraDemo(Node):
         self.declare_parameter("camera_rate", 10)  # images per second, an integer
         self.declare_parameter("camera_frame", "camera_frame")
         self.stopped = False
-        # Make self.images (Image) and self.status (String), and subscribe self.on_stop (Bool)
+        # Create self.images (Image) and self.status (String), and subscribe with self.on_stop (Bool)
         self.images = self.create_publisher(
             Image, self.get_parameter("camera_name").value + "/image_color", 10
         )

@@ -13,7 +13,7 @@ class LifecycleManager(Node):
         self.change = {name: self.create_client(ChangeState, f"{name}/change_state") for name in self.names}
 
     def request(self, name, label):
-        """Ask for one transition and wait for the answer."""
+        """Request one transition and wait for the answer."""
         self.change[name].wait_for_service()
         future = self.change[name].call_async(ChangeState.Request(transition=Transition(label=label)))
         rclpy.spin_until_future_complete(self, future)

@@ -15,7 +15,7 @@ class LifecycleManager(Node):
         self.change = {name: self.create_client(ChangeState, f"{name}/change_state") for name in self.names}
 
     def request(self, name, label):
-        """Ask for one transition and wait for the answer."""
+        """Request one transition and wait for the answer."""
         if not self.change[name].service_is_ready():
             return False
         future = self.change[name].call_async(ChangeState.Request(transition=Transition(label=label)))

@@ -29,7 +29,7 @@ class Taxi(Node):
         return GoalResponse.ACCEPT if goal.order > 0 else GoalResponse.REJECT
 
     def accepted(self, goal_handle):
-        """A goal was accepted; `goal_handle.execute()` starts to execute it."""
+        """Handle an accepted goal; `goal_handle.execute()` starts to execute it."""
         with self.lock:
             for handle in self.handles:
                 if handle.is_active:

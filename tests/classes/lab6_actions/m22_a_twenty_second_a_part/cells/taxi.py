@@ -14,7 +14,7 @@ class Taxi(Node):
         super().__init__("taxi")
         self.declare_parameter("block", 0.5)  # seconds
         self.block = self.get_parameter("block").value
-        self.current = None  # the handle of the goal that counts
+        self.current = None  # the handle of the goal that is being driven
         self.lock = threading.Lock()
         self.server = ActionServer(
             self,
@@ -29,7 +29,7 @@ class Taxi(Node):
         return GoalResponse.ACCEPT if goal.order > 0 else GoalResponse.REJECT
 
     def accepted(self, goal_handle):
-        """A goal was accepted; `goal_handle.execute()` starts to execute it."""
+        """Handle an accepted goal; `goal_handle.execute()` starts to execute it."""
         with self.lock:
             if self.current is not None and self.current.is_active:
                 self.current.abort()

@@ -22,7 +22,7 @@ class CarManager(Node):
         self.change = {name: self.create_client(ChangeState, f"{name}/change_state") for name in names}
 
     def ask(self, client, request):
-        """The answer, or None if none comes in time."""
+        """Return the answer, or None if none comes in time."""
         patience = self.get_parameter("patience").value
         if not client.wait_for_service(patience):
             return None
@@ -34,7 +34,7 @@ class CarManager(Node):
         return future.result()
 
     def bring_up(self, name):
-        """Take the steps that are left; return whether the node is active."""
+        """Request the transitions that are left, and return whether the node is active."""
         answer = self.ask(self.get[name], GetState.Request())
         state = answer.current_state.label if answer else ""
         for label in {"unconfigured": ["configure", "activate"], "inactive": ["activate"]}.get(state, []):
