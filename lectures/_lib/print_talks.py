@@ -12,6 +12,11 @@ from pathlib import Path
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 FORMS = {"": "", "_notes": "&showNotes=separate-page"}
 """What the name of a file ends in, and what reveal.js is asked for."""
+NOTES_STYLE = (
+    ".reveal .speaker-notes-pdf { font-size: 30px !important; line-height: 1.4 !important; }"
+    ".reveal .speaker-notes-pdf:last-child { break-after: avoid !important; page-break-after: avoid !important; }"
+)
+"""Notes as large as they must be if a slide and its notes are printed on one sheet."""
 
 
 def print_talks(folder: Path) -> list[Path]:
@@ -41,6 +46,7 @@ def print_talks(folder: Path) -> list[Path]:
                 window.wait_for_function(
                     "Reveal.isReady() && document.querySelectorAll('.pdf-page').length >= Reveal.getTotalSlides()"
                 )
+                window.add_style_tag(content=NOTES_STYLE)
                 file = deck.with_name(f"{deck.stem}{ending}.pdf")
                 window.pdf(path=file, prefer_css_page_size=True, print_background=True)
                 printed.append(file)
