@@ -220,7 +220,9 @@ def test_from_an_unpacked_zip_to_a_verdict(course: Path, tmp_path: Path) -> None
     links = '<a href="index.html">Index</a>\n      <a href="../slides/01_nodes.html">Slides</a>\n'
     (book / "01_nodes.html").write_text(links, encoding="utf-8")
     (book / "appendix").mkdir()
-    to_teachers = '<a class="reference" href="{}instructors/exam_questions.html#x"><span>Exam</span></a> <a href="#t">t</a>'
+    to_teachers = (
+        '<a class="reference" href="{}instructors/exam_questions.html#x"><span>Exam</span></a> <a href="#t">t</a>'
+    )
     (book / "appendix" / "words.html").write_text(to_teachers.format("../"), encoding="utf-8")
     (book / "search.html").write_text(to_teachers.format(""), encoding="utf-8")
     (book / "instructors").mkdir()

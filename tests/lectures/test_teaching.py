@@ -54,7 +54,9 @@ def test_the_points_of_the_term_plan_are_those_of_the_labs() -> None:
     assert [(int(number), int(points)) for number, points in whole] == [
         (number, sum(points_of(lab).values())) for number, lab in enumerate(labs, start=1)
     ]
-    for number, cells, kept, all_points in re.findall(r"^\| (\d) \| (`check.*?) \| (\d+) of (\d+) \|$", PLAN, re.MULTILINE):
+    for number, cells, kept, all_points in re.findall(
+        r"^\| (\d) \| (`check.*?) \| (\d+) of (\d+) \|$", PLAN, re.MULTILINE
+    ):
         points = points_of(labs[int(number) - 1])
         dropped = re.findall(r"`(\w+)`", cells)
         assert sum(points.values()) == int(all_points)
@@ -77,5 +79,12 @@ def test_each_lecture_has_a_part_on_the_teaching_page() -> None:
     parts = re.split(r"^## (?=Lecture \d)", text, flags=re.MULTILINE)[1:]
     assert [part[:9] for part in parts] == [f"Lecture {number}" for number in range(1, 9)]
     for part in parts:
-        for word in ("**Begin with:**", "**What they believe.**", "**Where they stumble**", "**Demo:", "%%node", "{measured}"):
+        for word in (
+            "**Begin with:**",
+            "**What they believe.**",
+            "**Where they stumble**",
+            "**Demo:",
+            "%%node",
+            "{measured}",
+        ):
             assert word in part or (word == "%%node" and part.startswith("Lecture 8")), f"{part[:9]} lacks {word}"
