@@ -1,7 +1,8 @@
 """What a lecture says was measured: each such assertion fails when the statement is made false.
 
 Each lecture, and the page of exam questions, has a table of mutants, `tests/lecture_mutants/PAGE.yaml`: for each
-statement a change that makes it false. One run of the page with changed programs shows for all of them at once whether their assertions notice.
+statement a change that makes it false. One run of the page with changed programs shows for all of them at once whether
+their assertions notice.
 """
 
 from __future__ import annotations
