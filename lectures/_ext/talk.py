@@ -48,14 +48,14 @@ def on_page(app: Sphinx, pagename: str, template: str, context: dict[str, Any], 
 def on_doctree(app: Sphinx, doctree: nodes.document) -> None:
     """Let the book's links to the source of a talk, as the repository has them, lead to the talk that was built."""
     above = "../" * (app.env.docname.count("/") + 1)
-    for link in list(doctree.findall(addnodes.download_reference)):
-        source = Path(link["reftarget"])
-        if source.parent.name == "slides" and source.suffix == ".md":
-            link.replace_self(nodes.reference("", "", *link.children, refuri=f"{above}slides/{source.stem}.html"))
+    for link in list(doctree.findall(addnodes.pending_xref)):
+        folder, _, talk = link["reftarget"].partition("/")
+        if link.get("refdomain") == "doc" and folder == "slides":
+            link.replace_self(nodes.reference("", "", *link.children, refuri=f"{above}slides/{talk}.html"))
 
 
 def setup(app: Sphinx) -> dict[str, Any]:
     """Register with Sphinx."""
     app.connect("html-page-context", on_page)
-    app.connect("doctree-read", on_doctree, priority=100)  # before Sphinx copies what can be downloaded
+    app.connect("doctree-read", on_doctree)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
