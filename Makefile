@@ -57,7 +57,7 @@ lectures: setup-dev ## build the book and the slides into build/lectures
 	@$(RUN) python lectures/_lib/build.py build/lectures $(ARGS)
 	@echo build/lectures/book/index.html build/lectures/slides/index.html
 
-pdf: lectures ## print the slides as PDF, one page for each slide, into build/lectures/slides (needs chromium)
+pdf: lectures ## print the slides as PDF, without and with the notes, into build/lectures/slides (needs chromium)
 	@$(RUN) python lectures/_lib/print_talks.py build/lectures/slides
 
 wheel: setup-dev ## build the kit as a wheel, for courses elsewhere, into build/wheel

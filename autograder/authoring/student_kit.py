@@ -134,6 +134,9 @@ _PLACES = {
 _BOOK_ROW = "| `lectures` | the lectures: open `lectures/index.html` in a browser |\n"
 _SLIDES = re.compile(r'\s*<a href="\.\./slides/[^"]*">Slides</a>')
 """A link from a page to its slides. The slides and their notes are only for teachers."""
+_TEACHERS_PAGES = "instructors"
+"""The folder of a book's pages for teachers. They hold exam questions with answers."""
+_TO_TEACHERS_PAGES = re.compile(rf'<a\b[^>]*href="(?:\.\./)*{_TEACHERS_PAGES}/[^"]*"[^>]*>(.*?)</a>', re.DOTALL)
 _NOT_OURS = shutil.ignore_patterns(".*", "__pycache__", "*.pyc", "nodes", "*.new")
 _EPOCH = (1980, 1, 1, 0, 0, 0)
 """The time of every file in the zip. It is always the same, so that equal sources give equal zips."""
@@ -144,7 +147,8 @@ def write_kit(root: Path, book: Path | None, into: Path) -> Path:
 
     Args:
         root: the course's folder. Its `labs` are copied as they are.
-        book: a folder with the lectures as HTML; None if the kit contains no lectures.
+        book: a folder with the lectures as HTML, of which students get all but the pages for teachers; None if the kit
+            contains no lectures.
         into: the folder in which the folder and the zip are written.
 
     Raises:
@@ -164,9 +168,7 @@ def write_kit(root: Path, book: Path | None, into: Path) -> Path:
         shutil.copytree(paths.labs / name, labs / name, ignore=_NOT_OURS)
     shutil.copy(paths.labs / "README.md", labs)
     if book is not None:
-        shutil.copytree(book, folder / "lectures", ignore=_NOT_OURS)
-        for page in (folder / "lectures").glob("*.html"):
-            page.write_text(_SLIDES.sub("", page.read_text(encoding="utf-8")), encoding="utf-8")
+        _copy_book(book, folder / "lectures")
     settings = read_settings(root)
     (folder / KIT_FOLDER / SETTINGS_FILE).write_text(_settings_file(settings, names), encoding="utf-8")
     shutil.copy(lock, folder)
@@ -185,6 +187,15 @@ def write_kit(root: Path, book: Path | None, into: Path) -> Path:
         what = "The students' kit would contain something that students must not see:"
         raise KitError("\n  ".join([what, *found[:10]]), "Nothing was written.")
     return _zipped(folder)
+
+
+def _copy_book(book: Path, into: Path) -> None:
+    """Copy the lectures without the pages for teachers, and without links to those and to the slides."""
+    shutil.copytree(book, into, ignore=_NOT_OURS)
+    shutil.rmtree(into / _TEACHERS_PAGES, ignore_errors=True)
+    for page in into.rglob("*.html"):
+        text = _SLIDES.sub("", page.read_text(encoding="utf-8"))
+        page.write_text(_TO_TEACHERS_PAGES.sub(r"\1", text), encoding="utf-8")
 
 
 def _settings_file(settings: CourseSettings, names: Sequence[str]) -> str:

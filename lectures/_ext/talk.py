@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from docutils import nodes
+from sphinx import addnodes
 from sphinx.application import Sphinx
 
 LECTURES = Path(__file__).resolve().parent.parent
@@ -44,7 +45,17 @@ def on_page(app: Sphinx, pagename: str, template: str, context: dict[str, Any], 
     context["body"] = _FIGURE.sub(linked, body)
 
 
+def on_doctree(app: Sphinx, doctree: nodes.document) -> None:
+    """Let the book's links to the source of a talk, as the repository has them, lead to the talk that was built."""
+    above = "../" * (app.env.docname.count("/") + 1)
+    for link in list(doctree.findall(addnodes.pending_xref)):
+        folder, _, talk = link["reftarget"].partition("/")
+        if link.get("refdomain") == "doc" and folder == "slides":
+            link.replace_self(nodes.reference("", "", *link.children, refuri=f"{above}slides/{talk}.html"))
+
+
 def setup(app: Sphinx) -> dict[str, Any]:
     """Register with Sphinx."""
     app.connect("html-page-context", on_page)
+    app.connect("doctree-read", on_doctree)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -1,4 +1,7 @@
-"""Print the talks that have been built as PDF, a page for each slide: `python print_talks.py build/lectures/slides`."""
+"""Print the talks that have been built as PDF: `python print_talks.py build/lectures/slides`.
+
+`01_nodes.pdf` has a page for each slide. In `01_nodes_notes.pdf` a page with the notes follows each slide.
+"""
 
 from __future__ import annotations
 
@@ -7,10 +10,17 @@ import sys
 from pathlib import Path
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
+FORMS = {"": "", "_notes": "&showNotes=separate-page"}
+"""What the name of a file ends in, and what reveal.js is asked for."""
+NOTES_STYLE = (
+    ".reveal .speaker-notes-pdf { font-size: 30px !important; line-height: 1.4 !important; }"
+    ".reveal .speaker-notes-pdf:last-child { break-after: avoid !important; page-break-after: avoid !important; }"
+)
+"""Notes as large as they must be if a slide and its notes are printed on one sheet."""
 
 
 def print_talks(folder: Path) -> list[Path]:
-    """Print each deck of a folder into a file beside it, and return the files.
+    """Print each deck of a folder into two files beside it, without and with the notes, and return the files.
 
     Raises:
         SystemExit: there is no browser, or there are no decks.
@@ -26,17 +36,22 @@ def print_talks(folder: Path) -> list[Path]:
         raise SystemExit(f"There are no slides in {folder}. What to do: make lectures")
     from playwright.sync_api import sync_playwright
 
+    printed: list[Path] = []
     with sync_playwright() as playwright:
         started = playwright.chromium.launch(executable_path=browser, args=["--no-sandbox", "--disable-gpu"])
         window = started.new_page(viewport={"width": 1280, "height": 720})
         for deck in decks:
-            window.goto(f"{deck.resolve().as_uri()}?print-pdf")
-            window.wait_for_function(
-                "Reveal.isReady() && document.querySelectorAll('.pdf-page').length >= Reveal.getTotalSlides()"
-            )
-            window.pdf(path=deck.with_suffix(".pdf"), prefer_css_page_size=True, print_background=True)
+            for ending, notes in FORMS.items():
+                window.goto(f"{deck.resolve().as_uri()}?print-pdf{notes}")
+                window.wait_for_function(
+                    "Reveal.isReady() && document.querySelectorAll('.pdf-page').length >= Reveal.getTotalSlides()"
+                )
+                window.add_style_tag(content=NOTES_STYLE)
+                file = deck.with_name(f"{deck.stem}{ending}.pdf")
+                window.pdf(path=file, prefer_css_page_size=True, print_background=True)
+                printed.append(file)
         started.close()
-    return [deck.with_suffix(".pdf") for deck in decks]
+    return printed
 
 
 if __name__ == "__main__":

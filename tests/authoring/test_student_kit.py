@@ -219,11 +219,22 @@ def test_from_an_unpacked_zip_to_a_verdict(course: Path, tmp_path: Path) -> None
     (book / "index.html").write_text("<h1>Lectures</h1>", encoding="utf-8")
     links = '<a href="index.html">Index</a>\n      <a href="../slides/01_nodes.html">Slides</a>\n'
     (book / "01_nodes.html").write_text(links, encoding="utf-8")
+    (book / "appendix").mkdir()
+    to_teachers = (
+        '<a class="reference" href="{}instructors/exam_questions.html#x"><span>Exam</span></a> <a href="#t">t</a>'
+    )
+    (book / "appendix" / "words.html").write_text(to_teachers.format("../"), encoding="utf-8")
+    (book / "search.html").write_text(to_teachers.format(""), encoding="utf-8")
+    (book / "instructors").mkdir()
+    (book / "instructors" / "exam_questions.html").write_text("<p>Answer: 42</p>", encoding="utf-8")
     with zipfile.ZipFile(write_kit(course, book, tmp_path)) as archive:
         archive.extractall(tmp_path / "für Übungen")
     kit = tmp_path / "für Übungen" / NAME
     page = (kit / "lectures" / "01_nodes.html").read_text(encoding="utf-8")
     assert page == '<a href="index.html">Index</a>\n', "a link to slides, which students do not get"
+    assert not (kit / "lectures" / "instructors").exists(), "exam questions with their answers"
+    for place in ("appendix/words.html", "search.html"):
+        assert (kit / "lectures" / place).read_text(encoding="utf-8") == '<span>Exam</span> <a href="#t">t</a>'
     write_lock(kit, "requirements.lock", "uv")
     made = make(kit, "setup")
     assert made.returncode == 0, made.stderr

@@ -1,7 +1,8 @@
 """What a lecture says was measured: each such assertion fails when the statement is made false.
 
-Beside each lecture lies a table of mutants, `tests/lecture_mutants/LECTURE.yaml`: for each statement a change that
-makes it false. One run of the page with changed programs shows for all of them at once whether their assertions notice.
+Each lecture, and the page of exam questions, has a table of mutants, `tests/lecture_mutants/PAGE.yaml`: for each
+statement a change that makes it false. One run of the page with changed programs shows for all of them at once whether
+their assertions notice.
 """
 
 from __future__ import annotations
@@ -21,7 +22,8 @@ from nbclient import NotebookClient
 from places import ROOT
 
 LECTURES = ROOT / "lectures"
-TABLES = sorted((ROOT / "tests" / "lecture_mutants").glob("*.yaml"))
+MUTANTS = ROOT / "tests" / "lecture_mutants"
+TABLES = sorted(MUTANTS.rglob("*.yaml"))
 CELL = re.compile(r"^```\{code-cell\}[^\n]*\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 OPTIONS = re.compile(r"\A(?:---\n.*?\n---\n|(?::\w[^\n]*\n)+\n?)", re.DOTALL)
 HELD = "HELD "
@@ -62,6 +64,11 @@ def held(sources: list[str], folder: Path) -> dict[str, bool]:
     return dict(json.loads(next(text for text in said if text.startswith(HELD)).removeprefix(HELD)))
 
 
+def page_of(table: Path) -> Path:
+    """The page whose statements a table makes false."""
+    return LECTURES / table.relative_to(MUTANTS).with_suffix(".md")
+
+
 def keys_of(page: Path) -> set[str]:
     """The statements that a page asserts."""
     return set(re.findall(r'^assert .*?, "([a-z0-9-]+)"$', page.read_text(encoding="utf-8"), re.MULTILINE))
@@ -85,7 +92,7 @@ def mutated(sources: list[str], changes: list[dict[str, Any]]) -> list[str]:
 @pytest.mark.parametrize("table", TABLES, ids=lambda path: path.stem)
 def test_each_statement_has_a_mutant(table: Path) -> None:
     changes = yaml.safe_load(table.read_text(encoding="utf-8"))
-    page = LECTURES / f"{table.stem}.md"
+    page = page_of(table)
     assert {key for change in changes for key in change["breaks"]} == keys_of(page)
     mutated(cells_of(page), changes)
 
@@ -93,7 +100,7 @@ def test_each_statement_has_a_mutant(table: Path) -> None:
 @pytest.mark.parametrize("table", TABLES, ids=lambda path: path.stem)
 def test_each_assertion_fails_when_its_statement_is_false(table: Path, tmp_path: Path) -> None:
     changes = yaml.safe_load(table.read_text(encoding="utf-8"))
-    page = LECTURES / f"{table.stem}.md"
+    page = page_of(table)
     found = held(mutated(cells_of(page), changes), tmp_path)
     assert found.keys() == keys_of(page)
     assert [key for key, holds in found.items() if holds] == [], "these assertions do not notice"

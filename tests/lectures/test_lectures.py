@@ -182,15 +182,17 @@ def test_axe_has_nothing_against_the_slides(site: Path, page: Any, name: str, co
 
 
 def test_a_talk_can_be_printed(site: Path, browser: Any, tmp_path: Path) -> None:
-    """A page for each slide; where there is no browser, one sentence."""
+    """A page for each slide, and with the notes two pages; where there is no browser, one sentence."""
     for name in ("_static", "_images"):
         (tmp_path / name).symlink_to(site / "slides" / name)
     deck = tmp_path / f"{TALKS[0]}.html"
     deck.write_text((site / "slides" / deck.name).read_text())
     command = [sys.executable, ROOT / "lectures" / "_lib" / "print_talks.py", tmp_path]
     subprocess.run(command, check=True, timeout=300)
-    pages = re.findall(rb"/Type\s*/Page\b", deck.with_suffix(".pdf").read_bytes())
-    assert len(pages) == deck.read_text().count('<aside class="notes"')
+    slides = deck.read_text().count('<aside class="notes"')
+    for ending, number in (("", slides), ("_notes", 2 * slides)):
+        printed = deck.with_name(f"{deck.stem}{ending}.pdf").read_bytes()
+        assert len(re.findall(rb"/Type\s*/Page\b", printed)) == number
     without = subprocess.run(command, capture_output=True, text=True, timeout=300, env={"PATH": ""})
     assert without.returncode == 1 and without.stderr.startswith("No browser was found"), without.stderr
 
