@@ -89,8 +89,37 @@ def middleware() -> Picture:
     )
 
 
+def frames() -> Picture:
+    """Three frames of a car, and a sign that one of them sees."""
+    canvas = Canvas(330)
+    for x, name, what in ((20, "map", "the hall"), (360, "car", "its middle"), (700, "camera", "on the car")):
+        canvas.box(x, 40, 180, 84, look=0, round=10, line=2)
+        canvas.words(x + 90, 76, name, anchor="middle", bold=True, size=22)
+        canvas.words(x + 90, 106, what, anchor="middle")
+    for x, kind, topic, often in ((200, "moves", "/tf", "every 0.1 s"), (540, "static", "/tf_static", "once")):
+        canvas.line([(x, 82), (x + 156, 82)], arrow=True, line=2.6, dashed=kind == "moves")
+        canvas.words(x + 78, 68, kind, anchor="middle", bold=True)
+        canvas.words(x + 78, 108, topic, anchor="middle", size=17)
+        canvas.words(x + 78, 130, often, anchor="middle", size=17)
+    canvas.box(360, 220, 180, 60, look=3, round=10)
+    canvas.words(450, 257, "stop sign", anchor="middle", bold=True, halo=True)
+    canvas.line([(790, 124), (790, 250), (546, 250)], arrow=True, line=2.2)
+    canvas.words(670, 214, "seen: 20 m ahead", anchor="middle")
+    canvas.line([(110, 124), (110, 250), (354, 250)], arrow=True, line=2.2)
+    canvas.words(232, 214, "wanted: at (5, 30)", anchor="middle")
+    canvas.words(
+        450, 318, "From the camera's frame to the map's: two transforms, one after the other.", anchor="middle"
+    )
+    return canvas.picture(
+        "Three coordinate frames. From map to car leads a transform that moves, published every 0.1 s on /tf. From "
+        "car to camera leads a static transform, published once on /tf_static. The camera sees a stop sign 20 m ahead; "
+        "wanted is its place on the map, (5, 30). Two transforms, one after the other, lead there."
+    )
+
+
 DRAWINGS: dict[str, Callable[[], Picture]] = {
     "robot-layers": robot_layers,
     "two-helpers": two_helpers,
     "middleware": middleware,
+    "frames": frames,
 }
