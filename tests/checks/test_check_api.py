@@ -17,7 +17,7 @@ LABS = sorted((ROOT / "solutions").glob("*/*.ipynb"))
 
 OFFERED = {
     "ros": """
-        action activity changes clock draw expect_argument_needed graph lifecycle log node part pause program programs
+        action activity car changes clock draw expect_argument_needed graph lifecycle log node part pause program programs
         publisher qos require require_equal runs score server service start stop topic wait
     """,
     "topic": """
@@ -43,7 +43,8 @@ OFFERED = {
         signal stop
     """,
     "graph": "nodes publishers subscriptions topics wait",
-    "draw": "arrivals graph lifecycle qos timeline",
+    "car": "expect_driven expect_no_touch expect_reached expect_stopped_within place pose touches trail",
+    "draw": "arrivals film graph lifecycle qos timeline world",
 }
 
 

@@ -161,4 +161,3 @@ def test_a_world_that_is_paused_stands_still(observer: Observer) -> None:
         assert observer.wait(lambda: len(passed) > 5, WITHIN) and world.simulation.steps == before
     finally:
         world.close()
-
