@@ -206,6 +206,26 @@ class Launch(Ros):
         """
         self._end()
 
+    def show(self) -> None:
+        """Show the world of the launch live, below the cell, while the cells after it go on.
+
+        It stops with the launch; then the picture of the world with the trails takes its place. At grading it does
+        nothing.
+
+        Example:
+            `robot = launch("driver", world="room").start(); robot.show()`
+        """
+        here = current.check.front_end
+        if self._running.world is None:
+            raise Misuse('show: this launch has no world; write launch(…, world="room").')
+        if not self._entered or self._over:
+            raise Misuse("show: nothing runs; begin with robot = launch(…).start(), then robot.show().")
+        if here is None:
+            return
+        if self._running.view is not None:
+            self._running.view.close()
+        self._running.view = here.show(self._running)
+
     def log(self, program: str = "") -> Log:
         """Return what the programs, or one of them, have printed so far; also after the block.
 
@@ -293,6 +313,8 @@ class Launch(Ros):
                 self._group.end()
             if self._running.watcher is not None:
                 self._running.watcher.close()
+            if self._running.view is not None:
+                self._running.view.close()
             if self._running.world is not None:
                 self._running.world.close()
         finally:

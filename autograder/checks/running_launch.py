@@ -10,7 +10,7 @@ from autograder.checks import current, picture_data
 from autograder.checks.concurrency import Concurrency
 from autograder.checks.program import Program
 from autograder.checks.settling import Settling
-from autograder.core.front_end import Watcher
+from autograder.core.front_end import View, Watcher
 from autograder.core.results import NodeLog
 from autograder.diagnosis import Scene
 from autograder.graph.lifecycle import LifecycleClient
@@ -74,6 +74,8 @@ class RunningLaunch:
         """Those of them that have been used: what subscribed by then knows them."""
         self.world: RunningWorld | None = None
         """The world that its programs drive in."""
+        self.view: View | None = None
+        """Shows that world live in a notebook."""
         self.graph: picture_data.Graph | None = None
         """The graph as it was when the launch ended."""
         self._ended: float | None = None

@@ -1,9 +1,9 @@
 """The world that a launch drives in: how a check cell describes it, and how it is started beside the programs.
 
 It runs in the process of the check, outside of the sandbox of the programs, and only there are its room, its cars and
-its record. What a check asks about a car is therefore what the world itself measured: a program that publishes `odom` or
-`scan` of its own deceives only those who listen to them, and `told_by_others` flags it for the instructor. In a check,
-nobody but the check can place a car.
+its record. What a check asks about a car is therefore what the world itself measured: a program that publishes `odom`
+or `scan` of its own deceives only those who listen to them, and `told_by_others` flags it for the instructor. In a
+check, nobody but the check can place a car.
 """
 
 from __future__ import annotations
