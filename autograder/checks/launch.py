@@ -216,7 +216,7 @@ class Launch(Ros):
             `robot = launch("driver", world="room").start(); robot.show()`
         """
         here = current.check.front_end
-        if self._running.world is None:
+        if self._world is None:
             raise Misuse('show: this launch has no world; write launch(…, world="room").')
         if not self._entered or self._over:
             raise Misuse("show: nothing runs; begin with robot = launch(…).start(), then robot.show().")

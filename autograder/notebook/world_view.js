@@ -157,12 +157,12 @@ function render({ model, el }) {
     const row = element(meters, "div");
     element(row, "span", {}, `${name || "speed"} `);
     const meter = element(row, "meter", { min: 0, max: 1, value: 0, "aria-label": `speed ${name}` });
-    return { meter, text: element(row, "span", { class: "aw-figure" }) };
+    return { meter, text: element(row, "span", { class: "aw-figure" }), state: element(meters, "div", { class: "aw-state" }) };
   });
   const table = element(right, "table");
   element(table, "caption", {}, "Messages a second");
   const rates = element(table, "tbody");
-  const news = element(el, "ol", { class: "aw-news", role: "log", "aria-live": "polite", "aria-label": "What happens" });
+  const news = element(el, "ul", { class: "aw-news", role: "log", "aria-live": "polite", "aria-label": "What happens" });
 
   const show = (message) => {
     if (message.gone) {
@@ -173,11 +173,13 @@ function render({ model, el }) {
     pause.textContent = message.paused ? "Go on" : "Pause";
     message.cars.forEach(({ speed, state }, number) => {
       speeds[number].meter.value = Math.abs(speed);
-      speeds[number].text.textContent = `${speed.toFixed(2)} m/s ${state}`;
+      speeds[number].text.textContent = ` ${speed.toFixed(2)} m/s`;
+      speeds[number].state.textContent = state;
     });
     for (const [name, made] of kills) {
-      made.disabled = !message.running.includes(name);
-      made.textContent = made.disabled ? `${name} has ended` : `Kill ${name}`;
+      const ended = !message.running.includes(name);
+      made.setAttribute("aria-disabled", ended); // a button that is disabled would lose the focus
+      made.textContent = ended ? `${name} has ended` : `Kill ${name}`;
     }
     rates.replaceChildren();
     for (const [topic, rate] of message.rates) {

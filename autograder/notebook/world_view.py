@@ -32,6 +32,8 @@ _EVERY = 0.1
 """The seconds between two messages to the page."""
 _GONE_AFTER = 3.0
 """The seconds after which a page that says nothing does not look any more."""
+_KEYS_HOLD = 1.0
+"""The seconds for which a key counts as held if nothing more comes from the page."""
 _EVERY_RAY = 6
 """Of the lidar's rays, one in so many is shown."""
 _TRAIL = 600
@@ -64,6 +66,8 @@ class WorldView:
         self._rates = _Rates(self._world)
         self._wheels: dict[str, Any] = {}
         """The publishers through which a page drives, by the car's namespace."""
+        self._keys: tuple[str, float, float, float] | None = None
+        """The car that is driven by keys, its speeds, and until when."""
         self._widget = self._make_widget()
         self._display: Any = None
         self._over = threading.Event()
@@ -149,6 +153,21 @@ class WorldView:
                 self._kill(str(content["name"]))
 
     def _drive(self, name: str, speed: float, turn: float) -> None:
+        """Drive as the keys say, until they say something else or nothing more comes."""
+        drives = bool(speed or turn)
+        self._keys = (name, speed, turn, time.monotonic() + _KEYS_HOLD) if drives else None
+        self._command(name, speed, turn)
+
+    def _hold_keys(self) -> None:
+        """Repeat the last command: a busy browser sends fewer than the watchdog of the car wants."""
+        keys = self._keys
+        if keys is not None:
+            name, speed, turn, until = keys
+            if time.monotonic() > until:
+                self._keys, speed, turn = None, 0.0, 0.0
+            self._command(name, speed, turn)
+
+    def _command(self, name: str, speed: float, turn: float) -> None:
         message = Twist()
         message.linear.x, message.angular.z = speed, turn
         with self._lock:
@@ -172,6 +191,7 @@ class WorldView:
 
     def _feed(self) -> None:
         while not self._over.wait(_EVERY):
+            self._hold_keys()
             if self._heard and self._busy():  # a page that looked when the cell began may be unable to say so now
                 self._heard = time.monotonic()
             if time.monotonic() - self._heard > _GONE_AFTER:

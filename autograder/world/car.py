@@ -85,11 +85,9 @@ class Car:
     """Whether the watchdog keeps it from driving."""
     touches: str = ""
     """What it touches now: `a wall`, `a box` or `a car`; empty if it touches nothing."""
-    touched: Pose = field(init=False)
-    """Where it was when that began."""
 
     def __post_init__(self) -> None:
-        self.pose = self.touched = self.start
+        self.pose = self.start
 
     def back(self, pose: Pose | None = None) -> None:
         """Put the car where it began, or somewhere else. It stands, and has got no command yet."""

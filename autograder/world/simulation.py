@@ -32,8 +32,8 @@ RANGE_MIN, RANGE_MAX = 0.05, 8.0
 """What the lidar can measure, in metres."""
 NOISE = 0.01
 """The standard deviation of the lidar, in metres."""
-AWAY = 0.03
-"""The metres that a car must move before the same thing counts as touched again."""
+CLEAR = 0.03
+"""The metres that must be free around a car before it can touch the same thing again."""
 KEPT = 20 * 60 * 20
 """The samples that are kept of a car: twenty minutes."""
 TOUCHES_KEPT = 1000
@@ -95,7 +95,7 @@ class Simulation:
     ) -> None:
         """Put the cars where the map has them."""
         if len(names) > len(room.starts):
-            raise ValueError(f"the map has {len(room.starts)} cars, and {len(names)} are to be driven")
+            raise ValueError(f"{len(names)} cars are to be driven, and the map has {len(room.starts)}")
         self.room, self.heartbeat = room, heartbeat
         self.cars = [
             Car(names[number], start) if number < len(names) else Car(f"parked{number}", start, driven=False)
@@ -109,6 +109,7 @@ class Simulation:
         self.lock = threading.RLock()
         """Held while the world changes; hold it to read several things of one moment."""
         self._outline = cars.outline(min(room.cell, 0.2) / 2)
+        self._around = self._outline * (1 + 2 * CLEAR / cars.LENGTH, 1 + 2 * CLEAR / cars.WIDTH)
         self._seed = random.Random(seed).getrandbits(64)
 
     @property
@@ -175,18 +176,17 @@ class Simulation:
         if found is None:
             record.metres += math.hypot(pose.x - car.pose.x, pose.y - car.pose.y)
             car.pose = pose
-            if car.touches and math.hypot(pose.x - car.touched.x, pose.y - car.touched.y) > AWAY:
+            if car.touches and self._touched(car, pose, self._around) is None:
                 car.touches = ""
             return
         what, x, y = found
         if what != car.touches:
             record.touches.append(Touch(self.time, car.pose, what, x, y))
-            car.touched = car.pose
         car.touches, car.speed, car.turn = what, 0.0, 0.0
 
-    def _touched(self, car: Car, pose: Pose) -> tuple[str, float, float] | None:
-        """Return what a car would touch at a pose, and where; None if it would touch nothing."""
-        points = cars.placed(self._outline, pose)
+    def _touched(self, car: Car, pose: Pose, outline: Any = None) -> tuple[str, float, float] | None:
+        """Return what a car, or an outline around it, would touch at a pose, and where; None if it is nothing."""
+        points = cars.placed(self._outline if outline is None else outline, pose)
         hit = self.room.is_solid(points)
         if np.any(hit):
             x, y = points[np.argmax(hit)]

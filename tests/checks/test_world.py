@@ -1,4 +1,4 @@
-"""What a check is told about a car comes from the world itself, in the grading sandbox, whatever a program publishes."""
+"""What a check is told about a car comes from the world itself, in the sandbox, whatever a program publishes."""
 
 from __future__ import annotations
 

@@ -154,7 +154,7 @@ def test_a_parked_car_is_an_obstacle_and_two_driven_cars_are_told_apart() -> Non
     drive(world, 0.3, 0.0, 1.0, "rear")
     assert world.driven["front"].pose == world.room.starts[0]
     assert world.driven["rear"].pose.x < world.room.starts[1].x
-    with pytest.raises(ValueError, match="2 cars, and 3"):
+    with pytest.raises(ValueError, match="3 cars are to be driven, and the map has 2"):
         Simulation(hall(TWO), ["one", "two", "three"])
 
 
