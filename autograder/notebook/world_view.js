@@ -65,14 +65,10 @@ function drawRoom(box, room, cars) {
       names[number].setAttribute("x", car.pose[0]);
       names[number].setAttribute("y", height - car.pose[1] - wide);
       if (message.whole) paths[number] = [];
-      paths[number].push(...car.trail);
+      const [lastX, lastY] = paths[number].at(-1) ?? [];
+      paths[number].push(...car.trail.filter(([x, y]) => x !== lastX || y !== lastY)); // standing adds nothing
       paths[number] = paths[number].slice(-TRAIL_KEPT);
-      let before = null;
-      const step = ([x, y]) => {
-        const jumped = !before || Math.hypot(x - before[0], y - before[1]) > 0.4;
-        before = [x, y];
-        return `${jumped ? "M" : "L"}${x} ${y}`;
-      };
+      const step = ([x, y, jumped], place) => `${jumped || !place ? "M" : "L"}${x} ${y}`;
       trails[number].setAttribute("d", paths[number].map(step).join(""));
       const [x, y] = car.pose;
       rays[number].setAttribute("d", car.rays.map(([to, at]) => `M${x} ${y}L${to} ${at}`).join(""));

@@ -12,6 +12,7 @@ import math
 import threading
 import time
 from collections.abc import Callable
+from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,7 +21,7 @@ from rclpy.qos import QoSProfile
 
 from autograder.world import RunningWorld
 from autograder.world import car as cars
-from autograder.world.drawing import blocks, drawn, still
+from autograder.world.drawing import blocks, drawn, still, thinned
 from autograder.world.room import BOX, WALL
 from autograder.world.simulation import RANGE_MAX, STANDS, Sample
 
@@ -36,8 +37,8 @@ _KEYS_HOLD = 1.0
 """The seconds for which a key counts as held if nothing more comes from the page."""
 _EVERY_RAY = 6
 """Of the lidar's rays, one in so many is shown."""
-_TRAIL = 600
-"""The points of a trail that are sent to a page that begins to look."""
+_TRAIL, _APART = 3000, 0.03
+"""The points of a trail that are sent to a page that begins to look, and the metres between two of them."""
 _RATES_OVER = 2.0
 """The seconds over which the rates of topics are counted."""
 
@@ -224,7 +225,10 @@ class WorldView:
         car, trail = world.driven[name], world.records[name].trail
         new = len(trail) if whole else min(len(trail), world.steps - self._sent[number])
         self._sent[number] = world.steps
-        points = [trail[place].pose for place in range(-new, 0, max(1, new // _TRAIL))]
+        since = max(
+            0, len(trail) - new - 1
+        )  # with the last one that was sent, from which the car may have been put away
+        points = thinned([sample.pose for sample in islice(trail, since, None)], _APART)[-_TRAIL:]
         metres, angles = world.scan(name)[::_EVERY_RAY], world.angles[::_EVERY_RAY] + car.pose.heading
         ends = [
             [round(car.pose.x + one * math.cos(angle), 2), round(car.pose.y + one * math.sin(angle), 2)]
@@ -234,7 +238,7 @@ class WorldView:
             "pose": [round(value, 3) for value in car.pose],
             "speed": round(car.speed, 2),
             "state": _state(car),
-            "trail": [[round(pose.x, 2), round(pose.y, 2)] for pose in points],
+            "trail": [[round(pose.x, 2), round(pose.y, 2), jumped] for pose, jumped in points],
             "rays": ends,
         }
 

@@ -160,6 +160,18 @@ class _Panel:
         self._canvas.path(f"M{across + arm:.1f} {down - arm:.1f}l{-size:g} {size:g}", line=size / 5)
 
 
+def thinned(poses: Sequence[Pose], apart: float) -> list[tuple[Pose, bool]]:
+    """Return the first pose and those that are so many metres apart, each with whether the car was put there."""
+    found: list[tuple[Pose, bool]] = []
+    before: Pose | None = None
+    for pose in poses:
+        jumped = before is not None and _jumped(before, pose)
+        if not found or jumped or math.hypot(pose.x - found[-1][0].x, pose.y - found[-1][0].y) >= apart:
+            found.append((pose, jumped))
+        before = pose
+    return found
+
+
 def _jumped(one: Pose, other: Pose) -> bool:
     """Whether a car cannot have driven from one pose to the next: it was reset or placed."""
     return math.hypot(one.x - other.x, one.y - other.y) > 0.2

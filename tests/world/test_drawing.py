@@ -6,7 +6,7 @@ import re
 import xml.etree.ElementTree as ElementTree
 
 from autograder.world import Pose, Simulation, read_room
-from autograder.world.drawing import Mark, blocks, drawn, still, strip
+from autograder.world.drawing import Mark, blocks, drawn, still, strip, thinned
 from autograder.world.simulation import STEP
 
 
@@ -57,3 +57,9 @@ def test_cells_are_joined_to_rectangles() -> None:
 
     cells = np.array([[True, True, False], [True, True, True]])
     assert blocks(cells, 0.5) == [(0.0, 0.0, 1.0, 1.0), (1.0, 0.5, 0.5, 0.5)]
+
+
+def test_a_trail_is_thinned_to_points_apart_and_says_where_the_car_was_put() -> None:
+    poses = [Pose(0.01 * number, 0.0, 0.0) for number in range(8)] + [Pose(3.0, 0.0, 0.0)] * 5
+    found = [(round(pose.x, 2), jumped) for pose, jumped in thinned(poses, 0.03)]
+    assert found == [(0.0, False), (0.03, False), (0.06, False), (3.0, True)]
