@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import signal
+import threading
 from typing import Annotated
 
 import typer
@@ -28,12 +30,11 @@ def world(
         simulation = Simulation(read_room(room), names, heartbeat=heartbeat, seed=seed)
     except ValueError as error:
         raise KitError(f"The world does not start: {error}.", "Name fewer cars, or draw more arrows.") from None
+    over = threading.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):  # an exception while the nodes are made would leave some behind
+        signal.signal(number, lambda *_: over.set())
     running = RunningWorld(simulation, arguments=words or ())
     nodes = ", ".join(node.node.get_fully_qualified_name() for node in running.nodes.values())
     typer.echo(f"The world {room} runs with {nodes}. Ctrl-C ends it.")
-    try:
-        running.join()
-    except KeyboardInterrupt:
-        pass
-    finally:
-        running.close()
+    over.wait()
+    running.close()

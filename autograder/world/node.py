@@ -212,11 +212,6 @@ class RunningWorld:
         """Return the name of a car's topic after its namespace and remap rules."""
         return str(self.nodes[car].node.resolve_topic_name(topic))
 
-    def join(self) -> None:
-        """Wait until the context is shut down, as Ctrl-C does it."""
-        while self._thread.is_alive():
-            self._thread.join(0.5)
-
     def close(self) -> None:
         """End the world. The thread is joined, because one that spins at exit would abort the process."""
         with self._leaving:

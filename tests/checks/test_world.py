@@ -41,7 +41,7 @@ def ask():
     reset.call_async(Trigger.Request())
 node.create_timer(0.1, ask)
 """
-SET_UP = "from autograder.checks import World, launch\n"
+SET_UP = "from autograder.checks import World, launch, launch_file\n"
 
 
 def graded(check: str, program: str, **files: str) -> CheckResult:
@@ -109,3 +109,34 @@ def test_what_an_author_gets_wrong_is_said(line: str, told: str) -> None:
     check = f"with launch('p', world={world}) as ros:\n    {line}\nros.score(1)"
     found = graded(check, "import time\ntime.sleep(9)\n")
     assert found.status is Status.UNKNOWN and told in found.outcomes[-1].because, found
+
+
+LAUNCH_FILE = """
+launch:
+- group:
+  - push_ros_namespace: {namespace: rear}
+  - node: {pkg: lab, exec: p, remap: [{from: cmd_vel, to: drive}]}
+"""
+
+
+def test_a_launch_file_drives_one_of_two_cars_by_their_names() -> None:
+    cars = 'World("street", cars=["/front", "/rear"], remappings=[("cmd_vel", "drive")])'
+    check = f'with launch_file("car.launch.yaml", package="lab", world={cars}) as ros:\n'
+    check += (
+        '    ros.car("/rear").expect_driven(1.0)\n    ros.car("/front").expect_driven(0.1, within=0.2)\nros.score(1)'
+    )
+    found = graded(check, DRIVES.format(speed=0.5, more=""), **{"car.launch__yaml": LAUNCH_FILE})
+    assert [(outcome.status, outcome.title) for outcome in found.outcomes] == [
+        (Status.PASSED, "`/rear/car` drives 1 m"),
+        (Status.FAILED, "`/front/car` drives 0.1 m"),
+    ], found
+
+
+def test_a_check_places_the_car_and_drives_it_with_a_heartbeat() -> None:
+    check = 'with launch("p", world=World("street", heartbeat=True)) as ros:\n    car = ros.car()\n'
+    check += "    car.place(5.0, 1.4)\n    car.expect_stopped_within(0.5)\n"
+    check += '    ros.require(abs(car.pose.x - 5.0) < 0.01, "It is there")\n'
+    check += "    car.expect_driven(0.1, within=0.5)\nros.score(1)"
+    failed = graded(check, DRIVES.format(speed=0.5, more="")).first_failure
+    assert failed is not None and failed.code == "not-driven"
+    assert "because nothing came on `cmd_vel`, or no heartbeat, for 0.3 s" in failed.because, failed.because
