@@ -28,6 +28,8 @@ TOUCHED = Kind("touched", "the car touched a wall, a box or another car", Group.
 NOT_STOPPED = Kind("not-stopped", "the car still drives, or it stands somewhere else than it should", Group.WORLD)
 NOT_DRIVEN = Kind("not-driven", "the car got commands, but it did not drive as far as it should", Group.WORLD)
 
+NEARLY = 0.02
+"""Metres that make no difference: a car that pushes against a wall still comes a little nearer to it."""
 STANDS_FOR = 0.25
 """Seconds for which a car must stand to have stopped: one that turns back passes through a speed of 0."""
 
@@ -120,7 +122,9 @@ class Car(Expectations):
         if came:
             outcomes.passed(title, observed=f"after {self._record.places[place]:.1f} s", picture=self._picture())
             return
-        sample = min(self.trail(), key=lambda one: self._away(place, one))
+        trail = self.trail()
+        nearest = min(self._away(place, one) for one in trail)
+        sample = next(one for one in trail if self._away(place, one) < nearest + NEARLY)
         text = f"At {sample.time:.1f} s the car was nearest to {place}: {self._away(place, sample):.2f} m from it, at "
         self._fail_with(
             title, PLACE_NOT_REACHED, text + f"{_at(sample.pose)}. {self._afterwards(sample)}", sample, hint
