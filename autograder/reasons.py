@@ -33,6 +33,7 @@ class Group(StrEnum):
     ENDS = "Expectations: nodes, ends, quality of service"
     MESSAGES = "Expectations: messages and callbacks"
     STATES = "Expectations: lifecycle, parameters, actions"
+    WORLD = "Expectations: the car in its world"
     OUTPUT = "Expectations: programs and their output"
     LIMITS = "Limits of the sandbox"
     FILES = "Files of answers, parameters and launches"

@@ -116,7 +116,7 @@ NAME = "ros2-labs"
 INSTRUCTORS = ("authoring", "gradebook", "report/class_page.py", "report/templates/class.html")
 """The parts of the package `autograder` that students do not get."""
 STUDENTS = {
-    "cli": ("__init__", "app", "check", "doctor", "machine", "main", "package", "ros2", "submit"),
+    "cli": ("__init__", "app", "check", "doctor", "machine", "main", "package", "ros2", "submit", "world"),
     "intake": ("__init__", "record"),
 }
 """The modules that students get from each of these folders. The others are for instructors."""

@@ -24,6 +24,7 @@ from autograder.checks.ros import Ros
 from autograder.checks.running_launch import RunningLaunch
 from autograder.checks.scoring import Score, part, score
 from autograder.checks.waiting import NotLaunchedError
+from autograder.checks.world import World, told_by_others
 from autograder.core.processes import no_threads
 from autograder.graph.domains import claim_domain
 from autograder.graph.observer import ForgedGraph, Observer
@@ -45,6 +46,7 @@ class Launch(Ros):
         lifecycle: Iterable[str],
         file: LaunchFile | None = None,
         packages: Sequence[str] = (),
+        world: World | str | None = None,
     ) -> None:
         """Use `launch` or `launch_file`."""
         super().__init__(RunningLaunch())
@@ -55,6 +57,7 @@ class Launch(Ros):
         self._packages = [*packages, *(file.packages() if file else ())]
         self._running.described = list(nodes)
         self._file = file
+        self._world = World(world) if isinstance(world, str) else world
         self._group: RunningPrograms | None = None
         self._robot: Robot | None = None
         self._entered = self._over = False
@@ -103,6 +106,10 @@ class Launch(Ros):
         """Listen, and then start the programs."""
         if not self._build():
             return
+        if self._world is not None:
+            if self._world.room.endswith(".yaml"):
+                current.check.use(self._world.room)
+            self._running.world = self._world.start(self._observer.domain_id)
         self._group = current.check.sandbox.group()
         for topic, msg_type in self._listen:
             self._observer.record(topic, msg_type)
@@ -201,6 +208,26 @@ class Launch(Ros):
         """
         self._end()
 
+    def show(self) -> None:
+        """Show the world of the launch live, below the cell, while the cells after it go on.
+
+        It stops with the launch; then the picture of the world with the trails takes its place. At grading it does
+        nothing.
+
+        Example:
+            `robot = launch("driver", world="room").start(); robot.show()`
+        """
+        here = current.check.front_end
+        if self._world is None:
+            raise Misuse('show: this launch has no world; write launch(…, world="room").')
+        if not self._entered or self._over:
+            raise Misuse("show: nothing runs; begin with robot = launch(…).start(), then robot.show().")
+        if here is None:
+            return
+        if self._running.view is not None:
+            self._running.view.close()
+        self._running.view = here.show(self._running)
+
     def log(self, program: str = "") -> Log:
         """Return what the programs, or one of them, have printed so far; also after the block.
 
@@ -277,6 +304,8 @@ class Launch(Ros):
                 self._running.graph = picture_data.graph(self._observer)
             return
         varied = [node.may_vary_names() for node, _ in self._running.programs]
+        if self._running.world is not None:
+            current.check.findings.flags += told_by_others(self._running.world, self._observer)
         current.check.findings.flags += contradictions.flags(self._scene(), self._running.overlaps, varied)
 
     def _close(self) -> None:
@@ -286,6 +315,10 @@ class Launch(Ros):
                 self._group.end()
             if self._running.watcher is not None:
                 self._running.watcher.close()
+            if self._running.view is not None:
+                self._running.view.close()
+            if self._running.world is not None:
+                self._running.world.close()
         finally:
             if current.check.block is self._robot:
                 current.check.block = None
@@ -310,6 +343,7 @@ def launch(
     serve: Iterable[tuple[str, type, Callable[[Any, Any], Any], float] | tuple[Any, ...]] = (),
     lifecycle: Iterable[str] = (),
     packages: Sequence[str] = (),
+    world: World | str | None = None,
 ) -> Launch:
     """Describe a launch; `with` starts it and ends it.
 
@@ -328,6 +362,7 @@ def launch(
         serve: (service, class, answer, delay in seconds) that the observer offers.
         lifecycle: full names of lifecycle nodes whose transition events are recorded from before the start.
         packages: packages of the student's that the programs import from; each is built first.
+        world: the world that the programs drive in, or the name of its room, such as `room`.
     """
     refuse_text("launch", packages=packages, remappings=remappings)
     given = dict(parameters or {})
@@ -349,7 +384,7 @@ def launch(
             )
         )
     needed = dict.fromkeys([*packages, *(node.package for node in nodes if node.package)])
-    return Launch(nodes, listen, serve, lifecycle, packages=list(needed))
+    return Launch(nodes, listen, serve, lifecycle, packages=list(needed), world=world)
 
 
 def launch_file(
@@ -362,6 +397,7 @@ def launch_file(
     includes: Mapping[str, str] | None = None,
     listen: Iterable[tuple[str, type]] = (),
     lifecycle: Iterable[str] = (),
+    world: World | str | None = None,
 ) -> Launch:
     """Describe the launch that a student's launch file describes; `with` starts it and ends it.
 
@@ -376,6 +412,7 @@ def launch_file(
             program of the lab.
         listen: (topic, message class) to record from before the start.
         lifecycle: full names of lifecycle nodes whose transition events are recorded from before the start.
+        world: the world that the programs drive in, or the name of its room, such as `room`.
     """
     described = LaunchFile(file, dict(arguments or {}), package, dict(programs or {}), dict(includes or {}), namespace)
-    return Launch([], listen, (), lifecycle, described)
+    return Launch([], listen, (), lifecycle, described, world=world)

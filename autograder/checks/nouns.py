@@ -6,6 +6,7 @@ import inspect
 
 from autograder.checks.expect.action import Action
 from autograder.checks.expect.activity import Activity
+from autograder.checks.expect.car import Car
 from autograder.checks.expect.draw import Draw
 from autograder.checks.expect.goal import SentGoal
 from autograder.checks.expect.graph import Graph
@@ -31,6 +32,7 @@ NOUNS: dict[str, type] = {
     "goal": SentGoal,
     "activity": Activity,
     "program": StartedProgram,
+    "car": Car,
     "graph": Graph,
     "draw": Draw,
 }

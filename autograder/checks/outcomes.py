@@ -115,9 +115,9 @@ def _is_cells(file: str) -> bool:
     return not file.startswith(_NOT_CELLS)
 
 
-def passed(title: str, *, expected: str = "", observed: str = "") -> None:
+def passed(title: str, *, expected: str = "", observed: str = "", picture: Picture | None = None) -> None:
     """Record that an expectation holds."""
-    _record(worded(Status.PASSED, title, expected, observed))
+    _record(worded(Status.PASSED, title, expected, observed).model_copy(update={"picture": picture}))
 
 
 def worded(

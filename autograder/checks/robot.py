@@ -82,9 +82,12 @@ class Robot:
     def wait_for_nodes(self) -> None:
         """Wait until each program that has not ended has a node."""
 
+        world = self._running.world
+        cars = len(world.nodes) if world is not None else 0
+
         def there() -> bool:
             running = [program for _, program in self._running.programs if program.running()]
-            return len(self.observer.nodes()) >= len(running)
+            return len(self.observer.nodes()) >= len(running) + cars
 
         self.observer.wait(there, _THERE_WITHIN)
 

@@ -13,6 +13,7 @@ from rclpy.qos import QoSProfile
 from autograder.checks import outcomes, picture_data
 from autograder.checks.expect.action import Action
 from autograder.checks.expect.activity import Activity
+from autograder.checks.expect.car import Car
 from autograder.checks.expect.draw import Draw
 from autograder.checks.expect.expectations import WITHIN, Expectations
 from autograder.checks.expect.graph import Graph
@@ -282,6 +283,17 @@ class Ros(Facts, ABC):
             `program-missing`, `nothing-started`.
         """
         return StartedProgram(self._running, name, self._start)
+
+    def car(self, namespace: str = "") -> Car:
+        """A car in the world of the launch: where it is and was, what it reached and touched.
+
+        Args:
+            namespace: as `World(cars=[…])` has it, such as `/front`; not needed for a world with one car.
+
+        Example:
+            `ros.car().expect_reached("parking")`
+        """
+        return Car(self._running, namespace)
 
     @property
     def graph(self) -> Graph:

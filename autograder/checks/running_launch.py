@@ -10,7 +10,7 @@ from autograder.checks import current, picture_data
 from autograder.checks.concurrency import Concurrency
 from autograder.checks.program import Program
 from autograder.checks.settling import Settling
-from autograder.core.front_end import Watcher
+from autograder.core.front_end import View, Watcher
 from autograder.core.results import NodeLog
 from autograder.diagnosis import Scene
 from autograder.graph.lifecycle import LifecycleClient
@@ -21,6 +21,7 @@ from autograder.sandbox.running_program import RunningProgram
 
 if TYPE_CHECKING:
     from autograder.graph.actions import ActionSeen  # loads numpy, which most labs do not need
+    from autograder.world import RunningWorld
 
 SETTLE = 2.0
 """Seconds that a new program may take to show that it lives."""
@@ -71,6 +72,10 @@ class RunningLaunch:
         """The check's own publishers, by topic and QoS profile."""
         self.known_publishers: list[Any] = []
         """Those of them that have been used: what subscribed by then knows them."""
+        self.world: RunningWorld | None = None
+        """The world that its programs drive in."""
+        self.view: View | None = None
+        """Shows that world live in a notebook."""
         self.graph: picture_data.Graph | None = None
         """The graph as it was when the launch ended."""
         self._ended: float | None = None

@@ -24,6 +24,13 @@ class Watcher(Protocol):
         """Say that the programs have ended."""
 
 
+class View(Protocol):
+    """Shows something live, below the cell that asked for it."""
+
+    def close(self) -> None:
+        """End it, and leave a picture in its place."""
+
+
 class FrontEnd(Protocol):
     """The methods of a notebook that the checks use."""
 
@@ -59,6 +66,9 @@ class FrontEnd(Protocol):
 
     def watch(self, observer: Any, programs: Callable[[], Sequence[Any]]) -> Watcher:
         """Start to show what happens during a launch: what the check waits for, and what the programs print."""
+
+    def show(self, running: Any) -> View:
+        """Start to show the world of a running launch, below the running cell."""
 
 
 active: FrontEnd | None = None

@@ -23,9 +23,11 @@ from autograder.notebook.lab_state import Report
 from autograder.notebook.program_folder import ProgramFolder, Written, notebook_of, shown
 
 if TYPE_CHECKING:
+    from autograder.checks.running_launch import RunningLaunch
     from autograder.graph.observer import Observer
     from autograder.notebook.saved_notebook import SavedNotebook
     from autograder.notebook.watch import Watch
+    from autograder.notebook.world_view import WorldView
     from autograder.sandbox.running_program import RunningProgram
 
 _SCORED = re.compile(r"\bscore\(")
@@ -59,6 +61,7 @@ class Kernel:
         self.folder = ProgramFolder(notebook, notebook.parent if notebook else Path.cwd(), _cells_of(notebook))
         self.cell, self.cell_id = "", ""
         self._began = 0
+        self._in_cell = False
         self.reports: dict[str, Report] = {}
         """The last reports of the checks in this kernel, by `cell_digest`."""
         self._watch: Watch | None = None
@@ -82,6 +85,7 @@ class Kernel:
     def begin_cell(self, info: Any) -> None:
         """Note the cell that begins, and forget the findings of the last one."""
         self.cell = str(info.raw_cell or "")
+        self._in_cell = True
         interrupts.say(NO_VERDICT if _EXPECTS.search(self.cell) else "")
         told = str(getattr(info, "cell_id", "") or "")
         self.cell_id = told if _CELL_ID.fullmatch(told) else ""
@@ -94,6 +98,7 @@ class Kernel:
 
     def end_cell(self, result: Any) -> None:
         """Keep the report of a check, and show expectations that were checked in a cell without a score."""
+        self._in_cell = False
         self._end_block()
         if result is None or isinstance(result.error_in_exec, KeyboardInterrupt):
             self._forget_verdict()
@@ -148,6 +153,12 @@ class Kernel:
 
         self._watch = Watch(observer, programs, streams=not self.scored, updates=self.updates_outputs)
         return self._watch
+
+    def show(self, running: RunningLaunch) -> WorldView:
+        """Begin to show the world of a launch, live."""
+        from autograder.notebook.world_view import WorldView
+
+        return WorldView(running, lambda: self._in_cell)
 
     @property
     def number(self) -> int:

@@ -132,12 +132,19 @@ class Canvas:
         self.path(path, line=line, dashed=dashed, arrow=arrow, grey=grey)
 
     def path(
-        self, path: str, *, line: float = 1.6, dashed: bool = False, arrow: bool = False, grey: bool = False
+        self,
+        path: str,
+        *,
+        line: float = 1.6,
+        dashed: bool = False,
+        arrow: bool = False,
+        grey: bool = False,
+        fill: str = "none",
     ) -> None:
-        """Draw along an SVG path."""
+        """Draw along an SVG path, and fill what it encloses if `fill` is a colour."""
         more = (' stroke-dasharray="7 5"' if dashed else "") + (' marker-end="url(#arrow)"' if arrow else "")
         colour = "#bbbbbb" if grey else "#000000"
-        self._parts.append(f'<path d="{path}" fill="none" stroke="{colour}" stroke-width="{line:g}"{more}/>')
+        self._parts.append(f'<path d="{path}" fill="{fill}" stroke="{colour}" stroke-width="{line:g}"{more}/>')
 
     def picture(self, alt: str) -> Picture:
         """Return the picture of everything that has been drawn, with its description in words."""

@@ -17,8 +17,8 @@ LABS = sorted((ROOT / "solutions").glob("*/*.ipynb"))
 
 OFFERED = {
     "ros": """
-        action activity changes clock draw expect_argument_needed graph lifecycle log node part pause program programs
-        publisher qos require require_equal runs score server service start stop topic wait
+        action activity car changes clock draw expect_argument_needed graph lifecycle log node part pause program
+        programs publisher qos require require_equal runs score server service show start stop topic wait
     """,
     "topic": """
         account expect_last expect_messages expect_publisher expect_silence expect_subscription expect_unused listen
@@ -43,7 +43,8 @@ OFFERED = {
         signal stop
     """,
     "graph": "nodes publishers subscriptions topics wait",
-    "draw": "arrivals graph lifecycle qos timeline",
+    "car": "expect_driven expect_no_touch expect_reached expect_stopped_within place pose touches trail",
+    "draw": "arrivals film graph lifecycle qos timeline world",
 }
 
 

@@ -118,6 +118,20 @@ finally:
     rclpy.try_shutdown()
 """
 
+DRIVES = """
+import rclpy
+from geometry_msgs.msg import Twist
+from rclpy.node import Node
+
+rclpy.init()
+node = Node("drives")
+publisher = node.create_publisher(Twist, "cmd_vel", 10)
+command = Twist()
+command.linear.x = 1.0
+node.create_timer(0.05, lambda: publisher.publish(command))
+rclpy.spin(node)
+"""
+
 ENDS = "import sys, time\nprint('over', flush=True)\ntime.sleep(0.5)\nsys.exit(3)\n"
 
 LINES = {
@@ -223,13 +237,28 @@ LINES = {
     "clean": [
         ("ros.program('clean').expect_clean_end(by='SIGINT')", ""),
     ],
+    "drives": [
+        ("ros.car().expect_driven(0.5)", ""),
+        ("ros.car().expect_driven(50, within=0.2)", "not-driven"),
+        ("ros.car().expect_no_touch()", ""),
+        ("ros.car().expect_stopped_within(0.1)", "not-stopped"),
+        ("ros.car().expect_reached('parking', within=0.2)", "place-not-reached"),
+        ("ros.car().expect_reached('end', within=20)", ""),
+        ("ros.car().expect_stopped_within(5, at='end')", ""),
+        ("ros.car().expect_no_touch()", "touched"),
+        ("ros.require(ros.car().pose.x > 7 and ros.car().trail()[0].pose.x < 1, 'It drove')", ""),
+        ("ros.require_equal('The wall', ros.car().touches()[0].what, 'a wall')", ""),
+        ("ros.car().place(4.0, 1.4); ros.require_equal('It is put there', ros.car().trail()[-1].time > 5, True)", ""),
+        ("ros.require('touched something' in str(ros.draw.world()), 'It is drawn')", ""),
+        ("ros.require(str(ros.draw.film(frames=4)).startswith('4 moments'), 'It is a film')", ""),
+    ],
     "ends": [
         ("ros.program('ends').expect_exit(status=3)", ""),
         ("ros.program('ends').expect_exit(status=0)", "exit-status"),
         ("ros.require_equal('Status', ros.program('ends').exit_status(), 3)", ""),
     ],
 }
-PROGRAMS = {"busy": BUSY, "serves": SERVES, "camera": CAMERA, "clean": CLEAN, "ends": ENDS}
+PROGRAMS = {"busy": BUSY, "serves": SERVES, "camera": CAMERA, "clean": CLEAN, "drives": DRIVES, "ends": ENDS}
 SET_UP = """\
 from std_msgs.msg import Int64
 from test_msgs.action import Fibonacci
@@ -243,6 +272,7 @@ WORDS = {
     " serve=[('/gate', Trigger, lambda request, response: response, 0.5)]",
     "camera": "'camera', lifecycle=['/camera']",
     "clean": "'clean'",
+    "drives": "'drives', world='street'",
     "ends": "'ends'",
 }
 

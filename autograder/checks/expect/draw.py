@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import TYPE_CHECKING
 
 from autograder import pictures
 from autograder.checks import picture_data
 from autograder.checks.expect.expectations import Expectations
 from autograder.checks.misuse import Misuse
 from autograder.pictures import Picture
+
+if TYPE_CHECKING:  # loads numpy, which most labs do not need
+    from autograder.world.drawing import Drawn
+
+_MOST_FRAMES = 12
 
 
 class Draw(Expectations):
@@ -79,6 +85,38 @@ class Draw(Expectations):
             found = self._running.graph or picture_data.graph(self._observer)
             _refuse_unnamed("arrivals", topic, [end.topic for end in found.endpoints])
         return pictures.arrivals(topic, picture_data.traffic(self._insides(), topic), seconds=seconds)
+
+    def world(self) -> Picture:
+        """A picture of the world with the trails of its cars: now, or as it was at the end.
+
+        Example:
+            `ros.draw.world()`
+        """
+        from autograder.world.drawing import still
+
+        return still(self._drawn("world"))
+
+    def film(self, frames: int = 6) -> Picture:
+        """A film strip: moments of the world from the beginning to the end, one beside the other.
+
+        Args:
+            frames: how many.
+
+        Example:
+            `ros.draw.film(frames=6)`
+        """
+        from autograder.world.drawing import strip
+
+        if not 2 <= frames <= _MOST_FRAMES:
+            raise Misuse(f"film: frames={frames!r} is no number from 2 to {_MOST_FRAMES}.")
+        return strip(self._drawn("film"), frames)
+
+    def _drawn(self, picture: str) -> Drawn:
+        from autograder.world.drawing import drawn
+
+        if self._running.world is None:
+            raise Misuse(f'{picture}: this launch has no world; write launch(…, world=World("room")).')
+        return drawn(self._running.world.simulation)
 
 
 def _refuse_unnamed(picture: str, topic: str, there: Iterable[str]) -> None:

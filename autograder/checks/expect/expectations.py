@@ -11,6 +11,7 @@ from autograder import diagnosis
 from autograder.checks import outcomes, picture_data, scoring
 from autograder.checks.misuse import Misuse
 from autograder.checks.running_launch import RunningLaunch
+from autograder.core.results import Picture
 from autograder.diagnosis import Scene
 from autograder.diagnosis.inside import Inside
 from autograder.diagnosis.programs import EXITED, NOT_SPINNING, SPINNING_ENDED
@@ -106,7 +107,14 @@ class Expectations:
             self._observer.patience.is_sure()
 
     def _fail(
-        self, title: str, reason: Reason | None, *, expected: str = "", observed: str = "", hint: str = ""
+        self,
+        title: str,
+        reason: Reason | None,
+        *,
+        expected: str = "",
+        observed: str = "",
+        hint: str = "",
+        picture: Picture | None = None,
     ) -> NoReturn:
         """Record a failure with the first broken link as its reason, and end the block.
 
@@ -125,7 +133,7 @@ class Expectations:
         reason = reason or outcomes.FAILED("")
         reason = replace(reason, hint=f"{reason.hint} {where_to_read(hint)}" if reason.hint else hint)
         if gone is None:
-            picture = picture_data.explaining(reason, title, self._observer, self._insides())
+            picture = picture or picture_data.explaining(reason, title, self._observer, self._insides())
             outcomes.failed(title, reason, expected=expected, observed=observed, picture=picture)
         led_to = diagnosis.called_from_outside(gone)
         outcomes.failed_as_a_whole(

@@ -1,0 +1,288 @@
+"""`ros.car`: what a car in the world of the launch did, as the world itself measured it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from geometry_msgs.msg import Twist
+from rclpy.qos import QoSProfile
+
+from autograder import diagnosis
+from autograder.checks import outcomes
+from autograder.checks.expect.expectations import Expectations
+from autograder.checks.misuse import Misuse
+from autograder.checks.running_launch import RunningLaunch
+from autograder.checks.waiting import waits_for
+from autograder.core.results import Picture
+from autograder.reasons import Group, Kind, Reason
+
+if TYPE_CHECKING:  # loads numpy, which most labs do not need
+    from autograder.world import Pose, RunningWorld, Sample, Touch
+    from autograder.world.drawing import Mark
+    from autograder.world.simulation import Record
+
+PLACE_NOT_REACHED = Kind("place-not-reached", "the car did not come to the place in time", Group.WORLD)
+TOUCHED = Kind("touched", "the car touched a wall, a box or another car", Group.WORLD)
+NOT_STOPPED = Kind("not-stopped", "the car still drives, or it stands somewhere else than it should", Group.WORLD)
+NOT_DRIVEN = Kind("not-driven", "the car got commands, but it did not drive as far as it should", Group.WORLD)
+
+NEARLY = 0.02
+"""Metres that make no difference: a car that pushes against a wall still comes a little nearer to it."""
+STANDS_FOR = 0.25
+"""Seconds for which a car must stand to have stopped: one that turns back passes through a speed of 0."""
+
+
+class Car(Expectations):
+    """A car of the launch's world. All times are seconds of the world, which goes slower on a busy machine."""
+
+    def __init__(self, running: RunningLaunch, namespace: str) -> None:
+        """Ask about the car of this namespace.
+
+        Raises:
+            Misuse: the launch has no world, or no such car.
+        """
+        super().__init__(running)
+        if running.world is None:
+            raise Misuse('car: this launch has no world; write launch(…, world=World("room")).')
+        self._world: RunningWorld = running.world
+        self._name = namespace.strip("/")
+        if self._name not in self._world.simulation.driven:
+            known = ", ".join(f'"/{name}"' if name else '""' for name in self._world.simulation.driven)
+            raise Misuse(f"car: the world has no car {namespace!r}; it has {known}.")
+        self.name = f"/{self._name}/car" if self._name else "/car"
+
+    def __repr__(self) -> str:
+        pose = self.pose
+        return f"car {self.name} at ({pose.x:.2f}, {pose.y:.2f}), heading {math.degrees(pose.heading):.0f}°"
+
+    @property
+    def pose(self) -> Pose:
+        """Where it is: x and y in metres, heading in radians.
+
+        Example:
+            `x, y, heading = ros.car().pose`
+        """
+        return self._world.simulation.driven[self._name].pose
+
+    def trail(self) -> list[Sample]:
+        """Where it was after each step of 0.05 s: `time`, `pose`, `speed`, and whether the watchdog `braked`.
+
+        Example:
+            `fastest = max(sample.speed for sample in ros.car().trail())`
+        """
+        with self._world.simulation.lock:
+            return list(self._record.trail)
+
+    def touches(self) -> list[Touch]:
+        """What it touched so far: `time`, `pose`, `what`, and where.
+
+        Example:
+            `len(ros.car().touches())`
+        """
+        with self._world.simulation.lock:
+            return list(self._record.touches)
+
+    def place(self, x: float, y: float, heading: float = 0.0) -> None:
+        """Put it somewhere; it stands then. What it did so far stays in its record.
+
+        Args:
+            x: metres from the left edge of the map.
+            y: metres from the lower edge of the map.
+            heading: radians, 0 to the right, counter-clockwise.
+
+        Example:
+            `ros.car().place(1.0, 2.0)`
+        """
+        from autograder.world import Pose
+
+        refused = self._world.simulation.place(self._name, Pose(float(x), float(y), float(heading)))
+        if refused:
+            raise Misuse(f"place: the car cannot be at ({x}, {y}): {refused}.")
+
+    @waits_for("the car to come to its place")
+    def expect_reached(self, place: str, *, within: float = 60.0, hint: str = "") -> None:
+        """Its middle comes onto a place of the map, or was there before.
+
+        Args:
+            place: a name from `places:` of the map.
+            within: seconds of the world, from now on.
+            hint: a pointer for the student.
+
+        Example:
+            `ros.car().expect_reached("parking", within=30)`
+
+        Codes:
+            `place-not-reached`, and those of a topic on which nothing comes.
+        """
+        self._refuse_place(place)
+        came = self._wait_in_world(lambda: place in self._record.places, within)
+        title = f"`{self.name}` reaches {place}"
+        if came:
+            outcomes.passed(title, observed=f"after {self._record.places[place]:.1f} s", picture=self._picture())
+            return
+        trail = self.trail()
+        nearest = min(self._away(place, one) for one in trail)
+        sample = next(one for one in trail if self._away(place, one) < nearest + NEARLY)
+        text = f"At {sample.time:.1f} s the car was nearest to {place}: {self._away(place, sample):.2f} m from it, at "
+        self._fail_with(
+            title, PLACE_NOT_REACHED, text + f"{_at(sample.pose)}. {self._afterwards(sample)}", sample, hint
+        )
+
+    def expect_no_touch(self, *, hint: str = "") -> None:
+        """It has not touched anything so far.
+
+        Args:
+            hint: a pointer for the student.
+
+        Example:
+            `ros.car().expect_no_touch()`
+
+        Codes:
+            `touched`.
+        """
+        title, touches = f"`{self.name}` touches nothing", self.touches()
+        if not touches:
+            outcomes.passed(title)
+            return
+        first = touches[0]
+        more = f" It touched something {len(touches)} times in all." if len(touches) > 1 else ""
+        text = f"At {first.time:.1f} s the car touched {first.what} at ({first.x:.2f}, {first.y:.2f}).{more}"
+        self._fail(title, TOUCHED(text), hint=hint, picture=self._picture(self._mark(first.x, first.y, text)))
+
+    @waits_for("the car to stand")
+    def expect_stopped_within(self, seconds: float, *, at: str = "", hint: str = "") -> None:
+        """It stands, at the latest so many seconds of the world from now.
+
+        Args:
+            seconds: from now on, until it stands; it must then go on standing for a quarter of a second.
+            at: the place of the map on which it must stand; by default anywhere.
+            hint: a pointer for the student.
+
+        Example:
+            `ros.program("planner").stop(kill=True); ros.car().expect_stopped_within(1.0)`
+
+        Codes:
+            `not-stopped`.
+        """
+        if at:
+            self._refuse_place(at)
+        deadline = self._world.simulation.time + seconds
+
+        def stopped() -> bool:
+            since = self._stands_since()
+            return since is not None and since <= deadline and self._is_at(at)
+
+        where = f" on {at}" if at else ""
+        title = f"`{self.name}` stands{where} within {seconds:g} s"
+        if self._wait_in_world(stopped, seconds + STANDS_FOR + 0.1):
+            outcomes.passed(title, observed=f"at {_at(self.pose)}")
+            return
+        last = self.trail()[-1]
+        if abs(last.speed) > _stands_below():
+            text = f"At {last.time:.1f} s the car still drives with {last.speed:.2f} m/s, at {_at(last.pose)}."
+        elif self._is_at(at):
+            text = f"At {last.time:.1f} s the car had just stopped, at {_at(last.pose)}: too late."
+        else:
+            text = f"At {last.time:.1f} s the car stands at {_at(last.pose)}, {self._away(at, last):.2f} m from {at}."
+        self._fail_with(title, NOT_STOPPED, text, last, hint)
+
+    @waits_for("the car to drive")
+    def expect_driven(self, metres: float, *, within: float = 30.0, hint: str = "") -> None:
+        """It has driven at least so far, since the launch began.
+
+        Args:
+            metres: along its way.
+            within: seconds of the world, from now on.
+            hint: a pointer for the student.
+
+        Example:
+            `ros.car().expect_driven(0.5)`
+
+        Codes:
+            `not-driven`, and those of a topic on which nothing comes.
+        """
+        title = f"`{self.name}` drives {metres:g} m"
+        if self._wait_in_world(lambda: self._record.metres >= metres, within):
+            outcomes.passed(title, observed=f"{self._record.metres:.1f} m")
+            return
+        last = self.trail()[-1]
+        text = f"It drove {self._record.metres:.2f} m in {last.time:.1f} s, and is at {_at(last.pose)}."
+        self._fail_with(title, NOT_DRIVEN, f"{text} {self._afterwards(last)}".strip(), last, hint)
+
+    @property
+    def _record(self) -> Record:
+        return self._world.simulation.records[self._name]
+
+    def _wait_in_world(self, ready: Callable[[], bool], seconds: float) -> bool:
+        """Wait until something is so, or so many seconds of the world have gone by, or nothing drives the car."""
+        world = self._world.simulation
+        deadline = world.time + seconds
+
+        def nothing_more() -> bool:
+            return world.time >= deadline or (self._running.all_ended() and self._stands_since() is not None)
+
+        return self._observer.wait(ready, 4 * seconds + 10, nothing_more)
+
+    def _refuse_place(self, place: str) -> None:
+        places = self._world.simulation.room.places
+        if place not in places:
+            raise Misuse(f"The map has no place {place!r}; it has {', '.join(map(repr, places)) or 'none'}.")
+
+    def _away(self, place: str, sample: Sample) -> float:
+        return self._world.simulation.room.distance_to(place, sample.pose.x, sample.pose.y)
+
+    def _is_at(self, place: str) -> bool:
+        return not place or self._world.simulation.room.place_at(self.pose.x, self.pose.y) == place
+
+    def _stands_since(self) -> float | None:
+        """Since when it stands; None if it does not, or not for long enough yet."""
+        trail = self.trail()
+        since = None
+        for sample in reversed(trail):
+            if abs(sample.speed) > _stands_below():
+                break
+            since = sample.time
+        return since if since is not None and trail[-1].time - since >= STANDS_FOR else None
+
+    def _afterwards(self, sample: Sample) -> str:
+        """Why it did not drive on, as far as the record shows that."""
+        touches = [touch for touch in self.touches() if abs(touch.time - sample.time) < 1.0]
+        if touches:
+            return f"There it touched {touches[-1].what}."
+        last = self.trail()[-1]
+        if last.braked:
+            needs = "`cmd_vel`, or no heartbeat," if self._world.simulation.heartbeat else "`cmd_vel`"
+            return f"At {last.time:.1f} s its motors brake, because nothing came on {needs} for 0.3 s."
+        return ""
+
+    def _fail_with(self, title: str, kind: Kind, text: str, sample: Sample, hint: str) -> None:
+        """Fail with the place at which it went wrong; if no command came at all, with why none came."""
+        reason: Reason | None = kind(text.strip())
+        if not self._record.commands:
+            topic = self._world.full_name(self._name, "cmd_vel")
+            reason = diagnosis.why_silent(self._scene(), topic, Twist, QoSProfile(depth=1))
+        mark = self._mark(sample.pose.x, sample.pose.y, text.strip())
+        self._fail(title, reason, observed="" if self._record.commands else "no command came", hint=hint,
+                   picture=self._picture(mark))  # fmt: skip
+
+    def _mark(self, x: float, y: float, text: str) -> Mark:
+        from autograder.world.drawing import Mark
+
+        return Mark(x, y, text)
+
+    def _picture(self, *marks: Mark) -> Picture:
+        from autograder.world.drawing import drawn, still
+
+        return still(drawn(self._world.simulation), marks)
+
+
+def _at(pose: Pose) -> str:
+    return f"({pose.x:.2f}, {pose.y:.2f})"
+
+
+def _stands_below() -> float:
+    from autograder.world.simulation import STANDS
+
+    return STANDS

@@ -1,0 +1,199 @@
+// The live view of a world. Python sends what it shows (`world_view.py`); this draws it and sends back what a person does.
+// It uses the page's own colours, so that it suits light and dark themes, and no colour alone tells anything.
+
+const SVG = "http://www.w3.org/2000/svg";
+const STEER = { ArrowUp: [0.5, 0], ArrowDown: [-0.4, 0], ArrowLeft: [0, 1.5], ArrowRight: [0, -1.5] };
+const HERE_EVERY = 1000; // ms between two messages that say that somebody looks
+const STEER_EVERY = 100; // ms between two commands while a key is down
+const TRAIL_KEPT = 3000; // points of a trail
+const NEWS_KEPT = 4; // sentences that stay visible
+
+function element(parent, name, attributes = {}, text = "") {
+  const svg = parent.namespaceURI === SVG || name === "svg";
+  const made = svg ? document.createElementNS(SVG, name) : document.createElement(name);
+  for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
+  if (text) made.textContent = text;
+  parent.append(made);
+  return made;
+}
+
+// Draws the room once; gives a function that draws what moves.
+function drawRoom(box, room, cars) {
+  const { width, height } = room;
+  const svg = element(box, "svg", { viewBox: `0 0 ${width} ${height}`, role: "img", class: "aw-map" });
+  const title = element(svg, "title", {}, `A room of ${width} m by ${height} m, seen from above`);
+  title.id = `aw-${Math.random().toString(36).slice(2)}`;
+  svg.setAttribute("aria-labelledby", title.id);
+  const hatch = element(element(svg, "defs"), "pattern", {
+    id: `${title.id}-hatch`, width: 0.12, height: 0.12, patternUnits: "userSpaceOnUse",
+  });
+  element(hatch, "path", { d: "M0 0.12L0.12 0M0 0L0.12 0.12", class: "aw-thin" });
+  const up = element(svg, "g", { transform: `matrix(1 0 0 -1 0 ${height})` }); // y points up in the world
+  const rectangle = (parent, [x, y, w, h], attributes) =>
+    element(parent, "rect", { x, y, width: w, height: h, ...attributes });
+  for (const place of room.places) {
+    for (const one of place.blocks) rectangle(up, one, { class: "aw-place" });
+    const [x, y, w, h] = place.blocks[0];
+    element(svg, "text", { x: x + w / 2, y: height - y - h / 2, class: "aw-name" }, place.name);
+  }
+  for (const one of room.walls) rectangle(up, one, { class: "aw-wall" });
+  for (const one of room.boxes) {
+    rectangle(up, one, { class: "aw-box" });
+    rectangle(up, one, { fill: `url(#${title.id}-hatch)` });
+  }
+  const trails = cars.map((_, number) => element(up, "path", { class: `aw-trail aw-car${number % 4}` }));
+  const rays = cars.map(() => element(up, "path", { class: "aw-rays" }));
+  const touches = element(up, "g");
+  const [long, wide] = room.car;
+  const drawCar = (look) => {
+    const group = element(up, "g");
+    rectangle(group, [-long / 2, -wide / 2, long, wide], { class: `aw-body ${look}` });
+    element(group, "path", {
+      d: `M${long / 2} 0L0.02 ${wide / 2.6}L0.02 ${-wide / 2.6}Z`, class: "aw-nose",
+    });
+    return group;
+  };
+  const turn = (group, [x, y, heading]) =>
+    group.setAttribute("transform", `translate(${x} ${y}) rotate(${(heading * 180) / Math.PI})`);
+  for (const pose of room.parked) turn(drawCar("aw-parked"), pose);
+  const bodies = cars.map((_, number) => drawCar(`aw-car${number % 4}`));
+  const names = cars.map((name) => element(svg, "text", { class: "aw-name" }, name));
+  const paths = cars.map(() => []);
+  return (message) => {
+    message.cars.forEach((car, number) => {
+      turn(bodies[number], car.pose);
+      names[number].setAttribute("x", car.pose[0]);
+      names[number].setAttribute("y", height - car.pose[1] - wide);
+      if (message.whole) paths[number] = [];
+      const [lastX, lastY] = paths[number].at(-1) ?? [];
+      paths[number].push(...car.trail.filter(([x, y]) => x !== lastX || y !== lastY)); // standing adds nothing
+      paths[number] = paths[number].slice(-TRAIL_KEPT);
+      const step = ([x, y, jumped], place) => `${jumped || !place ? "M" : "L"}${x} ${y}`;
+      trails[number].setAttribute("d", paths[number].map(step).join(""));
+      const [x, y] = car.pose;
+      rays[number].setAttribute("d", car.rays.map(([to, at]) => `M${x} ${y}L${to} ${at}`).join(""));
+    });
+    touches.replaceChildren();
+    for (const [x, y] of message.touches) {
+      element(touches, "circle", { cx: x, cy: y, r: 0.1, class: "aw-touch" });
+      element(touches, "path", { d: `M${x - 0.05} ${y - 0.05}l0.1 0.1m0 -0.1l-0.1 0.1`, class: "aw-touch" });
+    }
+  };
+}
+
+function button(parent, text, press) {
+  const made = element(parent, "button", { type: "button" }, text);
+  made.addEventListener("click", press);
+  return made;
+}
+
+// The arrow keys, while the pad has the focus.
+function steering(pad, send) {
+  const down = new Set();
+  let timer = 0;
+  const steer = () => {
+    const sum = [...down].reduce(([a, b], key) => [a + STEER[key][0], b + STEER[key][1]], [0, 0]);
+    send({ do: "drive", speed: sum[0], turn: sum[1] });
+  };
+  const stop = () => {
+    down.clear();
+    clearInterval(timer);
+    if (timer) send({ do: "drive", speed: 0, turn: 0 });
+    timer = 0;
+  };
+  pad.addEventListener("keydown", (event) => {
+    if (!(event.key in STEER)) return;
+    event.preventDefault(); // neither the page nor the notebook moves
+    event.stopPropagation();
+    down.add(event.key);
+    if (!timer) timer = setInterval(steer, STEER_EVERY);
+    if (!event.repeat) steer();
+  });
+  pad.addEventListener("keyup", (event) => {
+    if (!(event.key in STEER)) return;
+    event.stopPropagation();
+    down.delete(event.key);
+    if (!down.size) stop();
+  });
+  pad.addEventListener("blur", stop);
+  return stop;
+}
+
+function render({ model, el }) {
+  const { room, cars, programs } = model.get("scene");
+  el.classList.add("aw-view");
+  const shadow = element(el, "div", { class: "aw-columns" });
+  const left = element(shadow, "div", { class: "aw-left" });
+  const move = drawRoom(left, room, cars);
+  const right = element(shadow, "div", { class: "aw-right" });
+  let car = 0;
+  const send = (content) => model.send({ car, ...content });
+
+  const buttons = element(right, "div", { class: "aw-buttons", role: "group", "aria-label": "The world" });
+  const pause = button(buttons, "Pause", () => send({ do: "pause" }));
+  button(buttons, "Reset", () => send({ do: "reset" }));
+  const kills = new Map();
+  for (const name of programs) kills.set(name, button(buttons, `Kill ${name}`, () => send({ do: "kill", name })));
+
+  const pad = element(
+    right, "div",
+    { class: "aw-pad", tabindex: 0, role: "application", "aria-label": "Drive with the arrow keys", "data-lm-suppress-shortcuts": "true" },
+    "Click here, or come here with Tab, and drive with the arrow keys.",
+  );
+  const stop = steering(pad, send);
+  if (cars.length > 1) {
+    const label = element(right, "label", {}, "Drive the car ");
+    const choice = element(label, "select");
+    cars.forEach((name, number) => element(choice, "option", { value: number }, name));
+    choice.addEventListener("change", () => { stop(); car = Number(choice.value); });
+  }
+
+  const meters = element(right, "div", { class: "aw-meters" });
+  const speeds = cars.map((name) => {
+    const row = element(meters, "div");
+    element(row, "span", {}, `${name || "speed"} `);
+    const meter = element(row, "meter", { min: 0, max: 1, value: 0, "aria-label": `speed ${name}` });
+    return { meter, text: element(row, "span", { class: "aw-figure" }), state: element(meters, "div", { class: "aw-state" }) };
+  });
+  const table = element(right, "table");
+  element(table, "caption", {}, "Messages a second");
+  const rates = element(table, "tbody");
+  const news = element(el, "ul", { class: "aw-news", role: "log", "aria-live": "polite", "aria-label": "What happens" });
+
+  const show = (message) => {
+    if (message.gone) {
+      clearInterval(here);
+      return;
+    }
+    move(message);
+    pause.textContent = message.paused ? "Go on" : "Pause";
+    message.cars.forEach(({ speed, state }, number) => {
+      speeds[number].meter.value = Math.abs(speed);
+      speeds[number].text.textContent = ` ${speed.toFixed(2)} m/s`;
+      speeds[number].state.textContent = state;
+    });
+    for (const [name, made] of kills) {
+      const ended = !message.running.includes(name);
+      made.setAttribute("aria-disabled", ended); // a button that is disabled would lose the focus
+      made.textContent = ended ? `${name} has ended` : `Kill ${name}`;
+    }
+    rates.replaceChildren();
+    for (const [topic, rate] of message.rates) {
+      const row = element(rates, "tr");
+      element(row, "th", { scope: "row" }, topic);
+      element(row, "td", {}, rate.toFixed(0));
+    }
+    for (const sentence of message.news) element(news, "li", {}, sentence);
+    while (news.children.length > NEWS_KEPT) news.firstChild.remove();
+  };
+  model.on("msg:custom", show);
+  send({ do: "begin" });
+  const here = setInterval(() => document.visibilityState === "visible" && send({ do: "here" }), HERE_EVERY);
+  return () => {
+    clearInterval(here);
+    stop();
+    model.off("msg:custom", show);
+  };
+}
+
+export default { render };

@@ -1,0 +1,309 @@
+"""The live view of a world in a notebook: a widget that is fed from a thread, so that cells go on beside it.
+
+The widget is made with anywidget, which brings its part of JupyterLab along and loads nothing from a network. As long
+as no page looks, nothing is sent. When the launch ends, the picture of the world with its trails takes the widget's
+place, so that the saved notebook shows it wherever it is opened.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import threading
+import time
+from collections.abc import Callable
+from itertools import islice
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from geometry_msgs.msg import Twist
+from rclpy.qos import QoSProfile
+
+from autograder.world import RunningWorld
+from autograder.world import car as cars
+from autograder.world.drawing import blocks, drawn, still, thinned
+from autograder.world.room import BOX, WALL
+from autograder.world.simulation import RANGE_MAX, STANDS, Sample
+
+if TYPE_CHECKING:
+    from autograder.checks.running_launch import RunningLaunch
+
+_HERE = Path(__file__).parent
+_EVERY = 0.1
+"""The seconds between two messages to the page."""
+_GONE_AFTER = 3.0
+"""The seconds after which a page that says nothing does not look any more."""
+_KEYS_HOLD = 1.0
+"""The seconds for which a key counts as held if nothing more comes from the page."""
+_EVERY_RAY = 6
+"""Of the lidar's rays, one in so many is shown."""
+_TRAIL, _APART = 3000, 0.03
+"""The points of a trail that are sent to a page that begins to look, and the metres between two of them."""
+_RATES_OVER = 2.0
+"""The seconds over which the rates of topics are counted."""
+
+
+class WorldView:
+    """Shows one world and takes what a person does with it.
+
+    Args:
+        running: the launch, which has a world.
+        busy: tells whether a cell runs, while which a page may not be heard.
+    """
+
+    def __init__(self, running: RunningLaunch, busy: Callable[[], bool]) -> None:
+        """Begin to show it below the running cell."""
+        assert running.world is not None
+        self._running, self._busy = running, busy
+        self._world: RunningWorld = running.world
+        self._names = list(self._world.simulation.driven)
+        self._lock = threading.Lock()
+        self._heard = 0.0
+        self._sent = [0] * len(self._names)
+        """The step up to which each car's trail has been sent."""
+        self._whole = True
+        self._news: list[str] = []
+        self._told = _Told(running, self._world)
+        self._rates = _Rates(self._world)
+        self._wheels: dict[str, Any] = {}
+        """The publishers through which a page drives, by the car's namespace."""
+        self._keys: tuple[str, float, float, float] | None = None
+        """The car that is driven by keys, its speeds, and until when."""
+        self._widget = self._make_widget()
+        self._display: Any = None
+        self._over = threading.Event()
+        self._thread = threading.Thread(target=self._feed, name="world view", daemon=True)
+        self._show()
+        self._thread.start()
+
+    def close(self) -> None:
+        """End the view; the picture of the world takes its place."""
+        if self._over.is_set():
+            return
+        self._over.set()
+        self._thread.join(timeout=2.0)
+        with contextlib.suppress(Exception):  # the kernel may be about to end
+            self._widget.send({"gone": True})
+            self._display.update(self._still(), raw=True)
+            self._widget.close()
+
+    def _make_widget(self) -> Any:
+        import anywidget
+        import traitlets
+
+        class Widget(anywidget.AnyWidget):  # type: ignore[misc]
+            _esm = (_HERE / "world_view.js").read_text(encoding="utf-8")
+            _css = (_HERE / "world_view.css").read_text(encoding="utf-8")
+            scene = traitlets.Dict().tag(sync=True)
+
+        widget = Widget(scene=self._scene())
+        widget.on_msg(lambda _, content, __: self._take(content))
+        return widget
+
+    def _show(self) -> None:
+        from IPython.display import display
+
+        made = self._widget._repr_mimebundle_()
+        live = made[0] if isinstance(made, tuple) else made
+        self._display = display({**live, **self._still()}, raw=True, display_id=True)
+
+    def _still(self) -> dict[str, str]:
+        picture = still(drawn(self._world.simulation))
+        return {"text/html": picture.html(), "text/plain": picture.alt}
+
+    def _scene(self) -> dict[str, Any]:
+        """What does not change."""
+        world = self._world.simulation
+        room = world.room
+        places = [
+            {"name": name, "blocks": blocks(room.floor == number, room.cell)} for number, name in enumerate(room.places)
+        ]
+        return {
+            "cars": self._names,
+            "programs": list(dict.fromkeys(program.name for _, program in self._running.programs)),
+            "room": {
+                "width": room.width,
+                "height": room.height,
+                "walls": blocks(room.solid == WALL, room.cell),
+                "boxes": blocks(room.solid == BOX, room.cell),
+                "places": places,
+                "parked": [list(car.pose) for car in world.cars if not car.driven],
+                "car": [cars.LENGTH, cars.WIDTH],
+            },
+        }
+
+    # What a person does. A page's messages come in the kernel's threads.
+
+    def _take(self, content: dict[str, Any]) -> None:
+        """Do what a button or a key asks for. It comes from the student's own page, so it is trusted."""
+        self._heard = time.monotonic()
+        name = self._names[int(content.get("car", 0))]
+        match content.get("do"):
+            case "begin":
+                self._whole = True
+            case "pause":
+                self._world.paused = not self._world.paused
+                self._tell("The world is paused." if self._world.paused else "The world goes on.")
+            case "reset":
+                for one in self._names:
+                    self._world.simulation.reset(one)
+                self._tell("The cars are back at their starts.")
+            case "drive":
+                self._drive(name, float(content["speed"]), float(content["turn"]))
+            case "kill":
+                self._kill(str(content["name"]))
+
+    def _drive(self, name: str, speed: float, turn: float) -> None:
+        """Drive as the keys say, until they say something else or nothing more comes."""
+        drives = bool(speed or turn)
+        self._keys = (name, speed, turn, time.monotonic() + _KEYS_HOLD) if drives else None
+        self._command(name, speed, turn)
+
+    def _hold_keys(self) -> None:
+        """Repeat the last command: a busy browser sends fewer than the watchdog of the car wants."""
+        keys = self._keys
+        if keys is not None:
+            name, speed, turn, until = keys
+            if time.monotonic() > until:
+                self._keys, speed, turn = None, 0.0, 0.0
+            self._command(name, speed, turn)
+
+    def _command(self, name: str, speed: float, turn: float) -> None:
+        message = Twist()
+        message.linear.x, message.angular.z = speed, turn
+        with self._lock:
+            if name not in self._wheels:
+                topic = self._world.full_name(name, "cmd_vel")
+                self._wheels[name] = self._running.observer.publisher(topic, Twist, QoSProfile(depth=1))
+            self._wheels[name].publish(message)
+
+    def _kill(self, name: str) -> None:
+        for _, program in list(self._running.programs):
+            if program.name == name and program.running():
+                self._running.may_end.append(program)
+                self._running.stopped.append(program)
+                program.stop(grace=0.0)
+
+    def _tell(self, sentence: str) -> None:
+        with self._lock:
+            self._news.append(sentence)
+
+    # What is shown, in the view's own thread.
+
+    def _feed(self) -> None:
+        while not self._over.wait(_EVERY):
+            self._hold_keys()
+            if self._heard and self._busy():  # a page that looked when the cell began may be unable to say so now
+                self._heard = time.monotonic()
+            if time.monotonic() - self._heard > _GONE_AFTER:
+                self._heard = 0.0
+                continue
+            with contextlib.suppress(Exception):  # a view that breaks must not end the kernel's other threads
+                self._widget.send(self._message())
+
+    def _message(self) -> dict[str, Any]:
+        whole, self._whole = self._whole, False
+        with self._lock:
+            news, self._news = self._news + self._told.news(), []
+        world = self._world.simulation
+        with world.lock:
+            shown = [self._car(number, name, whole) for number, name in enumerate(self._names)]
+            touches = [[round(one.x, 2), round(one.y, 2)] for record in world.records.values()
+                       for one in list(record.touches)[-50:]]  # fmt: skip
+        return {
+            "whole": whole,
+            "cars": shown,
+            "touches": touches,
+            "rates": self._rates.now(),
+            "running": [program.name for _, program in self._running.programs if program.running()],
+            "paused": self._world.paused,
+            "news": news,
+        }
+
+    def _car(self, number: int, name: str, whole: bool) -> dict[str, Any]:
+        world = self._world.simulation
+        car, trail = world.driven[name], world.records[name].trail
+        new = len(trail) if whole else min(len(trail), world.steps - self._sent[number])
+        self._sent[number] = world.steps
+        since = max(
+            0, len(trail) - new - 1
+        )  # with the last one that was sent, from which the car may have been put away
+        points = thinned([sample.pose for sample in islice(trail, since, None)], _APART)[-_TRAIL:]
+        metres, angles = world.scan(name)[::_EVERY_RAY], world.angles[::_EVERY_RAY] + car.pose.heading
+        ends = [
+            [round(car.pose.x + one * math.cos(angle), 2), round(car.pose.y + one * math.sin(angle), 2)]
+            for one, angle in zip((min(float(one), RANGE_MAX) for one in metres), angles, strict=True)
+        ]
+        return {
+            "pose": [round(value, 3) for value in car.pose],
+            "speed": round(car.speed, 2),
+            "state": _state(car),
+            "trail": [[round(pose.x, 2), round(pose.y, 2), jumped] for pose, jumped in points],
+            "rays": ends,
+        }
+
+
+def _state(car: cars.Car) -> str:
+    if car.touches:
+        return f"touches {car.touches}"
+    return "brakes: no command" if car.braked else ""
+
+
+class _Told:
+    """What has happened since it was asked last, a sentence each."""
+
+    def __init__(self, running: RunningLaunch, world: RunningWorld) -> None:
+        self._running, self._world = running, world
+        self._touches = {name: len(record.touches) for name, record in world.simulation.records.items()}
+        self._places = {name: len(record.places) for name, record in world.simulation.records.items()}
+        self._moves = dict.fromkeys(world.simulation.records, False)
+        self._ended: set[int] = set()
+
+    def news(self) -> list[str]:
+        """Return the sentences."""
+        found = []
+        for name, record in self._world.simulation.records.items():
+            car = f"The car {name}" if name else "The car"
+            for touch in list(record.touches)[self._touches[name] :]:
+                found.append(f"{car} touches {touch.what} at ({touch.x:.1f}, {touch.y:.1f}).")
+            for place in list(record.places)[self._places[name] :]:
+                found.append(f"{car} has reached {place}, after {record.places[place]:.1f} s.")
+            self._touches[name], self._places[name] = len(record.touches), len(record.places)
+            trail: list[Sample] = list(record.trail)[-10:]
+            moves = any(abs(sample.speed) > STANDS for sample in trail)
+            if trail and moves != self._moves[name]:
+                pose = trail[-1].pose
+                where = f"({pose.x:.1f}, {pose.y:.1f})"
+                found.append(f"{car} drives, from {where}." if moves else f"{car} stands at {where}.")
+                self._moves[name] = moves
+        for number, (_, program) in enumerate(self._running.programs):
+            if not program.running() and number not in self._ended:
+                self._ended.add(number)
+                found.append(f"The program {program.name} has ended.")
+        return found
+
+
+class _Rates:
+    """How many messages a second came and went on each topic of the cars."""
+
+    def __init__(self, world: RunningWorld) -> None:
+        self._world = world
+        self._since = time.monotonic()
+        self._before = self._counts()
+        self._shown = [(topic, 0.0) for topic in self._before]
+
+    def _counts(self) -> dict[str, int]:
+        return {
+            self._world.full_name(name, topic): count
+            for name, node in self._world.nodes.items()
+            for topic, count in node.counts.items()
+        }
+
+    def now(self) -> list[tuple[str, float]]:
+        """Return the topics with their rates, over the last two seconds."""
+        passed = time.monotonic() - self._since
+        if passed >= _RATES_OVER:
+            counts = self._counts()
+            self._shown = [(topic, (count - self._before[topic]) / passed) for topic, count in counts.items()]
+            self._before, self._since = counts, time.monotonic()
+        return self._shown

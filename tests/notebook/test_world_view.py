@@ -1,0 +1,113 @@
+"""The live view of a world: in a kernel without a page, and in a real JupyterLab with the keyboard alone."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from jupyter_lab import START_SECONDS, jupyter_lab, kernels, run_all
+from kernels import Notebook
+
+SET_UP = "%load_ext autograder\nfrom autograder.checks import World, launch"
+DRIVER = """%%node driver
+import rclpy
+from geometry_msgs.msg import Twist
+from rclpy.node import Node
+
+rclpy.init()
+node = Node("driver")
+wheels = node.create_publisher(Twist, "cmd_vel", 10)
+command = Twist()
+command.linear.x = 0.4
+command.angular.z = 1.0
+node.create_timer(0.05, lambda: wheels.publish(command))
+rclpy.spin(node)
+"""
+SHOWN = 'robot = launch("driver", world="room").start()\nrobot.show()'
+
+
+@pytest.fixture
+def notebook(tmp_path: Path) -> Iterator[Notebook]:
+    made = Notebook(tmp_path)
+    made.run(SET_UP)
+    yield made
+    made.close()
+
+
+def test_the_view_does_not_block_and_leaves_a_picture_with_the_trail(notebook: Notebook) -> None:
+    notebook.run(DRIVER)
+    shown = notebook.run(SHOWN)
+    assert "A room of 6 m by 4 m with the place parking" in shown.text and "<img alt=" in shown.html, shown
+    driven = notebook.run("robot._running.observer.wait(lambda: robot.car()._record.metres > 0.3, 60)")
+    assert driven.result == "True"
+    ended = notebook.run("robot.stop()")
+    assert "update_display_data" in ended.types and "The car drove" in ended.text, ended
+    assert "The car drove" in notebook.run("robot.draw.world()").result
+    assert "moments from" in notebook.run("robot.draw.film()").result
+
+
+def test_what_cannot_be_shown_is_told(notebook: Notebook) -> None:
+    notebook.run(DRIVER)
+    assert "this launch has no world" in notebook.run('launch("driver").show()').error
+    assert "nothing runs; begin with robot" in notebook.run('launch("driver", world="room").show()').error
+
+
+STATE = """() => ({
+  news: [...document.querySelectorAll('.aw-news li')].map(line => line.textContent),
+  buttons: [...document.querySelectorAll('.aw-view button')].map(one => one.textContent),
+  rates: [...document.querySelectorAll('.aw-view tr')].map(row => row.textContent),
+  pose: document.querySelector('.aw-body.aw-car0').parentNode.getAttribute('transform'),
+})"""
+
+
+def _until(page: Any, condition: str) -> None:
+    page.wait_for_function(condition, timeout=START_SECONDS * 1000)
+
+
+def _says(sentence: str) -> str:
+    return f"() => document.querySelector('.aw-news').textContent.includes({json.dumps(sentence)})"
+
+
+def test_in_jupyterlab_it_is_driven_with_the_keyboard_and_tells_what_happens(browser: Any, tmp_path: Path) -> None:
+    cells = [SET_UP, DRIVER, SHOWN, "6 * 7"]
+    made = [
+        {"cell_type": "code", "id": f"c{n}", "metadata": {}, "outputs": [], "execution_count": None, "source": source}
+        for n, source in enumerate(cells)
+    ]
+    about = {"kernelspec": {"name": "python3", "display_name": "Python 3", "language": "python"}}
+    saved = {"cells": made, "metadata": about, "nbformat": 4, "nbformat_minor": 5}
+    window = browser.new_context(viewport={"width": 1400, "height": 1000})
+    window.set_default_timeout(START_SECONDS * 1000)
+    with jupyter_lab(tmp_path) as (work, address):
+        (work / "world.ipynb").write_text(json.dumps(saved))
+        page, ran = run_all(window, address, "world")
+        assert "42" in ran[-1]["output"] and not any(cell["error"] for cell in ran)
+        page.wait_for_selector(".aw-view")
+        _until(page, _says("The car drives"))
+        _until(page, "() => /cmd_vel[1-9]/.test(document.querySelector('.aw-view table').textContent)")
+
+        page.get_by_role("button", name="Kill driver").press("Enter")
+        _until(page, _says("The program driver has ended."))
+        _until(page, _says("The car stands at"))
+        page.get_by_role("button", name="Reset").press("Enter")
+        _until(page, _says("The cars are back at their starts."))
+        _until(page, f"() => ({STATE})().pose.includes('rotate(0)')")
+
+        page.locator(".aw-pad").focus()
+        before = page.evaluate(STATE)["pose"]
+        page.keyboard.down("ArrowUp")
+        _until(page, "() => parseFloat(document.querySelector('.aw-meters meter').value) > 0.1")
+        page.keyboard.up("ArrowUp")
+        assert page.evaluate("document.activeElement.className") == "aw-pad"  # the notebook has not taken the key
+        _until(page, "() => document.querySelector('.aw-meters meter').value === 0")
+        assert page.evaluate(STATE)["pose"] != before
+
+        page.get_by_role("button", name="Pause").press("Enter")
+        _until(page, "() => document.querySelector('.aw-buttons button').textContent === 'Go on'")
+        for kernel in kernels(page, address, "world"):
+            page.request.delete(f"{address}api/kernels/{kernel['id']}?token=lab")
+        page.close()
+    window.close()

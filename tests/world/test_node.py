@@ -1,0 +1,163 @@
+"""The world as ROS nodes: another node drives the car and sees what its sensors send."""
+
+from __future__ import annotations
+
+import math
+import os
+import time
+from collections.abc import Iterator
+
+import pytest
+from geometry_msgs.msg import Twist
+from nav_msgs.msg import Odometry
+from rcl_interfaces.srv import SetParameters
+from rclpy.parameter import Parameter
+from rclpy.qos import qos_profile_sensor_data
+from sensor_msgs.msg import BatteryState, Image, LaserScan
+from std_msgs.msg import Empty
+from std_srvs.srv import Trigger
+
+from autograder.graph.domains import claim_domain
+from autograder.graph.observer import Observer
+from autograder.sandbox.environment import profile_environment
+from autograder.world import RunningWorld, Simulation, read_room
+
+WITHIN = 30.0
+
+
+@pytest.fixture
+def observer() -> Iterator[Observer]:
+    os.environ.update(profile_environment())
+    domain = claim_domain()
+    watching = Observer(domain.id, left=domain.release)
+    yield watching
+    watching.close()
+
+
+def commands(observer: Observer, topic: str, speed: float, turn: float = 0.0) -> None:
+    """Command a car 20 times a second from now on."""
+    message = Twist()
+    message.linear.x, message.angular.z = speed, turn
+    publisher = observer.node.create_publisher(Twist, topic, 10)
+    observer.node.create_timer(0.05, lambda: publisher.publish(message))
+
+
+def ask(observer: Observer, kind: type, name: str, request: object) -> object:
+    client = observer.node.create_client(kind, name)
+    assert client.wait_for_service(WITHIN)
+    answer = client.call_async(request)
+    assert observer.wait(answer.done, WITHIN)
+    return answer.result()
+
+
+def place(observer: Observer, pose: object) -> tuple[bool, str]:
+    request = SetParameters.Request(parameters=[Parameter("pose", value=pose).to_parameter_msg()])
+    result = ask(observer, SetParameters, "/car/set_parameters", request).results[0]
+    return result.successful, result.reason
+
+
+def test_a_node_drives_the_car_and_gets_what_its_sensors_measure(observer: Observer) -> None:
+    world = RunningWorld(Simulation(read_room("room")), observer.domain_id)
+    try:
+        heard: dict[type, list[object]] = {}
+        for kind, topic in (
+            (Odometry, "/odom"),
+            (LaserScan, "/scan"),
+            (Image, "/camera/image_raw"),
+            (BatteryState, "/battery_state"),
+        ):
+            heard[kind] = []
+            observer.node.create_subscription(kind, topic, heard[kind].append, qos_profile_sensor_data)
+        commands(observer, "/cmd_vel", 0.4, 0.2)
+        assert observer.wait(lambda: all(heard.values()) and world.simulation.records[""].metres > 0.5, WITHIN)
+        assert observer.wait(lambda: heard[Odometry][-1].pose.pose.position.x > 1.2, WITHIN)
+        odometry, scan, image, battery = (heard[kind][-1] for kind in (Odometry, LaserScan, Image, BatteryState))
+        assert (odometry.header.frame_id, odometry.child_frame_id) == ("odom", "base_link")
+        assert odometry.twist.twist.linear.x == pytest.approx(0.4)
+        assert 0 < odometry.pose.pose.orientation.z < 1
+        assert scan.header.frame_id == "laser" and len(scan.ranges) == 180
+        assert scan.angle_min == pytest.approx(-math.pi) and scan.angle_max == pytest.approx(math.pi * 178 / 180)
+        assert (image.height, image.width, image.encoding, len(image.data)) == (48, 64, "rgb8", 64 * 48 * 3)
+        assert 0.9 < battery.percentage <= 1.0 and battery.present
+        assert world.nodes[""].counts["cmd_vel"] > 5 and observer.nodes() == ["/car"]
+    finally:
+        world.close()
+
+
+def test_two_cars_have_their_names_and_frames_in_two_namespaces(observer: Observer) -> None:
+    world = RunningWorld(Simulation(read_room("street"), ["front", "rear"]), observer.domain_id)
+    try:
+        heard: list[Odometry] = []
+        observer.node.create_subscription(Odometry, "/rear/odom", heard.append, 10)
+        commands(observer, "/rear/cmd_vel", 0.4)
+        records = world.simulation.records
+        assert observer.wait(lambda: records["rear"].metres > 0.3 and heard, WITHIN)
+        assert (heard[0].header.frame_id, heard[0].child_frame_id) == ("rear/odom", "rear/base_link")
+        assert records["front"].metres == 0.0
+        assert world.full_name("front", "scan") == "/front/scan"
+    finally:
+        world.close()
+
+
+def test_its_names_can_be_remapped(observer: Observer) -> None:
+    rules = ["--ros-args", "-r", "cmd_vel:=/control/command"]
+    world = RunningWorld(Simulation(read_room("room")), observer.domain_id, arguments=rules)
+    try:
+        commands(observer, "/control/command", 0.4)
+        assert observer.wait(lambda: world.simulation.records[""].metres > 0.1, WITHIN)
+    finally:
+        world.close()
+
+
+def test_the_car_is_placed_and_reset_by_services(observer: Observer) -> None:
+    world = RunningWorld(Simulation(read_room("room")), observer.domain_id)
+    try:
+        car = world.simulation.driven[""]
+        assert place(observer, [5.0, 3.0, 1.0]) == (True, "")
+        assert car.pose == (5.0, 3.0, 1.0)
+        refused, why = place(observer, [0.1, 3.0, 1.0])
+        assert not refused and why.startswith("a wall is at (") and car.pose == (5.0, 3.0, 1.0)
+        assert place(observer, [1.0, 2.0]) == (False, "`pose` has three numbers: x, y, heading")
+        assert ask(observer, Trigger, "/car/reset", Trigger.Request()).success
+        assert car.pose == world.simulation.room.starts[0]
+    finally:
+        world.close()
+
+
+def test_in_a_check_nobody_but_the_check_places_the_car(observer: Observer) -> None:
+    world = RunningWorld(Simulation(read_room("room")), observer.domain_id, closed=True)
+    try:
+        assert place(observer, [5.0, 3.0, 1.0]) == (False, "The check has placed the car; nobody else may.")
+        assert not ask(observer, Trigger, "/car/reset", Trigger.Request()).success
+        assert world.simulation.driven[""].pose == world.simulation.room.starts[0]
+    finally:
+        world.close()
+
+
+def test_a_heartbeat_is_needed_where_the_lab_says_so(observer: Observer) -> None:
+    world = RunningWorld(Simulation(read_room("room"), heartbeat=True), observer.domain_id)
+    try:
+        record = world.simulation.records[""]
+        commands(observer, "/cmd_vel", 0.4)
+        assert observer.wait(lambda: record.commands > 10, WITHIN)
+        assert record.metres == 0.0
+        publisher = observer.node.create_publisher(Empty, "/heartbeat", 10)
+        observer.node.create_timer(0.1, lambda: publisher.publish(Empty()))
+        assert observer.wait(lambda: record.metres > 0.1, WITHIN)
+    finally:
+        world.close()
+
+
+def test_a_world_that_is_paused_stands_still(observer: Observer) -> None:
+    world = RunningWorld(Simulation(read_room("room")), observer.domain_id)
+    try:
+        assert observer.wait(lambda: world.simulation.steps > 3, WITHIN)
+        world.paused = True
+        passed: list[float] = []
+        began = time.monotonic()
+        observer.node.create_timer(0.1, lambda: passed.append(time.monotonic() - began))
+        assert observer.wait(lambda: len(passed) > 1, WITHIN)
+        before = world.simulation.steps
+        assert observer.wait(lambda: len(passed) > 5, WITHIN) and world.simulation.steps == before
+    finally:
+        world.close()
