@@ -6,7 +6,7 @@ import os
 import sys
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, TextIO
 
 import typer
 
@@ -76,7 +76,7 @@ def check(
 
             print(result_for(result, audience).model_dump_json(indent=1))
         if github:
-            _tell_github(result, audience, notebook)
+            _tell_github(result, audience, notebook, sys.stderr if as_json else sys.stdout)
         if not watch:
             raise typer.Exit(_status(result))
         print(f"Waiting for {notebook} to be saved. Ctrl-C ends it.", file=sys.stderr)
@@ -137,13 +137,20 @@ def _write_exports(result: SubmissionResult, audience: Audience, junit: Path | N
         write_beside(gradescope, results_json(result))
 
 
-def _tell_github(result: SubmissionResult, audience: Audience, notebook: Path) -> None:
-    """Print the annotations, which GitHub reads from the log, and write the summary to the file that GitHub names."""
+def _tell_github(result: SubmissionResult, audience: Audience, notebook: Path, log: TextIO) -> None:
+    """Print the annotations, which GitHub reads from the log, and write the summary to the file that GitHub names.
+
+    Args:
+        result: the result of the checks.
+        audience: the reader of the annotations.
+        notebook: the notebook that was checked.
+        log: the stream to print to. GitHub reads both standard output and standard error.
+    """
     from autograder.report.audience import result_for
     from autograder.report.github import commands, summary
 
     seen = result_for(result, audience)
-    print(commands(seen, notebook), end="", flush=True)
+    print(commands(seen, notebook), end="", file=log, flush=True)
     place = os.environ.get("GITHUB_STEP_SUMMARY")
     if place:
         with Path(place).open("a", encoding="utf-8") as file:

@@ -56,6 +56,9 @@ _BLACKBOARD = re.compile(r"(?P<head>.+?_(?P<user>[^_]+_*?))_attempt_(?P<when>\d{
 _BLACKBOARD_NAME = re.compile(r"Name:.*\((?P<user>[^()]+)\)\s*")
 _SUBMISSION = re.compile(r"submission_(?P<number>\d+)")
 """Gradescope's folders. The file `submission_metadata.yml` says to whom they belong."""
+_DOWNLOAD = re.compile(r".+_submissions_\d{4}(_\d\d){2}_T(_\d\d){3}")
+"""The folder that Classroom 50 downloads into, `class-lab2_submissions_2026_11_20_T_18_30_00`. Its numbers also have
+the form of Canvas."""
 _INBOUND = re.compile(r"(?P<student>.+?)\+(?P<lab>[^+]+)\+(?P<when>\d{4}-\d\d-\d\d \d\d:\d\d:\d\d(\.\d+)?[^+]*)(\+.+)?")
 """nbgrader's exchange: `inbound/jane+lab2_executors+2026-11-20 18:30:00.123456 UTC+Hc2x`. The random text after the
 time keeps others from guessing the folder's name. It can be switched off, and says nothing about the student."""
@@ -72,7 +75,7 @@ def _forms(entries: Sequence[Entry], form: re.Pattern[str]) -> list[tuple[Entry,
 def canvas(entries: Sequence[Entry], lab: str) -> Recognised:
     """Recognise Canvas, "Download submissions": one folder with the files of all students."""
     found = Recognised()
-    for entry, match in _forms(entries, _CANVAS):
+    for entry, match in _forms([entry for entry in entries if not _DOWNLOAD.fullmatch(entry.stem)], _CANVAS):
         owner = {"canvas": match["name"], "canvas_id": match["user"]}
         called = match["file"] or entry.name
         number = int(match["number"] or 0)
@@ -164,8 +167,8 @@ def _gradescope_metadata(entry: Entry) -> dict[str, tuple[list[dict[str, str]], 
     return told
 
 
-def classroom(entries: Sequence[Entry], lab: str) -> Recognised:
-    """Recognise GitHub Classroom: a repository for each student, named after the assignment and the student."""
+def classroom50(entries: Sequence[Entry], lab: str) -> Recognised:
+    """Recognise what Classroom 50 downloads: a repository for each student, with the student's name at its end."""
     found = Recognised()
     folders = [entry for entry in entries if entry.kind in (Kind.FOLDER, Kind.ZIP) and "-" in entry.stem]
     with_lab = [entry for entry in folders if _has_labs(entry, lab)]
@@ -180,11 +183,11 @@ def classroom(entries: Sequence[Entry], lab: str) -> Recognised:
 
 
 def repositories(entries: Sequence[Entry], lab: str) -> Recognised:
-    """Recognise GitHub Classroom if a person named this format.
+    """Recognise Classroom 50 if a person named this format.
 
     In this case even a single repository is accepted. Its whole name counts as the student's name.
     """
-    found = classroom(entries, lab)
+    found = classroom50(entries, lab)
     single = [entry for entry in entries if entry.kind in (Kind.FOLDER, Kind.ZIP) and _has_labs(entry, lab)]
     if not found.claims and len(single) == 1:
         found.claims.append(Claim(single[0], {"github": single[0].stem, "repository": single[0].stem}))
@@ -296,9 +299,9 @@ PLATFORMS: Mapping[str, Format] = {
         Format(FormatName.MOODLE, "Moodle", moodle),
         Format(FormatName.BLACKBOARD, "Blackboard", blackboard),
         Format(FormatName.CANVAS, "Canvas", canvas),
-        Format(FormatName.CLASSROOM, "GitHub Classroom", classroom, re.compile(r".+-submissions(-.+)?"), certain=False),
+        Format(FormatName.CLASSROOM50, "Classroom 50", classroom50, _DOWNLOAD, certain=False),
     )
 }
 """The formats of platforms, by the names of the formats."""
-CLASSROOM = replace(PLATFORMS["classroom"], read=repositories)
-"""The format of GitHub Classroom for the case that a person named it."""
+CLASSROOM50 = replace(PLATFORMS["classroom50"], read=repositories)
+"""The format of Classroom 50 for the case that a person named it."""

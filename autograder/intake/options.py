@@ -14,7 +14,7 @@ class FormatName(StrEnum):
     MOODLE = "moodle"
     BLACKBOARD = "blackboard"
     CANVAS = "canvas"
-    CLASSROOM = "classroom"
+    CLASSROOM50 = "classroom50"
     PLAIN = "plain"
 
 

@@ -1,8 +1,8 @@
 """The roster: a table of the class that maps a platform's names to the names in the gradebook.
 
-The roster is a CSV file with a line of headings, or the roster that GitHub Classroom exports. The column `id` is the
-name in the gradebook. Columns such as `name`, `email`, `canvas_id`, `moodle_id` and `github` hold the names of the same
-student on platforms.
+The roster is a CSV file with a line of headings, or the `roster.csv` of a classroom in Classroom 50. The column `id` is
+the name in the gradebook. Columns such as `name`, `email`, `canvas_id`, `moodle_id` and `github` hold the names of the
+same student on platforms.
 
 Without a roster, students keep the names that they had before, or get the names that the platform uses.
 """
@@ -26,8 +26,10 @@ from autograder.intake.entries import Claim
 from autograder.intake.record import person
 
 FILE_NAME = "roster.csv"
-_OF_CLASSROOM = {"identifier": "id", "github_username": "github"}
-"""The names of the columns in the roster that GitHub Classroom exports, with the kit's names for them."""
+_OF_CLASSROOM50 = {"username", "first_name", "last_name", "github_id"}
+"""Columns of a classroom's roster in Classroom 50, which has no column `id`. Source: its wiki, `gh teacher roster`."""
+_STAFF = ("teacher", "hta", "ta")
+"""The roles of people in Classroom 50's roster who are not students."""
 
 
 class Roster:
@@ -105,9 +107,8 @@ def read_roster(path: Path) -> Roster:
     except (OSError, UnicodeError, csv.Error) as error:
         raise KitError(f"The roster {path} cannot be read: {error}.", "It is a CSV file in UTF-8.") from error
     columns = [(name or "").strip().lower() for name in reader.fieldnames or []]
-    other = _OF_CLASSROOM if "id" not in columns else {}
-    columns = [other.get(name, name) for name in columns]
-    if "id" not in columns:
+    of_classroom50 = "id" not in columns and set(columns) >= _OF_CLASSROOM50
+    if "id" not in columns and not of_classroom50:
         raise KitError(
             f"The roster {path} has no column `id`; its first line is {heading[:80]!r}.",
             "The first line names the columns: id,name,email,…",
@@ -115,10 +116,14 @@ def read_roster(path: Path) -> Roster:
     students: dict[str, dict[str, str]] = {}
     for number, line in lines:
         given = {(key or "").strip().lower(): value.strip() for key, value in line.items() if isinstance(value, str)}
-        named = {other.get(key, key): value for key, value in given.items()}
+        if of_classroom50:
+            if given.get("role") in _STAFF:
+                continue
+            name = f"{given.get('first_name', '')} {given.get('last_name', '')}".strip()
+            given |= {"id": given.get("username", ""), "github": given.get("username", ""), "name": name}
         # If one number in a column is missing, spreadsheets write the others with a decimal point: 4711.0.
         known = {
-            key: re.sub(r"^(\d+)\.0+$", r"\1", value) if key.endswith("_id") else value for key, value in named.items()
+            key: re.sub(r"^(\d+)\.0+$", r"\1", value) if key.endswith("_id") else value for key, value in given.items()
         }
         if not any(known.values()):  # spreadsheets may write lines that contain only commas
             continue

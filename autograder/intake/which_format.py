@@ -12,7 +12,7 @@ from pathlib import Path
 
 from autograder.core.errors import KitError
 from autograder.intake.entries import Claim, Entry, Kind, NotUnderstoodError, Recognised, listed
-from autograder.intake.formats import CLASSROOM, PLAIN, PLATFORMS, Format, by_lab, owner_of
+from autograder.intake.formats import CLASSROOM50, PLAIN, PLATFORMS, Format, by_lab, owner_of
 from autograder.intake.members import is_hidden, is_notebook
 from autograder.intake.roster import given_name
 from autograder.intake.which_notebook import choose, is_of_lab
@@ -74,7 +74,7 @@ def read_class(source: Path, lab: str, format_name: str = "", known: Known | Non
     Raises:
         KitError: the source is not a class, or it can be read in two ways.
     """
-    named = {**PLATFORMS, PLAIN.name: PLAIN, CLASSROOM.name: CLASSROOM}.get(format_name)
+    named = {**PLATFORMS, PLAIN.name: PLAIN, CLASSROOM50.name: CLASSROOM50}.get(format_name)
     found = listed(source, lab)
     if known is not None and known.own:
         return Reading(PLAIN, by_lab(found.entries, lab))

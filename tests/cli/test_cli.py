@@ -374,6 +374,8 @@ def test_check_tells_github_what_is_wrong_and_where(
     assert "file=class/gil/toy.ipynb" in line and "hidden check failed" in line.rpartition("::")[2]
     told = place.read_text(encoding="utf-8")
     assert told.startswith("## toy: 2 of 5 points") and "| ✗ | The talker | 0 of 3 points |" in told
+    status, out, err = run(root, "check", "class/gil/toy.ipynb", "--course", ".", "--github", "--json")
+    assert status == 1 and json.loads(out)["lab"] == "toy" and line in err.splitlines()
 
 
 def test_what_a_program_prints_is_no_command_and_no_markdown_for_github() -> None:

@@ -201,7 +201,7 @@ def test_whatever_lies_among_nbgraders_folders_is_taken_or_named(tmp_path: Path)
 
 def test_too_many_files_are_said_however_often_they_are_looked_at(tmp_path: Path) -> None:
     files = {f"a-mal/{number}.txt": b"" for number in range(MOST + 1)} | {"a-bob/labs/toy/toy.ipynb": b"bob"}
-    taken, collected = taken_from(files, tmp_path)  # first as what GitHub Classroom gives out
+    taken, collected = taken_from(files, tmp_path)  # first as what Classroom 50 downloads
     assert taken == {"a-bob": "bob"} and "'a-mal' cannot be the work of one student" in collected.refused[0]
 
 
@@ -321,10 +321,10 @@ def test_a_class_of_one_is_asked_about_by_its_names_and_the_advice_holds(
 
 def test_a_single_repository_is_read_where_somebody_names_the_format(tmp_path: Path) -> None:
     source = class_forms.lay_out({"lab-2-ann/labs/toy/toy.ipynb": b"mine"}, tmp_path, False)
-    assert list(collect(source, class_forms.LAB, tmp_path / "course", "classroom").notebooks) == ["lab-2-ann"]
+    assert list(collect(source, class_forms.LAB, tmp_path / "course", "classroom50").notebooks) == ["lab-2-ann"]
     (tmp_path / "roster").mkdir()
     (tmp_path / "roster" / "roster.csv").write_text("id,github\njd01,ann\n")
-    assert list(collect(source, class_forms.LAB, tmp_path / "roster", "classroom").notebooks) == ["jd01"]
+    assert list(collect(source, class_forms.LAB, tmp_path / "roster", "classroom50").notebooks) == ["jd01"]
 
 
 def test_a_packed_kit_is_one_students(tmp_path: Path) -> None:

@@ -90,12 +90,12 @@ PLATFORMS: dict[str, tuple[str, dict[str, str], dict[str, str], dict[str, str]]]
         {"jd01": "second", "Jürgen Müller": "jm"},
         {"jd01": "second", "mm02": "jm"},
     ),
-    "classroom": (
-        "GitHub Classroom",
+    "classroom50": (
+        "Classroom 50",
         {
-            "toy-submissions/toy-janedoe/labs/toy/toy.ipynb": "jd",
-            "toy-submissions/toy-janedoe/README.md": "# Toy",
-            "toy-submissions/toy-nora-ob/labs/toy/toy.ipynb": "no",
+            "cs-toy_submissions_2026_11_20_T_18_30_00/cs-toy-janedoe/labs/toy/toy.ipynb": "jd",
+            "cs-toy_submissions_2026_11_20_T_18_30_00/cs-toy-janedoe/README.md": "# Toy",
+            "cs-toy_submissions_2026_11_20_T_18_30_00/cs-toy-nora-ob/labs/toy/toy.ipynb": "no",
         },
         {"janedoe": "jd", "nora-ob": "no"},
         {"jd01": "jd", "no03": "no"},
@@ -167,6 +167,21 @@ def test_a_platforms_export_is_recognised(tmp_path: Path, name: str, zipped: boo
     collected = collect(lay_out(files, tmp_path, zipped), toy.LAB, course)
     assert collected.format == called
     assert texts(collected) == (by_roster if with_roster else as_given)
+
+
+def test_the_roster_of_classroom_50_names_its_students_by_their_github_names(tmp_path: Path) -> None:
+    course = tmp_path / "course"
+    course.mkdir()
+    heading = "username,first_name,last_name,email,section,github_id,role"
+    lines = [
+        "janedoe,Jane,Doe,jane.doe@example.edu,A,4711,student",
+        "Nora-OB,Nora,O'Brien,,,4712,",
+        "prof,P,Rof,,,1,ta",
+    ]
+    (course / "roster.csv").write_text("\n".join([heading, *lines]), encoding="utf-8")
+    files = PLATFORMS["classroom50"][1]
+    collected = taken_in(lay_out(files, tmp_path, True), toy.LAB, course)  # the assistant is not missed
+    assert texts(collected) == {"janedoe": "jd", "Nora-OB": "no"}
 
 
 def test_what_was_replaced_late_or_no_notebook_is_said(tmp_path: Path) -> None:

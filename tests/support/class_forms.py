@@ -84,7 +84,7 @@ def built(seed: int) -> Built:
     for student in students:
         _hand_in(student, dice, hostile)
     form = dice.choice(list(FORMS))
-    if form.startswith("plain") or form in ("exchange", "submitted", "classroom", "blackboard"):
+    if form.startswith("plain") or form in ("exchange", "submitted", "classroom50", "blackboard"):
         # Who gives these names sees to it that no two are one.
         students = list({student.name.replace(" ", ""): student for student in students}.values())
     files = FORMS[form](students, dice)
@@ -180,7 +180,7 @@ def _gradescope(students: list[Student], dice: random.Random) -> dict[str, bytes
     return listed | files if dice.random() < 0.5 else files | listed
 
 
-def _classroom(students: list[Student], dice: random.Random) -> dict[str, bytes]:
+def _classroom50(students: list[Student], dice: random.Random) -> dict[str, bytes]:
     files = {}
     for student in students:
         top = f"toy-{student.name.replace(' ', '')}"
@@ -230,13 +230,14 @@ def _plain_mixed(students: list[Student], dice: random.Random) -> dict[str, byte
 
 FORMS: dict[str, Callable[[list[Student], random.Random], dict[str, bytes]]] = {
     "canvas": _canvas, "moodle": _moodle, "blackboard": _blackboard, "gradescope": _gradescope,
-    "classroom": _classroom, "exchange": _exchange, "submitted": _submitted, "plain folders": _plain_folders,
+    "classroom50": _classroom50, "exchange": _exchange, "submitted": _submitted, "plain folders": _plain_folders,
     "plain zips": _plain_zips, "plain files": _plain_files, "plain mixed": _plain_mixed,
 }  # fmt: skip
 
 
 def _packed(files: dict[str, bytes], form: str, dice: random.Random) -> dict[str, bytes]:
-    around = {"exchange": "inbound", "classroom": "toy-submissions", "gradescope": "assignment_5_export"}
+    around = {"exchange": "inbound", "classroom50": "cs-toy_submissions_2026_11_20_T_18_30_00"}
+    around["gradescope"] = "assignment_5_export"
     wrap = dice.random()
     if wrap < 0.3:
         top = around.get(form, "all of them")
@@ -269,9 +270,9 @@ def called(student: Student, form: str) -> set[str]:
             for bare_name in bare
             for one in (bare_name, f"{bare_name}_{student.number}", f"{bare_name}_1")
         }
-    if form in ("blackboard", "classroom"):
+    if form in ("blackboard", "classroom50"):
         name = name.replace(" ", "")
-    if form == "classroom":  # where there is one repository, nothing says where the student's name begins in its own
+    if form == "classroom50":  # where there is one repository, nothing says where the student's name begins in its own
         return {file_name(one) for one in (name, f"toy-{name}")}
     return {file_name(one) for one in (name, f"{name}_{student.number}", f"{name}_s{student.number}@x.edu")}
 
