@@ -162,6 +162,10 @@ def write_kit(root: Path, book: Path | None, into: Path) -> Path:
     labs = folder / KIT_FOLDER / "labs"
     for name in names:
         shutil.copytree(paths.labs / name, labs / name, ignore=_NOT_OURS)
+        if paths.versions(name).is_file():  # so that a student with an earlier version is not told of changed cells
+            there = CoursePaths(folder / KIT_FOLDER).versions(name)
+            there.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy(paths.versions(name), there)
     shutil.copy(paths.labs / "README.md", labs)
     if book is not None:
         shutil.copytree(book, folder / "lectures", ignore=_NOT_OURS)

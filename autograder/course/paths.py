@@ -141,6 +141,10 @@ class CoursePaths:
         """nbgrader's database, outside `build` because it holds people's decisions, which cannot be made again."""
         return self.root / "gradebook" / "gradebook.db"
 
+    def versions(self, lab: str) -> Path:
+        """Return the file that records the versions of a lab that students have received."""
+        return self.gradebook.parent / "versions" / f"{lab}.json"
+
     @property
     def lock(self) -> Path:
         """The lock file that a running grading holds."""

@@ -205,7 +205,7 @@ class SaveCheckedGrades(SaveScores):
         """Record all grades of a submission, and a digest of what was recorded."""
         root, student, lab, _ = _submitted(self.parent.parent, resources)
         self._programs = [cell.source for cell in nb.cells if cell.cell_type == "code" and utils.is_solution(cell)]
-        digest = own_tables.recordable(root, lab, student)
+        digest = own_tables.recordable(root, lab.name, lab.source_digest, student)
         with Gradebook(resources["nbgrader"]["db_url"]) as gradebook:
             own_tables.make_tables(gradebook.engine)
         made: tuple[Any, dict[str, Any]] = super().preprocess(nb, resources)

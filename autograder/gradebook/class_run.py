@@ -122,7 +122,7 @@ class Steps:
 def _trouble(result: SubmissionResult) -> str:
     undecided = sum(check.status is Status.UNKNOWN for check in result.checks)
     parts = [f"{undecided} undecided"] if undecided else []
-    parts += [problem.title for problem in result.problems[:1]]
+    parts += [problem.title for problem in result.real_problems[:1]]
     return f": {', '.join(parts)}" if parts else ""
 
 

@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Any
 
 from sqlalchemy import Column, MetaData, String, Table, delete, insert, select
 
-from autograder.course.lab import Lab
 from autograder.course.paths import CoursePaths
 from autograder.grading.store import ResultStore
 from autograder.submission import timestamp
@@ -55,11 +54,18 @@ def digest_of(*parts: object) -> str:
     return hashlib.sha256(json.dumps(parts).encode()).hexdigest()
 
 
-def recordable(root: Path, lab: Lab, student: str) -> str:
-    """Return a digest of everything that is recorded for a submission."""
-    handed_in = CoursePaths(root).submitted_notebook(student, lab.name).with_name(timestamp.FILE_NAME)
-    contents = (ResultStore(root).path(lab.name, student), handed_in)
-    return digest_of(lab.source_digest, *(hashlib.sha256(_content(path)).hexdigest() for path in contents))
+def recordable(root: Path, lab: str, source_digest: str, student: str) -> str:
+    """Return a digest of everything that is recorded for a submission.
+
+    Args:
+        root: the course's folder.
+        lab: the lab.
+        source_digest: the digest of the lab's notebook.
+        student: the student who handed it in.
+    """
+    handed_in = CoursePaths(root).submitted_notebook(student, lab).with_name(timestamp.FILE_NAME)
+    contents = (ResultStore(root).path(lab, student), handed_in)
+    return digest_of(source_digest, *(hashlib.sha256(_content(path)).hexdigest() for path in contents))
 
 
 def _content(path: Path) -> bytes:

@@ -120,7 +120,7 @@ def feedback_html(
         heading=heading,
         total=_total(grade),
         penalty=f"{grade.penalty:g}" if grade.penalty else "",
-        waiting=_waiting(grade),
+        waiting=grade.told_waiting,
         problems=shown.problems if shown is not None else [],
         sections=sections,
         parts=_parts(tasks, cells, sections),
@@ -154,14 +154,6 @@ def _number(points: float) -> str:
 def _total(grade: Grade) -> str:
     so_far = " so far" if grade.waiting else ""
     return f"{_number(grade.earned)} of {_number(grade.max_score)} points{so_far}"
-
-
-def _waiting(grade: Grade) -> str:
-    if not grade.waiting:
-        return ""
-    count, top = len(grade.waiting), sum(cell.max_points for cell in grade.waiting)
-    which = "1 answer is" if count == 1 else f"{count} answers are"
-    return f"{which} not graded yet, which can still give up to {_number(top)} points."
 
 
 def _points(cells: Sequence[CellGrade]) -> str:

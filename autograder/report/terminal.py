@@ -21,8 +21,14 @@ from autograder.report.audience import Audience, check_for, reason, result_for
 from autograder.report.words import Verdict
 from autograder.submission.similar import Pair
 
-SYMBOL = {Status.PASSED: "✓", Status.FAILED: "✗", Status.NOT_CHECKED: "-", Status.UNKNOWN: "?"}
-STYLE = {Status.PASSED: "blue", Status.FAILED: "bold red", Status.NOT_CHECKED: "dim", Status.UNKNOWN: "bold magenta"}
+SYMBOL = {Status.PASSED: "✓", Status.FAILED: "✗", Status.NOT_CHECKED: "-", Status.UNKNOWN: "?", Status.NOTE: "•"}
+STYLE = {
+    Status.PASSED: "blue",
+    Status.FAILED: "bold red",
+    Status.NOT_CHECKED: "dim",
+    Status.UNKNOWN: "bold magenta",
+    Status.NOTE: "dim",
+}
 _JOINERS = "\u200c\u200d"
 """Invisible characters that are part of the spelling of some scripts and emoji."""
 _LOG_LINES = 20
