@@ -38,6 +38,7 @@ def explain(
         screen.print(submission_view(result, "instructor", book))
         for path in _pictures(result.checks, folder):
             print(path)
+        _history(root, result)
         screen.print("To see all evidence and messages of a check, name the check, such as: ", end="")
         screen.print(f"autograder explain {student} 1 --lab {result.lab}", markup=False)
         return
@@ -45,6 +46,7 @@ def explain(
     screen.print(evidence_view(chosen, book))
     for path in _pictures([chosen], folder):
         print(path)
+    _history(root, result, chosen.grade_id)
     _messages(root, result, chosen, folder / _name(chosen))
 
 
@@ -87,6 +89,17 @@ def _pictures(checks: list[CheckResult], folder: Path) -> list[Path]:
             written.append(folder / f"{_name(check)}_{number}.svg")
             write_beside(written[-1], picture.svg)
     return written
+
+
+def _history(root: Path, result: SubmissionResult, check: str = "") -> None:
+    """Show what happened to the points of a submission or of one of its checks."""
+    from autograder.core.history import told
+    from autograder.gradebook.grades import read_history
+    from autograder.report.terminal import console, history_view
+
+    events = told(read_history(root, result.lab, result.student).get(result.student, []), check)
+    if events:
+        console().print(history_view(events))
 
 
 def _messages(root: Path, result: SubmissionResult, check: CheckResult, bag: Path) -> None:

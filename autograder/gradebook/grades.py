@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, TypeVar
 
 from autograder.core.files import write_beside
 from autograder.core.grades import Grade
+from autograder.core.history import Entry as HistoryEntry
 from autograder.course.paths import CoursePaths
 from autograder.gradebook.database import damage_told
-from autograder.gradebook.own_tables import THE_LAB, recordable, recorded
+from autograder.gradebook.own_tables import THE_LAB, history, recordable, recorded
 from autograder.gradebook.pages import shows
 from autograder.gradebook.queries import digests, grades_in
 from autograder.gradebook.settings import gradebook_address, gradebook_file
@@ -55,6 +56,18 @@ def read_grades(root: Path, lab: str = "") -> list[Grade]:
     return [grade for grade in grades if grade.student not in left[grade.lab]]
 
 
+def read_history(root: Path, lab: str, student: str = "") -> dict[str, list[HistoryEntry]]:
+    """Return what happened to the points in a lab, by student, the oldest entry first.
+
+    Args:
+        root: the course's folder.
+        lab: the lab.
+        student: the student; empty for all students.
+    """
+    nothing: dict[str, list[HistoryEntry]] = {}
+    return ask(root, lambda connection: history(connection, lab, student), nothing)
+
+
 def write_grades(root: Path) -> Path:
     """Write `build/grades.csv` from the gradebook and return its path.
 
@@ -90,6 +103,7 @@ def class_entries(root: Path, lab: str | None = None) -> list[Entry]:
     grades = {(grade.lab, grade.student): grade for grade in read_grades(root, lab or "")}
     results = ResultStore(root).all(lab)
     classes = {name: read_class(root, name) for name in {result.lab for result in results}}
+    histories = {name: read_history(root, name) for name in classes}
     stale = stale_submissions(root, [(result.lab, result.student) for result in results])
     entries = []
     for result in results:
@@ -105,6 +119,7 @@ def class_entries(root: Path, lab: str | None = None) -> list[Entry]:
                 file=taken.file,
                 late=taken.late,
                 feedback=page if page.is_file() else None,
+                history=histories[result.lab].get(result.student, ()),
                 stale=(result.lab, result.student) in stale,
             )
         )

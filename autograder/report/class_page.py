@@ -19,6 +19,7 @@ from urllib.parse import quote
 from markupsafe import Markup
 
 from autograder.core.files import write_beside
+from autograder.core.history import told
 from autograder.core.results import CheckResult, Status
 from autograder.report import words
 from autograder.report.audience import reason
@@ -212,4 +213,5 @@ def _student(entry: Entry, page: Path) -> dict[str, object]:
         "why": why_lost(entry.result),
         "flags": len(entry.result.flags),
         "feedback": link,
+        "history": told(entry.history),
     }

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from autograder.core.grades import Grade
+from autograder.core.history import Entry as HistoryEntry
 from autograder.core.results import SubmissionResult
 
 
@@ -30,6 +31,8 @@ class Entry:
     """Whether the platform has marked the submission as late."""
     feedback: Path | None = None
     """The student's feedback page; None if there is none."""
+    history: Sequence[HistoryEntry] = ()
+    """What happened to the points, the oldest entry first."""
     stale: bool = False
     """Whether the result or the feedback page is not the one to which the grade belongs."""
 
