@@ -122,6 +122,11 @@ class CoursePaths:
         return self.build / "taken" / f"{lab}.json"
 
     @property
+    def persons(self) -> Path:
+        """The file that remembers the name of each person on a platform, beside the gradebook with these names."""
+        return self.gradebook.parent / "persons.json"
+
+    @property
     def tried(self) -> Path:
         """Results of runs that do not count yet, as in `results`."""
         return self.build / "tried"

@@ -2,8 +2,8 @@
 
 `recorded` holds a digest of what was recorded last for a submission. If the submission now has another digest, it is
 recorded again. `judged` holds a digest of the work that a person saw when grading a cell. If the work has changed since
-then, the grade is kept, and a person is asked to look at it again. `history` holds the entries of `core.history`; its
-rows are never changed or removed.
+then, the grade is kept, and a person is asked to look at it again. `history` holds the entries of `core.history`; they
+are never changed or removed, but they follow a student to a new name.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sqlalchemy import Column, Integer, MetaData, String, Table, Text, delete, insert, inspect, select
+from sqlalchemy import Column, Integer, MetaData, String, Table, Text, delete, insert, inspect, select, update
 from sqlalchemy.engine import Connection
 
 from autograder.core.history import Entry
@@ -103,6 +103,13 @@ def history(talks: Talks, lab: str, student: str = "") -> dict[str, list[Entry]]
         for row in connection.execute(wanted):
             found.setdefault(row.student, []).append(Entry.model_validate_json(row.entry))
     return found
+
+
+def rename_student(talks: Talks, lab: str, old: str, new: str) -> None:
+    """Give everything that these tables have about a submission to the student's new name."""
+    talks.execute(delete(_RECORDED).where(_RECORDED.c.lab == lab, _RECORDED.c.student.in_([old, new])))
+    of_old = update(_HISTORY).where(_HISTORY.c.lab == lab, _HISTORY.c.student == old)
+    talks.execute(of_old.values(student=new))
 
 
 def note_history(talks: Talks, lab: str, student: str, entry: Entry) -> None:

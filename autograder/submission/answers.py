@@ -131,10 +131,9 @@ def _take_cell(
         title = f"the cell `{grade_id}` is in one piece"
         submission.problems.append(problem(title, SPLIT_CELL(SPLIT.format(name))))
     if len(copies) > 1:
-        because = told_of_given_copies(grade_id, len(copies))
-        said = note
+        said, because = note, told_of_given_copies(grade_id, len(copies))
         if answer is not None:
-            because, said = told_of_copies(name, len(copies), is_file=file is not None), problem
+            said, because = problem, told_of_copies(name, len(copies), is_file=file is not None)
         submission.problems.append(said(f"there is one cell `{grade_id}`", DUPLICATED_CELL(because, DELETE_COPIES)))
     flags = ("grade", "solution", "locked")
     meant = {flag: bool(nbgrader_of(original).get(flag, False)) for flag in flags}
