@@ -170,6 +170,11 @@ class CoursePaths:
         return self.build / "report" / f"{lab}.html"
 
     @property
+    def term_page(self) -> Path:
+        """The page about all labs of a term, which is for instructors."""
+        return self.build / "report" / "term.html"
+
+    @property
     def explained(self) -> Path:
         """Pictures and messages of single submissions."""
         return self.build / "explained"
