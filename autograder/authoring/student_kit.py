@@ -123,7 +123,7 @@ INSTRUCTORS = (
 )
 """The parts of the package `autograder` that students do not get."""
 STUDENTS = {
-    "cli": ("__init__", "app", "check", "doctor", "machine", "main", "package", "ros2", "submit"),
+    "cli": ("__init__", "app", "appeal", "check", "chosen", "doctor", "machine", "main", "package", "ros2", "submit"),
     "intake": ("__init__", "record"),
 }
 """The modules that students get from each of these folders. The others are for instructors."""
