@@ -6,13 +6,15 @@ import json
 import re
 from pathlib import Path
 
+from autograder.authoring.bank import refuse_unexplained
 from autograder.authoring.lint.static import read_findings, release_findings
 from autograder.core.errors import KitError
 from autograder.core.files import write_beside
 from autograder.course.cells import source_of
-from autograder.course.lab import lab_names
+from autograder.course.lab import lab_names, load_lab
 from autograder.course.paths import CoursePaths
 from autograder.course.settings import read_settings
+from autograder.course.versions import remember
 from autograder.gradebook.release import released_files
 
 START_PAGE = "README.md"
@@ -79,6 +81,8 @@ def release(root: Path, lab: str) -> Path:
         errors = release_findings(files)
     if errors:
         raise KitError(f"{lab} is not released:\n" + "\n".join(f"  {one}" for one in errors), "Repair these cells.")
+    refuse_unexplained(root, load_lab(root, lab))
+    remember(root, lab, load_lab(root, lab).released)
     folder = CoursePaths(root).labs / lab
     for path, content in files.items():
         write_beside(folder / path, content)

@@ -113,10 +113,32 @@ def _as_text(name: str, content: bytes) -> Iterator[tuple[str, str]]:
 
 NAME = "ros2-labs"
 """The name of the folder and of the zip."""
-INSTRUCTORS = ("authoring", "gradebook", "report/class_page.py", "report/templates/class.html")
+INSTRUCTORS = (
+    "authoring",
+    "gradebook",
+    "report/class_page.py",
+    "report/answers_page.py",
+    "report/term_page.py",
+    "report/templates/answers.html",
+    "report/templates/class.html",
+    "report/templates/term.html",
+)
 """The parts of the package `autograder` that students do not get."""
 STUDENTS = {
-    "cli": ("__init__", "app", "check", "doctor", "machine", "main", "package", "ros2", "submit", "world"),
+    "cli": (
+        "__init__",
+        "app",
+        "appeal",
+        "check",
+        "chosen",
+        "doctor",
+        "machine",
+        "main",
+        "package",
+        "ros2",
+        "submit",
+        "world",
+    ),  # fmt: skip
     "intake": ("__init__", "record"),
 }
 """The modules that students get from each of these folders. The others are for instructors."""
@@ -166,6 +188,10 @@ def write_kit(root: Path, book: Path | None, into: Path) -> Path:
     labs = folder / KIT_FOLDER / "labs"
     for name in names:
         shutil.copytree(paths.labs / name, labs / name, ignore=_NOT_OURS)
+        if paths.versions(name).is_file():  # so that a student with an earlier version is not told of changed cells
+            there = CoursePaths(folder / KIT_FOLDER).versions(name)
+            there.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy(paths.versions(name), there)
     shutil.copy(paths.labs / "README.md", labs)
     if book is not None:
         _copy_book(book, folder / "lectures")

@@ -161,7 +161,7 @@ def _status(result: SubmissionResult) -> int:
     from autograder.core.results import Status
 
     statuses = {check.status for check in result.checks}
-    if result.problems or statuses - {Status.PASSED, Status.UNKNOWN}:
+    if result.real_problems or statuses - {Status.PASSED, Status.UNKNOWN}:
         return 1
     return COULD_NOT_FIND_OUT if Status.UNKNOWN in statuses else 0
 

@@ -30,7 +30,8 @@ AcceptOption = Annotated[
     list[Accepted] | None,
     typer.Option(
         help="Continue although something stopped the run. smaller: students from the roster or the last run are"
-        " missing. replaced: one submission would replace another one. roster: somebody is not in the roster."
+        " missing. replaced: one submission would replace another one. renamed: the roster has a new name for a"
+        " student, to which the grades move. roster: somebody is not in the roster."
         " You can give this option several times."
     ),
 ]

@@ -26,15 +26,42 @@ def report(course: CourseOption = None) -> None:
 
     from autograder.course.paths import CoursePaths, course_root
     from autograder.gradebook.grades import class_entries
+    from autograder.gradebook.renewal import renew_pages
     from autograder.report.class_page import write_class_page
 
     root = course_root(course)
+    renew_pages(root)
     entries = class_entries(root)
     if not entries:
         raise KitError("There are no results yet.", "Grade a class first: autograder grade LAB")
     for lab in sorted({entry.lab for entry in entries}):
         of_lab = [entry for entry in entries if entry.lab == lab]
         print(write_class_page(CoursePaths(root).class_page(lab), of_lab, datetime.date.today()))
+
+
+@app.command()
+def term(course: CourseOption = None) -> None:
+    """Write a page about the whole term, build/report/term.html, for instructors and not for students."""
+    import datetime
+
+    from autograder.course.lab import lab_names
+    from autograder.course.paths import CoursePaths, course_root
+    from autograder.course.settings import read_settings
+    from autograder.gradebook.appeals import waiting
+    from autograder.gradebook.grades import class_entries
+    from autograder.gradebook.renewal import renew_pages
+    from autograder.report.term_page import write_term_page
+
+    root = course_root(course)
+    renew_pages(root)
+    entries, settings = class_entries(root), read_settings(root)
+    if not entries:
+        raise KitError("There are no results yet.", "Grade a class first: autograder grade LAB")
+    page, today = CoursePaths(root).term_page, datetime.date.today()
+    appeals, damaged = waiting(root)
+    print(write_term_page(page, settings.title, entries, lab_names(root), settings.weights, appeals, today))
+    for sentence in damaged:
+        print(sentence, file=sys.stderr)
 
 
 @app.command()
@@ -52,12 +79,18 @@ def export(
     Exit status: 0, or 3 if somebody is not in the export; the command names them and says why.
     """
     from autograder.core.files import write_beside
+    from autograder.course.lab import load_lab
     from autograder.course.paths import course_root
     from autograder.gradebook.grades import class_entries
+    from autograder.gradebook.renewal import renew_pages
 
     if form not in FORMATS:
         raise KitError(f"There is no format `{form}`.", f"Name one of: {', '.join(FORMATS)}.")
-    entries = class_entries(course_root(course), lab)
+    root = course_root(course)
+    if lab is not None:
+        load_lab(root, lab)  # a misspelt name is an error
+    renew_pages(root, lab)
+    entries = class_entries(root, lab)
     if not entries:
         raise KitError("There are no results to export.", "Grade a class first: autograder grade LAB")
     labs = sorted({entry.lab for entry in entries})

@@ -39,6 +39,15 @@ class Grade:
         return [cell for cell in self.cells if cell.points is None]
 
     @property
+    def told_waiting(self) -> str:
+        """A sentence about the cells that a person has yet to grade, for the student; empty if there are none."""
+        if not self.waiting:
+            return ""
+        top = round(sum(cell.max_points for cell in self.waiting), 2)
+        which = "1 answer is" if len(self.waiting) == 1 else f"{len(self.waiting)} answers are"
+        return f"{which} not graded yet, which can still give up to {top:g} points."
+
+    @property
     def stale(self) -> list[CellGrade]:
         """The cells that a person should look at again."""
         return [cell for cell in self.cells if cell.stale]

@@ -71,6 +71,8 @@ class Status(StrEnum):
     """Something earlier in the same check failed, so this expectation was not checked."""
     UNKNOWN = "could not find out"
     """The grader itself failed. No points are taken off; the instructor decides."""
+    NOTE = "note"
+    """Something about a submission that is good to know and makes no difference to its points."""
 
 
 class Isolation(StrEnum):
@@ -154,6 +156,8 @@ class CellResult(_Model):
     """Files of answer cells that are still as students receive them. If there are any, the check has not passed."""
     logs: list[NodeLog] = Field(default_factory=list)
     """The output of the programs that the check launched."""
+    varied: list[Text] = Field(default_factory=list)
+    """The random values that the check drew, in their order."""
 
     @property
     def sure_points(self) -> float | None:
@@ -204,7 +208,7 @@ class SubmissionResult(_Model):
     seed: int = 0
     """Seed of the random values that differ from run to run."""
     problems: list[Outcome] = Field(default_factory=list)
-    """Problems of the whole submission, such as a broken notebook or a forged cell."""
+    """Problems of the whole submission, such as a broken notebook or a forged cell, and notes about it."""
     checks: list[CheckResult] = Field(default_factory=list)
     seconds: dict[str, float] = Field(default_factory=dict)
     """Durations in seconds, by step."""
@@ -218,6 +222,11 @@ class SubmissionResult(_Model):
     def possible_points(self) -> float:
         """Points that grading can still give; more than `points` if hidden tests or a person still have to decide."""
         return sum(check.possible_points for check in self.checks)
+
+    @property
+    def real_problems(self) -> list[Outcome]:
+        """The problems without the notes."""
+        return [problem for problem in self.problems if problem.status is not Status.NOTE]
 
     @property
     def max_points(self) -> float:

@@ -11,7 +11,7 @@ import hashlib
 import json
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cache, cached_property, lru_cache
 from pathlib import Path
 from typing import Any
@@ -26,6 +26,7 @@ from autograder.course.cells import (
     BadNameError,
     CellFile,
     blank_mark,
+    cell_digest,
     grade_id_of,
     headings,
     nbgrader_of,
@@ -34,7 +35,9 @@ from autograder.course.cells import (
     without_hidden_tests,
     without_region,
 )
+from autograder.course.paths import CoursePaths
 from autograder.course.settings import read_settings
+from autograder.course.versions import digests_by_cell, versions
 
 
 @cache
@@ -92,11 +95,22 @@ class Lab:
     """The text of each file that a locked cell names, by file name: programs that students use but do not write."""
     released: tuple[dict[str, Any], ...]
     """The cells that students receive."""
+    given_out: Mapping[str, frozenset[str]] = field(default_factory=dict)
+    """The digests that each cell had in all versions of the lab that students have received, by grade_id."""
 
     @property
     def checks(self) -> tuple[Cell, ...]:
         """The cells that give points."""
         return tuple(cell for cell in self.cells if cell.points is not None)
+
+    def is_as_given_out(self, grade_id: str, source: str) -> bool:
+        """Return whether a cell is as in a version of the lab that students have received, the current one or not."""
+        with_hidden_lines = () if grade_id in self.answers else self.raw["cells"]
+        current = [cell for cell in (*self.released, *with_hidden_lines) if grade_id_of(cell) == grade_id]
+        digest = cell_digest(source)
+        return digest in self.given_out.get(grade_id, ()) or digest in [
+            cell_digest(source_of(cell)) for cell in current
+        ]
 
     @property
     def max_points(self) -> float:
@@ -167,7 +181,8 @@ def load_lab(root: Path, name: str) -> Lab:
     if notebook is None or not re.fullmatch(r"[A-Za-z0-9_-]+", name):
         names = ", ".join(lab_names(root)) or "none"
         raise KitError(f"This course has no lab `{name}`.", f"Labs in {root}: {names}.")
-    return _loaded(name, notebook, signature(notebook), released_only=notebook == candidates[1])
+    lab = _loaded(name, notebook, signature(notebook), released_only=notebook == candidates[1])
+    return _with_versions(lab, root, signature(CoursePaths(root).versions(name)))
 
 
 @lru_cache(maxsize=32)
@@ -177,6 +192,11 @@ def _loaded(name: str, notebook: Path, _signature: object, released_only: bool) 
         return _read(name, notebook, raw, released_only)
     except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise KitError(f"{notebook} cannot be used as a lab: {error}", "Repair that cell.") from error
+
+
+@lru_cache(maxsize=32)
+def _with_versions(lab: Lab, root: Path, recorded: object) -> Lab:
+    return lab if recorded is None else replace(lab, given_out=digests_by_cell(versions(root, lab.name)))
 
 
 def _read(name: str, notebook: Path, raw: dict[str, Any], released_only: bool) -> Lab:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -122,6 +123,11 @@ class CoursePaths:
         return self.build / "taken" / f"{lab}.json"
 
     @property
+    def persons(self) -> Path:
+        """The file that remembers the name of each person on a platform, beside the gradebook with these names."""
+        return self.gradebook.parent / "persons.json"
+
+    @property
     def tried(self) -> Path:
         """Results of runs that do not count yet, as in `results`."""
         return self.build / "tried"
@@ -141,6 +147,10 @@ class CoursePaths:
         """nbgrader's database, outside `build` because it holds people's decisions, which cannot be made again."""
         return self.root / "gradebook" / "gradebook.db"
 
+    def versions(self, lab: str) -> Path:
+        """Return the file that records the versions of a lab that students have received."""
+        return self.gradebook.parent / "versions" / f"{lab}.json"
+
     @property
     def lock(self) -> Path:
         """The lock file that a running grading holds."""
@@ -159,6 +169,32 @@ class CoursePaths:
     def class_page(self, lab: str) -> Path:
         """Return the page about a lab's class, which is for instructors."""
         return self.build / "report" / f"{lab}.html"
+
+    @property
+    def appeals(self) -> Path:
+        """The appeals that instructors have received, beside the gradebook, which has the answers to them."""
+        return self.gradebook.parent / "appeals"
+
+    def sample_students(self, lab: str) -> Path:
+        """Return the folder that describes the sample students of a lab."""
+        return self.root / "tests" / "classes" / lab
+
+    def bank(self, lab: str) -> Path:
+        """Return the folder with anonymous answers of past terms to a lab."""
+        return self.root / "bank" / lab
+
+    def bank_checked(self, lab: str) -> Path:
+        """Return the file that says with which version the bank of a lab was run, and with which outcome."""
+        return self.build / "bank" / f"{lab}.json"
+
+    def answers_page(self, lab: str, cell: str) -> Path:
+        """Return the page with all answers to a question, which is for instructors."""
+        return self.build / "report" / f"{lab}_{re.sub(r'[^A-Za-z0-9_-]', '-', cell)}.html"
+
+    @property
+    def term_page(self) -> Path:
+        """The page about all labs of a term, which is for instructors."""
+        return self.build / "report" / "term.html"
 
     @property
     def explained(self) -> Path:

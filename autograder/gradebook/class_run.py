@@ -21,6 +21,7 @@ from autograder.course.lab import Lab, load_lab
 from autograder.course.paths import CoursePaths
 from autograder.gradebook.grades import read_grades, write_grades
 from autograder.gradebook.recorder import Recorder, Recording
+from autograder.gradebook.renamed import move_renamed
 from autograder.grading.canaries import Canaries, known_answers
 from autograder.grading.class_runner import run_class
 from autograder.grading.runner import Settings
@@ -122,7 +123,7 @@ class Steps:
 def _trouble(result: SubmissionResult) -> str:
     undecided = sum(check.status is Status.UNKNOWN for check in result.checks)
     parts = [f"{undecided} undecided"] if undecided else []
-    parts += [problem.title for problem in result.problems[:1]]
+    parts += [problem.title for problem in result.real_problems[:1]]
     return f": {', '.join(parts)}" if parts else ""
 
 
@@ -266,6 +267,7 @@ def _graded(root: Path, lab: Lab, source: Path, settings: Settings, intake: Inta
     began = time.monotonic()
     recorder = Recorder(root, lab, settings.force)
     recorder.begin()
+    recorder.told += move_renamed(root)
     recorded: set[str] = set()
 
     with Steps(len(collected.notebooks), console) as steps:

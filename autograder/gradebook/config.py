@@ -13,6 +13,7 @@ from autograder.course.paths import CoursePaths
 from autograder.gradebook.autograde import AUTOGRADE, SANITIZE, SubmissionExporter
 from autograder.gradebook.exchange_files import CollectNotebooks
 from autograder.gradebook.feedback import FeedbackExporter
+from autograder.gradebook.history import watch_people
 from autograder.gradebook.released_notebook import RELEASE, WITHOUT_GRADEBOOK
 from autograder.grading.nbgrader_validate import HEADING
 from autograder.intake.record import left_class
@@ -60,6 +61,7 @@ def configure(config: Any, root: Path) -> None:
         config: the Config of traitlets that `get_config()` returns.
         root: the course's folder.
     """
+    watch_people()
     paths = CoursePaths(root)
     course = config.CourseDirectory
     course.root = str(root)

@@ -13,12 +13,18 @@ from typing import Any
 from nbconvert.exporters import Exporter
 from nbgrader import utils
 from nbgrader.converters import GenerateFeedback
+from sqlalchemy import create_engine
 
 from autograder.core.errors import KitError
+from autograder.core.history import Entry, decisions
+from autograder.core.history import told as told_history
 from autograder.core.results import SubmissionResult
 from autograder.course.cells import headings
 from autograder.course.lab import Lab, load_lab
+from autograder.course.settings import read_settings
+from autograder.gradebook import own_tables
 from autograder.gradebook.exchange_files import complete, only_notebooks
+from autograder.gradebook.history import note_graded
 from autograder.gradebook.queries import read_grade
 from autograder.grading.store import ResultStore
 from autograder.intake.roster import FILE_NAME, read_roster
@@ -52,14 +58,29 @@ class FeedbackExporter(Exporter):  # type: ignore[misc]
         folder = Path(course.format_path(course.submitted_directory, student, name))
         lab = load_lab(root, name)
         complete(folder, Path(course.format_path(course.feedback_directory, student, name)))
+        entries = _history(told["db_url"], lab, student, folder / f"{name}.ipynb")
         page = feedback_html(
             Heading(_title(lab), student, _name(root, student), _handed_in(folder)),
             _tasks(copied),
             _result(root, lab, student, folder / f"{name}.ipynb"),
             read_grade(told["db_url"], name, student),
             datetime.date.today(),
+            decisions(entries),
+            told_history(entries) if read_settings(root).history_for_students else [],
         )
         return page, resources
+
+
+def _history(address: str, lab: Lab, student: str, notebook: Path) -> list[Entry]:
+    """Note what is new in the history of a submission, and return the whole history."""
+    engine = create_engine(address)
+    try:
+        with engine.begin() as connection:
+            own_tables.make_tables(connection)
+            note_graded(connection, lab, student, notebook)
+            return own_tables.history(connection, lab.name, student)[student]
+    finally:
+        engine.dispose()
 
 
 def _title(lab: Lab) -> str:

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
 from autograder.core.files import write_beside
 from autograder.core.grades import Grade
+from autograder.core.history import Entry as HistoryEntry
 from autograder.course.paths import CoursePaths
 from autograder.gradebook.database import damage_told
-from autograder.gradebook.queries import grades_in
+from autograder.gradebook.own_tables import THE_LAB, history, recordable, recorded
+from autograder.gradebook.pages import shows
+from autograder.gradebook.queries import digests, grades_in
 from autograder.gradebook.settings import gradebook_address, gradebook_file
 from autograder.grading.store import ResultStore
 from autograder.intake.record import Taken, left_class, read_class
@@ -53,6 +56,18 @@ def read_grades(root: Path, lab: str = "") -> list[Grade]:
     return [grade for grade in grades if grade.student not in left[grade.lab]]
 
 
+def read_history(root: Path, lab: str, student: str = "") -> dict[str, list[HistoryEntry]]:
+    """Return what happened to the points in a lab, by student, the oldest entry first.
+
+    Args:
+        root: the course's folder.
+        lab: the lab.
+        student: the student; empty for all students.
+    """
+    nothing: dict[str, list[HistoryEntry]] = {}
+    return ask(root, lambda connection: history(connection, lab, student), nothing)
+
+
 def write_grades(root: Path) -> Path:
     """Write `build/grades.csv` from the gradebook and return its path.
 
@@ -88,6 +103,8 @@ def class_entries(root: Path, lab: str | None = None) -> list[Entry]:
     grades = {(grade.lab, grade.student): grade for grade in read_grades(root, lab or "")}
     results = ResultStore(root).all(lab)
     classes = {name: read_class(root, name) for name in {result.lab for result in results}}
+    histories = {name: read_history(root, name) for name in classes}
+    stale = stale_submissions(root, [(result.lab, result.student) for result in results])
     entries = []
     for result in results:
         taken = classes[result.lab].get(result.student, Taken(source=""))
@@ -102,6 +119,25 @@ def class_entries(root: Path, lab: str | None = None) -> list[Entry]:
                 file=taken.file,
                 late=taken.late,
                 feedback=page if page.is_file() else None,
+                history=histories[result.lab].get(result.student, ()),
+                stale=(result.lab, result.student) in stale,
             )
         )
     return entries
+
+
+def stale_submissions(root: Path, submissions: Sequence[tuple[str, str]]) -> set[tuple[str, str]]:
+    """Return the submissions, by lab and student, whose result, grade and page do not belong together.
+
+    A lab that was changed after the class was graded does not count: its grades and pages are still those of the class.
+    """
+    paths, stale = CoursePaths(root), set()
+    for lab in {name for name, _ in submissions}:
+        known: tuple[dict[str, str], dict[str, str]] = ({}, {})
+        known = ask(root, lambda talks, lab=lab: (recorded(talks, lab), digests(talks, lab)), known)  # type: ignore[misc]
+        was_recorded, shown = known
+        for student in [student for name, student in submissions if name == lab and student in shown]:
+            now = recordable(root, lab, was_recorded.get(THE_LAB, ""), student)
+            if was_recorded.get(student) != now or not shows(paths.feedback_page(student, lab), shown[student]):
+                stale.add((lab, student))
+    return stale

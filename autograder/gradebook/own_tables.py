@@ -2,7 +2,8 @@
 
 `recorded` holds a digest of what was recorded last for a submission. If the submission now has another digest, it is
 recorded again. `judged` holds a digest of the work that a person saw when grading a cell. If the work has changed since
-then, the grade is kept, and a person is asked to look at it again.
+then, the grade is kept, and a person is asked to look at it again. `history` holds the entries of `core.history`; they
+are never changed or removed, but they follow a student to a new name.
 """
 
 from __future__ import annotations
@@ -13,15 +14,15 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sqlalchemy import Column, MetaData, String, Table, delete, insert, select
+from sqlalchemy import Column, Integer, MetaData, String, Table, Text, delete, insert, inspect, select, update
+from sqlalchemy.engine import Connection
 
-from autograder.course.lab import Lab
+from autograder.core.history import Entry
 from autograder.course.paths import CoursePaths
 from autograder.grading.store import ResultStore
 from autograder.submission import timestamp
 
 if TYPE_CHECKING:
-    from sqlalchemy.engine import Connection
     from sqlalchemy.orm import Session, scoped_session
 
     Talks = Connection | Session | scoped_session[Session]
@@ -43,6 +44,14 @@ _JUDGED = Table(
     Column("grade", String(32), primary_key=True),
     Column("digest", String(64), nullable=False),
 )
+_HISTORY = Table(
+    "autograder_history",
+    _TABLES,
+    Column("number", Integer, primary_key=True, autoincrement=True),
+    Column("lab", String(128), nullable=False, index=True),
+    Column("student", String(128), nullable=False),
+    Column("entry", Text, nullable=False),
+)
 
 
 def make_tables(engine: Any) -> None:
@@ -55,11 +64,18 @@ def digest_of(*parts: object) -> str:
     return hashlib.sha256(json.dumps(parts).encode()).hexdigest()
 
 
-def recordable(root: Path, lab: Lab, student: str) -> str:
-    """Return a digest of everything that is recorded for a submission."""
-    handed_in = CoursePaths(root).submitted_notebook(student, lab.name).with_name(timestamp.FILE_NAME)
-    contents = (ResultStore(root).path(lab.name, student), handed_in)
-    return digest_of(lab.source_digest, *(hashlib.sha256(_content(path)).hexdigest() for path in contents))
+def recordable(root: Path, lab: str, source_digest: str, student: str) -> str:
+    """Return a digest of everything that is recorded for a submission.
+
+    Args:
+        root: the course's folder.
+        lab: the lab.
+        source_digest: the digest of the lab's notebook.
+        student: the student who handed it in.
+    """
+    handed_in = CoursePaths(root).submitted_notebook(student, lab).with_name(timestamp.FILE_NAME)
+    contents = (ResultStore(root).path(lab, student), handed_in)
+    return digest_of(source_digest, *(hashlib.sha256(_content(path)).hexdigest() for path in contents))
 
 
 def _content(path: Path) -> bytes:
@@ -71,12 +87,34 @@ def _content(path: Path) -> bytes:
 
 def recorded(connection: Connection, lab: str) -> dict[str, str]:
     """Return the digests of what was recorded for a lab, by student."""
-    from sqlalchemy import inspect
-
     if not inspect(connection).has_table(_RECORDED.name):
         return {}
     rows = connection.execute(select(_RECORDED.c.student, _RECORDED.c.digest).where(_RECORDED.c.lab == lab))
     return {row.student: row.digest for row in rows}
+
+
+def history(talks: Talks, lab: str, student: str = "") -> dict[str, list[Entry]]:
+    """Return the entries of a lab, or of one of its submissions, by student, the oldest first."""
+    connection = talks if isinstance(talks, Connection) else talks.connection()
+    found: dict[str, list[Entry]] = {}
+    if inspect(connection).has_table(_HISTORY.name):
+        of_student = [_HISTORY.c.student == student] if student else []
+        wanted = select(_HISTORY).where(_HISTORY.c.lab == lab, *of_student).order_by(_HISTORY.c.number)
+        for row in connection.execute(wanted):
+            found.setdefault(row.student, []).append(Entry.model_validate_json(row.entry))
+    return found
+
+
+def rename_student(talks: Talks, lab: str, old: str, new: str) -> None:
+    """Give everything that these tables have about a submission to the student's new name."""
+    talks.execute(delete(_RECORDED).where(_RECORDED.c.lab == lab, _RECORDED.c.student.in_([old, new])))
+    of_old = update(_HISTORY).where(_HISTORY.c.lab == lab, _HISTORY.c.student == old)
+    talks.execute(of_old.values(student=new))
+
+
+def note_history(talks: Talks, lab: str, student: str, entry: Entry) -> None:
+    """Add an entry to the history of a submission."""
+    talks.execute(insert(_HISTORY).values(lab=lab, student=student, entry=entry.model_dump_json()))
 
 
 def note_recorded(talks: Talks, lab: str, student: str, digest: str) -> None:

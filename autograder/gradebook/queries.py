@@ -8,6 +8,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from autograder.core.grades import CellGrade, Grade
+from autograder.core.history import Points
+from autograder.gradebook import own_tables
 
 if TYPE_CHECKING:
     from sqlalchemy.engine import Connection
@@ -57,10 +59,12 @@ def digests(connection: Connection, lab: str, student: str = "") -> dict[str, st
     comments: dict[str, list[tuple[str, str]]] = {}
     for (who, _, cell), comment in sorted(_comments(connection, lab, student).items()):
         comments.setdefault(who, []).append((cell, comment))
+    entries = own_tables.history(connection, lab, student)
+    decided = {who: [one.decided.model_dump() for one in told if one.decided] for who, told in entries.items()}
     found = {}
     for grade in grades_in(connection, lab, student):
         cells = [(cell.grade_id, cell.points, cell.max_points) for cell in grade.cells]
-        shown = json.dumps([grade.penalty, cells, comments.get(grade.student)])
+        shown = json.dumps([grade.penalty, cells, comments.get(grade.student), *decided.get(grade.student, [])])
         found[grade.student] = hashlib.sha256(shown.encode()).hexdigest()
     return found
 
@@ -73,6 +77,22 @@ def grades_in(connection: Connection, lab: str, student: str = "") -> list[Grade
         comment = comments.get((row.student_id, row.lab, row.cell), "")
         cells.setdefault((row.student_id, row.lab, row.penalty or 0.0), []).append(_cell(row, comment))
     return [Grade(who, name, tuple(found), penalty) for (who, name, penalty), found in cells.items()]
+
+
+def points_in(connection: Connection, lab: str, student: str) -> tuple[dict[str, Points], float]:
+    """Return the points of each cell of a submission, by grade_id, and the penalty for being late."""
+    rows = _rows(connection, _GRADES, lab, student)
+    points = {
+        row.cell: Points(
+            auto=row.auto_score,
+            by_hand=row.manual_score,
+            extra=row.extra_credit,
+            most=row.max_score,
+            is_check=not row.is_answer,
+        )
+        for row in rows
+    }
+    return points, next((row.penalty or 0.0 for row in rows), 0.0)
 
 
 def _cell(row: Any, comment: str) -> CellGrade:

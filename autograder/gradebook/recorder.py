@@ -21,13 +21,12 @@ from autograder.gradebook import own_tables
 from autograder.gradebook.api import answered, last_error, open_api
 from autograder.gradebook.database import make_folder
 from autograder.gradebook.grades import ask
+from autograder.gradebook.pages import MARK, shows
 from autograder.gradebook.queries import digests
 from autograder.gradebook.release import register
 from autograder.gradebook.settings import gradebook_place
 from autograder.submission import exchange_secret
 
-MARK = ".grades"
-"""The file beside a feedback page with a digest of the grades that the page shows."""
 _NO_ROOM = re.compile(
     r"(No space left on device|database or disk is full|database is locked|disk I/O error|Disk quota exceeded"
     r"|readonly database|file is not a database|disk image is malformed|Read-only file system"
@@ -85,6 +84,10 @@ class Recorder:
                 return
         write_beside(page.with_name(MARK), self._shown(student).get(student, ""))
 
+    def lacks_only_a_page(self, student: str) -> bool:
+        """Return whether a student's grade is recorded, but the feedback page does not show it."""
+        return self._due(student) == ["generate_feedback"]
+
     def _failed(self, student: str, answer: dict[str, Any]) -> None:
         why = last_error(answer)
         refused = _NO_ROOM.search(why)
@@ -107,11 +110,11 @@ class Recorder:
             self._known = self._recorded(), self._shown()
         recorded, shown = self._known
         there = self._paths.autograded_notebook(student, self._lab.name).is_file()
-        if self._force or not there or recorded.get(student) != own_tables.recordable(self._root, self._lab, student):
+        now = own_tables.recordable(self._root, self._lab.name, self._lab.source_digest, student)
+        if self._force or not there or recorded.get(student) != now:
             return ["autograde", "generate_feedback"]
         page = self._paths.feedback_page(student, self._lab.name)
-        mark = page.with_name(MARK)
-        fresh = page.is_file() and mark.is_file() and mark.read_text(encoding="utf-8") == shown.get(student)
+        fresh = shows(page, shown.get(student))
         # If a student submits the same work again through the exchange, the secret for the feedback is a new one.
         wanted = _secret_in(self._paths.submitted_notebook(student, self._lab.name).parent)
         return [] if fresh and wanted in ("", _secret_in(page.parent)) else ["generate_feedback"]

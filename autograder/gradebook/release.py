@@ -7,6 +7,7 @@ from pathlib import Path
 
 from autograder.core.errors import GRADEBOOK_REFUSED, KitError
 from autograder.course.lab import load_lab
+from autograder.course.versions import remember
 from autograder.gradebook.api import answered, last_error, open_api
 from autograder.gradebook.database import make_usable
 from autograder.gradebook.settings import gradebook_address
@@ -75,6 +76,7 @@ def register(root: Path, lab: str) -> list[str]:
         KitError: the gradebook cannot be used, or nbgrader could not generate the lab.
     """
     make_usable(root)
+    remember(root, lab, load_lab(root, lab).released)
     if knows(root, lab):
         return []
     with tempfile.TemporaryDirectory() as folder:

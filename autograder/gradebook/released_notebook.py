@@ -29,6 +29,7 @@ from nbgrader.preprocessors import (
 
 from autograder.course.cells import blank_mark, for_checks, without_hidden_tests
 from autograder.course.lab import load_lab
+from autograder.course.versions import remember
 from autograder.gradebook import own_tables
 from autograder.gradebook.backup import back_up
 from autograder.gradebook.private_nbgrader import SaveLabCells
@@ -58,6 +59,7 @@ class FitCells(SaveLabCells):
         made: tuple[Any, dict[str, Any]] = super().preprocess(nb, resources)
         course = self.parent.parent.coursedir
         lab = load_lab(Path(course.root), resources["nbgrader"]["assignment"])
+        remember(Path(course.root), lab.name, lab.released)
         with Gradebook(resources["nbgrader"]["db_url"]) as gradebook:
             own_tables.make_tables(gradebook.engine)
             own_tables.note_recorded(gradebook.db, lab.name, own_tables.THE_LAB, lab.source_digest)

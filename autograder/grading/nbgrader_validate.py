@@ -83,7 +83,7 @@ def verdicts(root: Path, notebook: Path, invert: bool) -> Verdicts:
     result = result_for(result, "student")
     if invert:
         return {"passed": [{"source": check.title} for check in result.checks if check.status is Status.PASSED]}
-    failed = [_entry(problem.title, _lines(problem)) for problem in result.problems]
+    failed = [_entry(problem.title, _lines(problem)) for problem in result.real_problems]
     for check in result.checks:
         if check.status is not Status.PASSED:
             untouched = [text for text in (words.not_attempted(check),) if text]

@@ -126,7 +126,7 @@ def job_of(submission: Submission, student: str, lab: Lab, settings: Settings) -
         seed=random.SystemRandom().getrandbits(32) if settings.seed is None else settings.seed,
         files=submission.files,
         answers={
-            answer.file.file_name: submission.sources[answer.grade_id] == answer.blank
+            answer.file.file_name: lab.is_as_given_out(answer.grade_id, submission.sources[answer.grade_id])
             for answer in lab.answers.values()
             if answer.file is not None
         },

@@ -39,8 +39,8 @@ class Gone:
 
     lost: Mapping[str, Taken]
     """The students who are missing."""
-    renamed: Mapping[str, Taken]
-    """The students who are among the submissions under another name, because the roster has changed."""
+    renamed: Mapping[str, str]
+    """The new names of students who are among the submissions under another name, by their old names."""
 
 
 def gone(source: Path, students: Sequence[Student], roster: Roster | None, before: Mapping[str, Taken]) -> Gone:
@@ -66,8 +66,9 @@ def gone(source: Path, students: Sequence[Student], roster: Roster | None, befor
     for name in map(file_name, roster.students if roster is not None else ()):
         if name not in here and name not in before:
             missing[name] = Taken(source=place)
-    persons = {person(claim.owner) for student in students for claim in student.claims} - {None}
-    renamed = {name: taken for name, taken in missing.items() if person(taken.owner) in persons}
+    persons = {person(claim.owner): file_name(student.name) for student in students for claim in student.claims}
+    persons.pop(None, None)
+    renamed = {name: persons[who] for name, taken in missing.items() if (who := person(taken.owner)) in persons}
     return Gone({name: taken for name, taken in missing.items() if name not in renamed}, renamed)
 
 
@@ -75,7 +76,7 @@ def stop(
     source: Path,
     students: Sequence[Student],
     reading: Reading,
-    lost: Collection[str],
+    missing: Gone,
     before: Mapping[str, Taken],
     accepted: Collection[Accepted],
 ) -> None:
@@ -85,7 +86,7 @@ def stop(
         source: the folder or zip of the submissions.
         students: the students whose work is in it.
         reading: how the source was read.
-        lost: the students who are missing.
+        missing: the students who are missing, or have another name.
         before: what was taken in before for this lab, by student.
         accepted: the objections that a person has accepted.
 
@@ -94,7 +95,8 @@ def stop(
     """
     strangers = [repr(student.name[:100]) for student in students if not student.listed]
     objections = {
-        Accepted.SMALLER: _missing(source, sorted(lost)),
+        Accepted.SMALLER: _missing(source, sorted(missing.lost)),
+        Accepted.RENAMED: some([_renamed(old, new) for old, new in sorted(missing.renamed.items())], " "),
         Accepted.ROSTER: _strangers(strangers),
         Accepted.REPLACED: some(_replaced(students, before), " "),
     }
@@ -114,6 +116,10 @@ def stop(
 def _strangers(names: Sequence[str]) -> str:
     matches = "matches" if len(names) == 1 else "match"
     return f"{some(names, ', ')} {matches} no student in the roster, or more than one." if names else ""
+
+
+def _renamed(old: str, new: str) -> str:
+    return f"{old[:80]!r} of the last run has the same number on the platform as {new[:80]!r}, so they are one person."
 
 
 def _missing(source: Path, lost: Sequence[str]) -> str:
@@ -232,8 +238,8 @@ def collect(
     recognised = reading.recognised
     students = named(recognised.claims, roster, known_persons(root, lab))
     missing = gone(source, students, roster, before)
-    stop(source, students, reading, missing.lost, before, accepted)
-    collected = Collected(_title(reading), reading.around, notes=list(reading.notes))
+    stop(source, students, reading, missing, before, accepted)
+    collected = Collected(_title(reading), reading.around, notes=[*reading.notes, *(roster.shared if roster else [])])
     others = [name for name in lab_names(root) if name != lab]
     collected.refused += [f"{sentence} It was left out." for sentence in recognised.strange]
     handed_in = {
@@ -258,7 +264,7 @@ def collect(
         else:
             taken[name] = _taken(source, reading, student, chosen)
     if tried_in is None:
-        keep_class(root, lab, taken, {**missing.lost, **missing.renamed})
+        keep_class(root, lab, taken, missing.lost, missing.renamed)
         collected.notes += _farewells(missing, before)
     return collected
 
@@ -382,18 +388,14 @@ def _write(paths: CoursePaths, student: str, lab: str, chosen: Chosen, notebook:
 
 
 def _farewells(missing: Gone, before: Mapping[str, Taken]) -> list[str]:
-    """Return sentences about students who have left the class or have a new name."""
+    """Return sentences about students who have left the class."""
     left = [
         f"{student} is no longer among the submissions and was removed from grades.csv, the class page and the exports."
         " The gradebook keeps the grades."
         for student in missing.lost
         if student in before
     ]
-    return left + [
-        f"{student} has a different name now, so the old name was removed from grades.csv, the class page and the"
-        " exports. Points that somebody gave by hand stay in the gradebook under the old name."
-        for student in missing.renamed
-    ]
+    return left
 
 
 def _keep(submitted: Path, parts: Sequence[str], text: str) -> None:

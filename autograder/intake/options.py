@@ -25,5 +25,7 @@ class Accepted(StrEnum):
     """Students from the roster, or from the last run, are not among the submissions."""
     REPLACED = "replaced"
     """A submission would replace another one, and nothing says that both belong to the same student."""
+    RENAMED = "renamed"
+    """A student has another name than in the last run, because the roster has changed. The grades get the new name."""
     ROSTER = "roster"
     """A submission belongs to somebody who is not in the roster."""

@@ -37,6 +37,8 @@ class Taken(BaseModel):
     """Whether the platform has marked the submission as late."""
     left: bool = False
     """Whether the student has left the class: either is missing, which a person has accepted, or has a new name."""
+    now: str = ""
+    """The student's new name; empty if the student has none."""
 
 
 _CLASS = TypeAdapter(dict[str, Taken])
@@ -74,7 +76,7 @@ def person(owner: Mapping[str, str]) -> tuple[str, str] | None:
 
 def known_persons(root: Path, lab: str) -> dict[tuple[str, str], str]:
     """Return the names in the gradebook of all persons who were taken in before, for this lab or for another."""
-    known: dict[tuple[str, str], str] = {}
+    known = {(one.kind, one.value): one.name for one in _remembered(root) if one.lab in ("", lab)}
     folder = CoursePaths(root).taken(lab).parent
     others = [path.stem for path in sorted(folder.glob("*.json")) if path.stem != lab]
     for name in (*others, lab):  # this lab's record comes last, so it takes precedence
@@ -85,7 +87,67 @@ def known_persons(root: Path, lab: str) -> dict[tuple[str, str], str]:
     return known
 
 
-def keep_class(root: Path, lab: str, taken: Mapping[str, Taken], gone: Mapping[str, Taken]) -> None:
+def new_names(root: Path) -> dict[str, str]:
+    """Return the new names of students whose names have changed, by their old names, from the records of all labs."""
+    records = [read_class(root, path.stem) for path in sorted(CoursePaths(root).taken("x").parent.glob("*.json"))]
+    return {student: taken.now for record in records for student, taken in record.items() if taken.now}
+
+
+def rename_in_class(root: Path, lab: str, old: str, new: str) -> None:
+    """Write the new name of a student into the record of a lab's class, if the class has only the old one."""
+    known = read_class(root, lab)
+    if old in known and not known[old].left:
+        known.setdefault(new, known[old])
+        known[old] = known[old].model_copy(update={"left": True, "now": new})
+        write_beside(CoursePaths(root).taken(lab), _CLASS.dump_json(dict(sorted(known.items())), indent=1) + b"\n")
+
+
+class _Person(BaseModel):
+    """A person on a platform, and the person's name in the gradebook."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    lab: str
+    """The lab for which the platform's number holds; empty if it holds for all labs."""
+    kind: str
+    value: str
+    name: str
+
+
+_PERSONS = TypeAdapter(list[_Person])
+
+
+def _remembered(root: Path) -> list[_Person]:
+    path = CoursePaths(root).persons
+    try:
+        return _PERSONS.validate_json(path.read_bytes())
+    except FileNotFoundError:
+        return []
+    except (OSError, ValidationError) as error:
+        why = error.strerror if isinstance(error, OSError) else "it is damaged"
+        raise KitError(
+            f"{path}, which remembers the names of the students, cannot be read: {why}.",
+            "Replace it with an earlier copy, or move it away; two students with the same name may then be called"
+            " differently than before.",
+        ) from error
+
+
+def _remember_persons(root: Path, lab: str, taken: Mapping[str, Taken]) -> None:
+    known = {(one.lab, one.kind, one.value): one for one in _remembered(root)}
+    before = dict(known)
+    for name, one in taken.items():
+        who = person(one.owner)
+        if who is not None:
+            where = lab if who[0] in _IN_EACH_LAB else ""
+            known[where, *who] = _Person(lab=where, kind=who[0], value=who[1], name=name)
+    if known != before:
+        content = _PERSONS.dump_json([known[key] for key in sorted(known)], indent=1) + b"\n"
+        write_beside(CoursePaths(root).persons, content)
+
+
+def keep_class(
+    root: Path, lab: str, taken: Mapping[str, Taken], gone: Mapping[str, Taken], renamed: Mapping[str, str]
+) -> None:
     """Record what was taken in, and remove the feedback pages of students who have left.
 
     Their grades stay in the gradebook, and count again if they come back.
@@ -95,11 +157,14 @@ def keep_class(root: Path, lab: str, taken: Mapping[str, Taken], gone: Mapping[s
         lab: the lab to which the submissions belong.
         taken: what is known about each submission, by student.
         gone: the students who are no longer in the class.
+        renamed: the new names of students whose names have changed, by their old names.
     """
+    _remember_persons(root, lab, taken)
     known = read_class(root, lab)
-    for student in gone:
+    for student in (*gone, *renamed):
         CoursePaths(root).feedback_page(student, lab).unlink(missing_ok=True)
-    known.update({student: one.model_copy(update={"left": True}) for student, one in gone.items()})
+        left = gone.get(student) or known[student]
+        known[student] = left.model_copy(update={"left": True, "now": renamed.get(student, "")})
     known.update(taken)
     content = _CLASS.dump_json(dict(sorted(known.items())), indent=1) + b"\n"
     path = CoursePaths(root).taken(lab)

@@ -24,6 +24,7 @@ from pathlib import Path
 from autograder.core.errors import KitError
 from autograder.intake.entries import Claim
 from autograder.intake.record import person
+from autograder.intake.words import some
 
 FILE_NAME = "roster.csv"
 _OF_CLASSROOM50 = {"username", "first_name", "last_name", "github_id"}
@@ -47,6 +48,21 @@ class Roster:
             for heading, value in line.items():
                 for word in _ways(heading, value) if heading != "section" else ():
                     self._known.setdefault(word, set()).add(student)
+
+    @property
+    def shared(self) -> list[str]:
+        """Sentences about numbers and names on platforms that the roster gives to more than one student."""
+        found: dict[tuple[str, str], list[str]] = {}
+        for student, line in self.students.items():
+            for heading, value in line.items():
+                if value and (heading.endswith("_id") or heading in ("email", "github")):
+                    found.setdefault((heading, value.casefold()), []).append(student)
+        return [
+            f"The roster gives the {heading} {value[:80]!r} to {some([repr(name[:80]) for name in names], ' and ')}, so"
+            " it identifies neither of them. If they are one person, keep one line of the roster."
+            for (heading, value), names in found.items()
+            if len(names) > 1
+        ]
 
     def student(self, owner: Mapping[str, str]) -> str | None:
         """Return the id of the student that a platform's names belong to; None if there is no or more than one match.

@@ -6,10 +6,12 @@ import datetime
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import groupby
+from types import MappingProxyType
 
 from markupsafe import Markup
 
 from autograder.core.grades import CellGrade, Grade
+from autograder.core.history import Decided, Event
 from autograder.core.results import CheckResult, SubmissionResult
 from autograder.core.version import VERSION
 from autograder.course.cells import TEXT_STUB
@@ -18,6 +20,8 @@ from autograder.report.audience import reason, result_for
 from autograder.report.html import check_html, render
 from autograder.report.words import Verdict
 
+NO_DECISIONS: Mapping[str, Decided] = MappingProxyType({})
+"""The answers to appeals of a student who has made none."""
 _FIRST = 3
 """The number of reasons that are listed under "What to repair first"."""
 
@@ -76,12 +80,20 @@ class _Graded:
     report: Markup
     comment: str
     remark: str
+    decided: Decided | None
+    """The answer to the student's appeal."""
     answer: str
     """The text of an answer that a person grades."""
 
 
 def feedback_html(
-    heading: Heading, tasks: Sequence[Task], result: SubmissionResult | None, grade: Grade, written: datetime.date
+    heading: Heading,
+    tasks: Sequence[Task],
+    result: SubmissionResult | None,
+    grade: Grade,
+    written: datetime.date,
+    decided: Mapping[str, Decided] = NO_DECISIONS,
+    history: Sequence[Event] = (),
 ) -> str:
     """Return the page as HTML.
 
@@ -91,6 +103,8 @@ def feedback_html(
         result: the result of the checks; None if it is no longer stored.
         grade: the grade in the gradebook.
         written: the date that is shown on the page.
+        decided: the answers to appeals, by grade_id.
+        history: what happened to the points; empty if the page does not show it.
     """
     shown = result_for(result, "student") if result is not None else None
     checks = {check.grade_id: check for check in shown.checks} if shown is not None else {}
@@ -100,7 +114,7 @@ def feedback_html(
     sections = []
     for number, task in enumerate(tasks, start=1):
         graded = [
-            _graded(cells[name], checks.get(name), task, fold=name not in first)
+            _graded(cells[name], checks.get(name), task, decided.get(name), fold=name not in first)
             for name in task.graded
             if name in cells
         ]
@@ -120,11 +134,12 @@ def feedback_html(
         heading=heading,
         total=_total(grade),
         penalty=f"{grade.penalty:g}" if grade.penalty else "",
-        waiting=_waiting(grade),
+        waiting=grade.told_waiting,
         problems=shown.problems if shown is not None else [],
         sections=sections,
         parts=_parts(tasks, cells, sections),
         repairs=repairs,
+        history=history,
         written=f"{written.day} {written:%B %Y}",
         version=result.kit_version if result is not None else VERSION,
         digest=result.digest[:12] if result is not None else "",
@@ -156,14 +171,6 @@ def _total(grade: Grade) -> str:
     return f"{_number(grade.earned)} of {_number(grade.max_score)} points{so_far}"
 
 
-def _waiting(grade: Grade) -> str:
-    if not grade.waiting:
-        return ""
-    count, top = len(grade.waiting), sum(cell.max_points for cell in grade.waiting)
-    which = "1 answer is" if count == 1 else f"{count} answers are"
-    return f"{which} not graded yet, which can still give up to {_number(top)} points."
-
-
 def _points(cells: Sequence[CellGrade]) -> str:
     top = _number(sum(cell.max_points for cell in cells))
     decided = [cell.points for cell in cells if cell.points is not None]
@@ -184,7 +191,7 @@ def _verdict(cells: Sequence[CellGrade], checks: Sequence[CheckResult], task: Ta
     return Verdict.PASSED if earned >= top else Verdict.PARTLY if earned else Verdict.FAILED
 
 
-def _graded(cell: CellGrade, check: CheckResult | None, task: Task, fold: bool) -> _Graded:
+def _graded(cell: CellGrade, check: CheckResult | None, task: Task, decided: Decided | None, fold: bool) -> _Graded:
     look = _verdict([cell], [check] if check is not None else [], task)
     title = f"Check {task.graded.index(cell.grade_id) + 1}" if len(task.graded) > 1 else ""
     report = Markup(check_html(check, title=title, fold_pictures=fold) if check is not None else "")
@@ -200,6 +207,7 @@ def _graded(cell: CellGrade, check: CheckResult | None, task: Task, fold: bool) 
         report=report,
         comment=cell.comment,
         remark=remark,
+        decided=decided,
         answer=task.answers.get(cell.grade_id, ""),
     )
 

@@ -19,7 +19,10 @@ def commands(result: SubmissionResult, notebook: Path) -> str:
         result: the result as its reader may see it.
         notebook: the notebook that was checked. All findings belong to the file as a whole.
     """
-    lines = [_line("error", notebook, problem.title, problem) for problem in result.problems]
+    lines = [
+        _line("notice" if problem.status is Status.NOTE else "error", notebook, problem.title, problem)
+        for problem in result.problems
+    ]
     for check in result.checks:
         for outcome in check.outcomes:
             kind = {Status.FAILED: "error", Status.UNKNOWN: "warning"}.get(outcome.status)

@@ -13,6 +13,7 @@ from rich.progress import Progress, ProgressColumn, SpinnerColumn, Task, TimeEla
 from rich.table import Column, Table
 from rich.text import Text
 
+from autograder.core.history import Event
 from autograder.core.output import last_lines
 from autograder.core.results import CellResult, CheckResult, Isolation, NodeLog, Outcome, Status, SubmissionResult
 from autograder.course.settings import NO_BOOK, Book
@@ -21,8 +22,14 @@ from autograder.report.audience import Audience, check_for, reason, result_for
 from autograder.report.words import Verdict
 from autograder.submission.similar import Pair
 
-SYMBOL = {Status.PASSED: "✓", Status.FAILED: "✗", Status.NOT_CHECKED: "-", Status.UNKNOWN: "?"}
-STYLE = {Status.PASSED: "blue", Status.FAILED: "bold red", Status.NOT_CHECKED: "dim", Status.UNKNOWN: "bold magenta"}
+SYMBOL = {Status.PASSED: "✓", Status.FAILED: "✗", Status.NOT_CHECKED: "-", Status.UNKNOWN: "?", Status.NOTE: "•"}
+STYLE = {
+    Status.PASSED: "blue",
+    Status.FAILED: "bold red",
+    Status.NOT_CHECKED: "dim",
+    Status.UNKNOWN: "bold magenta",
+    Status.NOTE: "dim",
+}
 _JOINERS = "\u200c\u200d"
 """Invisible characters that are part of the spelling of some scripts and emoji."""
 _LOG_LINES = 20
@@ -419,3 +426,18 @@ def _line(screen: Console) -> Progress:
     on_a_terminal = screen.is_terminal and screen.file.isatty()
     elapsed = TimeElapsedColumn(Column(no_wrap=True))
     return Progress(SpinnerColumn(), elapsed, _Sentence(), console=screen, transient=True, disable=not on_a_terminal)
+
+
+def history_view(events: Sequence[Event]) -> RenderableType:
+    """Return a table of what happened to the points of a submission."""
+    table = Table(title="History", box=None, header_style="bold", padding=(0, 1), pad_edge=False, title_justify="left")
+    for title in ("when (UTC)", "by", "what", "points"):
+        table.add_column(title, no_wrap=title != "what")
+    for event in events:
+        lines = [event.what]
+        for change in event.changes:
+            name = f"{change.cell}: " if change.cell else ""
+            lines.append(f"{name}{change.before} → {change.after}, {change.why}")
+        when = f"{event.at:%Y-%m-%d %H:%M}"
+        table.add_row(when, plain(event.by), Text("\n".join(map(plain, lines))), event.score)
+    return table

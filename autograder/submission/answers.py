@@ -33,7 +33,7 @@ from autograder.submission.copies import (
     told_of_copies,
     told_of_given_copies,
 )
-from autograder.submission.notebook_file import NOT_A_NOTEBOOK, UnreadableError, problem
+from autograder.submission.notebook_file import NOT_A_NOTEBOOK, UnreadableError, note, problem
 
 WRONG_NOTEBOOK = Kind(
     "wrong-notebook", "the file is another notebook, or almost none of the lab's cells are left in it", Group.NOTEBOOK
@@ -131,10 +131,10 @@ def _take_cell(
         title = f"the cell `{grade_id}` is in one piece"
         submission.problems.append(problem(title, SPLIT_CELL(SPLIT.format(name))))
     if len(copies) > 1:
-        because = told_of_given_copies(grade_id, len(copies))
+        said, because = note, told_of_given_copies(grade_id, len(copies))
         if answer is not None:
-            because = told_of_copies(name, len(copies), is_file=file is not None)
-        submission.problems.append(problem(f"there is one cell `{grade_id}`", DUPLICATED_CELL(because, DELETE_COPIES)))
+            said, because = problem, told_of_copies(name, len(copies), is_file=file is not None)
+        submission.problems.append(said(f"there is one cell `{grade_id}`", DUPLICATED_CELL(because, DELETE_COPIES)))
     flags = ("grade", "solution", "locked")
     meant = {flag: bool(nbgrader_of(original).get(flag, False)) for flag in flags}
     if any({flag: bool(nbgrader_of(cell).get(flag, False)) for flag in flags} != meant for cell in copies):
@@ -181,28 +181,21 @@ def _take_cell(
 
 
 def _compare(grade_id: str, copies: list[dict[str, Any]], lab: Lab, submission: Submission) -> None:
-    """Report an edited check cell. A deleted one does not matter, because the lab's own cell is run anyway.
+    """Note an edited check cell. A deleted one does not matter, because the lab's own cell is run anyway.
 
-    A cell with the hidden lines of the lab's source does not count as edited, because authors check that notebook.
+    A cell of an earlier version of the lab is not edited, and neither is one with the hidden lines of the lab's source,
+    because authors check that notebook.
     """
 
-    def text(cell: dict[str, Any]) -> list[str]:
+    def as_given_out(cell: dict[str, Any]) -> bool:
         try:
-            return [line.rstrip() for line in source_of(cell).rstrip().split("\n")]
+            return lab.is_as_given_out(grade_id, source_of(cell))
         except ValueError:
-            return []
+            return False
 
-    originals = [text(cell) for cell in (*lab.released, *lab.raw["cells"]) if grade_id_of(cell) == grade_id]
-    if any(text(cell) not in originals for cell in copies):
-        submission.problems.append(
-            problem(
-                f"the cell `{grade_id}` is as in the lab",
-                CHANGED_CELL(
-                    f"The cell `{grade_id}` differs from the lab's current one: it was edited, or it comes from an "
-                    "earlier version of the lab. The lab's current cell is run instead.",
-                ),
-            )
-        )
+    if not all(as_given_out(cell) for cell in copies):
+        because = f"The cell `{grade_id}` was changed. Grading runs the lab's own cell, so this makes no difference."
+        submission.problems.append(note(f"the cell `{grade_id}` is not the lab's", CHANGED_CELL(because)))
 
 
 OWN_FILES = 50

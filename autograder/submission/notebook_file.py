@@ -34,6 +34,11 @@ def problem(title: str, reason: Reason) -> Outcome:
     return Outcome(status=Status.FAILED, title=title, because=reason.because, hint=reason.hint, code=reason.kind.code)
 
 
+def note(title: str, reason: Reason) -> Outcome:
+    """Return an outcome for something in a submission that makes no difference to its points."""
+    return problem(title, reason).model_copy(update={"status": Status.NOTE})
+
+
 def cells_of(path: Path) -> list[dict[str, Any]]:
     """Return a notebook's cells.
 

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from autograder.core.grades import Grade
+from autograder.core.history import Entry as HistoryEntry
 from autograder.core.results import SubmissionResult
 
 
@@ -30,6 +31,10 @@ class Entry:
     """Whether the platform has marked the submission as late."""
     feedback: Path | None = None
     """The student's feedback page; None if there is none."""
+    history: Sequence[HistoryEntry] = ()
+    """What happened to the points, the oldest entry first."""
+    stale: bool = False
+    """Whether the result or the feedback page is not the one to which the grade belongs."""
 
 
 @dataclass
@@ -64,11 +69,21 @@ def scores(entries: Sequence[Entry], left_out: list[str]) -> list[tuple[Entry, s
     for entry in entries:
         if entry.grade is None:
             left_out.append(f"{entry.student} is not in the gradebook: run autograder grade {entry.lab} again.")
+        elif entry.stale:
+            left_out.append(told_stale(entry))
         elif entry.grade.score is None:
             left_out.append(f"{entry.student} has no score yet: a check waits for your verdict in formgrader.")
         else:
             found.append((entry, points(entry.grade.score), points(entry.grade.max_score)))
     return found
+
+
+def told_stale(entry: Entry) -> str:
+    """Say that a student is not exported because the result, the grade and the page do not belong together."""
+    return (
+        f"{entry.student}: the result, the grade and the feedback page do not belong together, because something"
+        f" changed after {entry.lab} was graded: run autograder grade {entry.lab} again."
+    )
 
 
 def header(entries: Sequence[Entry], column: str) -> str:
@@ -116,6 +131,8 @@ def feedback_zip(entries: Sequence[Entry], platform: str, place: Callable[[Entry
                     f"{entry.student}: {platform} could not assign the page to a student. Grade the submissions as"
                     f" {platform} exports them, or put its number for the student into roster.csv."
                 )
+            elif entry.stale:
+                left_out.append(told_stale(entry))
             elif entry.feedback is None:
                 left_out.append(f"{entry.student} has no feedback page: run autograder grade {entry.lab} again.")
             else:

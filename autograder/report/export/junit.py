@@ -34,7 +34,7 @@ def _suite(full: SubmissionResult, audience: Audience, grade: Grade | None) -> T
         suite.add_property("max_score", points(grade.max_score))
     suite.add_property("isolation", result.isolation.value)
     suite.add_property("digest", result.digest)
-    for problem in result.problems:
+    for problem in result.real_problems:
         case = TestCase(_xml(problem.title), _xml(f"{name}.submission"))
         case.result = [_failed(Failure, [problem])]
         suite.add_testcase(case)

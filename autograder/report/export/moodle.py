@@ -35,6 +35,7 @@ def to_moodle(entries: Sequence[Entry], _: str) -> Export:
             continue
         grade = entry.grade
         comments = [cell.comment for cell in grade.cells if cell.comment] if grade is not None else []
+        comments += [grade.told_waiting] if grade is not None and grade.waiting else []
         name, email = entry.known.get("name") or entry.student, entry.known.get("email", "")
         rows.append((f"Participant {number}", name, email, score, most, changed, "\n".join(comments)))
     return Export(table(rows), left_out)
