@@ -1,4 +1,7 @@
-"""The links between a deck and its page of the book, and figures that can be enlarged."""
+"""The links between a deck and its page of the book, and figures that can be enlarged.
+
+The role `slides` links to a lecture's talk, as in `` {slides}`02_executors` ``; the talks are built beside the book.
+"""
 
 from __future__ import annotations
 
@@ -10,11 +13,27 @@ from typing import Any
 
 from docutils import nodes
 from sphinx.application import Sphinx
+from sphinx.errors import ExtensionError
+from sphinx.util.docutils import SphinxRole
 
 LECTURES = Path(__file__).resolve().parent.parent
 _FIGURE = re.compile(r'<img ([^>]*?)src="data:image/svg\+xml;base64,([A-Za-z0-9+/=]+)"([^>]*)>')
 
 _FILE = re.compile(r'(<a [^>]*>)?(<img [^>]*?src="([^":]+\.svg)"[^>]*>)')
+
+
+class Slides(SphinxRole):
+    """The role `slides`: a link from a page of the book to a talk."""
+
+    def run(self) -> tuple[list[nodes.Node], list[nodes.system_message]]:
+        """Make the link; what is no talk ends the build."""
+        if not (LECTURES / "slides" / f"{self.text}.md").exists():
+            raise ExtensionError(f"{self.env.docname}: there are no slides {self.text}")
+        above = "../" * (self.env.docname.count("/") + 1)
+        # A page has one such link for each talk, so that the word alone would not say where it leads.
+        link = nodes.reference("", "slides", refuri=f"{above}slides/{self.text}.html", internal=True)
+        link["reftitle"] = f"Slides of {self.text}"
+        return [link], []
 
 
 def on_page(app: Sphinx, pagename: str, template: str, context: dict[str, Any], doctree: nodes.document | None) -> None:
@@ -46,5 +65,6 @@ def on_page(app: Sphinx, pagename: str, template: str, context: dict[str, Any], 
 
 def setup(app: Sphinx) -> dict[str, Any]:
     """Register with Sphinx."""
+    app.add_role("slides", Slides())
     app.connect("html-page-context", on_page)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
