@@ -132,9 +132,10 @@ _PLACES = {
 }
 """The path of the file that is made from each template."""
 _BOOK_ROW = "| `lectures` | the lectures: open `lectures/index.html` in a browser |\n"
-_SLIDES = re.compile(r'\s*<a href="\.\./slides/[^"]*">Slides</a>')
-"""A link from a page to its slides. The slides and their notes are only for teachers."""
-_NOT_OURS = shutil.ignore_patterns(".*", "__pycache__", "*.pyc", "nodes", "*.new")
+_SLIDES = re.compile(r'\s*<a class="to-slides".*?</a>|<a [^>]*href="[./]*/slides/[^>]*>(?P<words>.*?)</a>')
+"""A link from a page to slides; of one in a sentence the words stay. Slides and their notes are only for teachers."""
+_NOT_OURS = shutil.ignore_patterns(".*", "__pycache__", "*.pyc", "nodes", "*.new", "*.map", "notebooks")
+"""What is not copied: what programs leave behind, and of the book what no reader of its pages needs."""
 _EPOCH = (1980, 1, 1, 0, 0, 0)
 """The time of every file in the zip. It is always the same, so that equal sources give equal zips."""
 
@@ -166,7 +167,8 @@ def write_kit(root: Path, book: Path | None, into: Path) -> Path:
     if book is not None:
         shutil.copytree(book, folder / "lectures", ignore=_NOT_OURS)
         for page in (folder / "lectures").glob("*.html"):
-            page.write_text(_SLIDES.sub("", page.read_text(encoding="utf-8")), encoding="utf-8")
+            text = _SLIDES.sub(lambda link: link["words"] or "", page.read_text(encoding="utf-8"))
+            page.write_text(text, encoding="utf-8")
     settings = read_settings(root)
     (folder / KIT_FOLDER / SETTINGS_FILE).write_text(_settings_file(settings, names), encoding="utf-8")
     shutil.copy(lock, folder)

@@ -1,6 +1,7 @@
 """The links between a deck and its page of the book, and figures that can be enlarged.
 
-The role `slides` links to a lecture's talk, as in `` {slides}`02_executors` ``; the talks are built beside the book.
+The role `slides` links to a lecture's talk, as in `` {slides}`lecture 2 <02_executors>` ``. The talks are built beside
+the book.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from typing import Any
 from docutils import nodes
 from sphinx.application import Sphinx
 from sphinx.errors import ExtensionError
-from sphinx.util.docutils import SphinxRole
+from sphinx.util.docutils import ReferenceRole
 
 LECTURES = Path(__file__).resolve().parent.parent
 _FIGURE = re.compile(r'<img ([^>]*?)src="data:image/svg\+xml;base64,([A-Za-z0-9+/=]+)"([^>]*)>')
@@ -22,18 +23,15 @@ _FIGURE = re.compile(r'<img ([^>]*?)src="data:image/svg\+xml;base64,([A-Za-z0-9+
 _FILE = re.compile(r'(<a [^>]*>)?(<img [^>]*?src="([^":]+\.svg)"[^>]*>)')
 
 
-class Slides(SphinxRole):
+class Slides(ReferenceRole):
     """The role `slides`: a link from a page of the book to a talk."""
 
     def run(self) -> tuple[list[nodes.Node], list[nodes.system_message]]:
         """Make the link; what is no talk ends the build."""
-        if not (LECTURES / "slides" / f"{self.text}.md").exists():
-            raise ExtensionError(f"{self.env.docname}: there are no slides {self.text}")
+        if not (LECTURES / "slides" / f"{self.target}.md").exists():
+            raise ExtensionError(f"{self.env.docname}: there are no slides {self.target}")
         above = "../" * (self.env.docname.count("/") + 1)
-        # A page has one such link for each talk, so that the word alone would not say where it leads.
-        link = nodes.reference("", "slides", refuri=f"{above}slides/{self.text}.html", internal=True)
-        link["reftitle"] = f"Slides of {self.text}"
-        return [link], []
+        return [nodes.reference("", self.title, refuri=f"{above}slides/{self.target}.html", internal=True)], []
 
 
 def on_page(app: Sphinx, pagename: str, template: str, context: dict[str, Any], doctree: nodes.document | None) -> None:

@@ -217,13 +217,18 @@ def test_from_an_unpacked_zip_to_a_verdict(course: Path, tmp_path: Path) -> None
     book = tmp_path / "book"
     book.mkdir()
     (book / "index.html").write_text("<h1>Lectures</h1>", encoding="utf-8")
-    links = '<a href="index.html">Index</a>\n      <a href="../slides/01_nodes.html">Slides</a>\n'
+    links = (
+        '<a href="index.html">Index</a>\n      <a class="to-slides" href="../slides/01_nodes.html">Slides</a>\n'
+        'Lecture <a class="internal" href="../slides/01_nodes.html"><span>1</span></a>.\n'
+    )
     (book / "01_nodes.html").write_text(links, encoding="utf-8")
     with zipfile.ZipFile(write_kit(course, book, tmp_path)) as archive:
         archive.extractall(tmp_path / "für Übungen")
     kit = tmp_path / "für Übungen" / NAME
     page = (kit / "lectures" / "01_nodes.html").read_text(encoding="utf-8")
-    assert page == '<a href="index.html">Index</a>\n', "a link to slides, which students do not get"
+    assert page == '<a href="index.html">Index</a>\nLecture <span>1</span>.\n', (
+        "a link to slides, which students do not get"
+    )
     write_lock(kit, "requirements.lock", "uv")
     made = make(kit, "setup")
     assert made.returncode == 0, made.stderr

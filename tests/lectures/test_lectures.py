@@ -145,7 +145,7 @@ def contrast(request: pytest.FixtureRequest, name: str) -> bool:
 
 @pytest.mark.parametrize("name", PAGES)
 def test_every_page_of_the_book_can_be_read(site: Path, page: Any, name: str, contrast: bool) -> None:
-    """No broken or undescribed picture, nothing that axe objects to, nothing but code to scroll sideways, on a phone, too.
+    """No broken or undescribed picture, nothing that axe objects to, and nothing but code to scroll sideways.
 
     What a phone shows too small leads to a file that can be enlarged. A dark page has other colours only.
     """
