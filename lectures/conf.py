@@ -65,11 +65,13 @@ html_theme_options = {
     "footer_start": [],
     "footer_end": [],
 }
+html_context = {"default_mode": "auto"}  # light or dark, as the reader's system is
 html_sidebars = {"**": ["all_pages"]}
 html_title = project
 html_theme_path = ["_theme"]
 html_static_path = ["_static"]
 html_css_files = ["course.css", "book.css"]
+html_js_files = ["paper.js"]
 html_copy_source = False
 html_use_index = True
 

@@ -12,11 +12,12 @@ from typing import TYPE_CHECKING, Any
 from autograder.core import front_end
 from autograder.core.errors import KitError
 from autograder.course.cells import CELL_BYTES, BadNameError, CellFile, check_free, check_name, parse
-from autograder.course.paths import ROOT, built_book, course_root, is_students_kit, trusted_course
+from autograder.course.paths import built_book, course_root, is_students_kit, trusted_course
 from autograder.course.settings import NO_BOOK, Book, read_book
 from autograder.notebook.kernel import Kernel, now
 from autograder.notebook.magics import lab_magic, register_completion, ros2_magic
 from autograder.notebook.program_folder import Written, shown
+from autograder.setup.places import ROOT
 
 if TYPE_CHECKING:
     from autograder.checks.scoring import Score

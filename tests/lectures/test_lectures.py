@@ -173,6 +173,19 @@ def test_the_search_finds_a_lecture_without_a_network(site: Path, browser: Any) 
     window.close()
 
 
+def test_paper_shows_what_is_folded_and_is_white(site: Path, page: Any) -> None:
+    page.emulate_media(color_scheme="dark")
+    page.goto(f"file://{site}/book/02_executors.html")
+    closed = "document.querySelectorAll('article details:not([open])').length"
+    look = f"() => [document.documentElement.dataset.theme, {closed}]"
+    scheme, folded = page.evaluate(look)
+    assert scheme == "dark" and folded > 10
+    page.evaluate("dispatchEvent(new Event('beforeprint'))")
+    assert page.evaluate(look) == ["light", 0]
+    page.evaluate("dispatchEvent(new Event('afterprint'))")
+    assert page.evaluate(look) == ["dark", folded]
+
+
 @pytest.mark.parametrize("name", TALKS)
 def test_a_talk_can_be_given(site: Path, page: Any, name: str) -> None:
     """25 to 35 slides, each with notes, at most 12 lines of code, and no text below 2.5 % of the height."""
