@@ -1,4 +1,4 @@
-"""`make kilted` runs a copy of the kit in which nothing of Jazzy is left; what it finds there is not a matter of the tests."""
+"""`make kilted` runs a copy of the kit in which nothing of Jazzy is left; what it finds is no matter of the tests."""
 
 from __future__ import annotations
 

@@ -70,7 +70,8 @@ def copy_kit(kit: Path) -> None:
 
 def set_up() -> None:
     """Pin Kilted's packages beside the versions that the course has of everything else, and install them."""
-    pins = re.findall(r"^(?!ros)\S+==\S+", (ROOT / LOCK).read_text(encoding="utf-8"), re.MULTILINE)
+    # A pin may hold on some versions of Python only, which is said after a semicolon.
+    pins = re.findall(r"^(?!ros)\S+==[^\\\n]+", (ROOT / LOCK).read_text(encoding="utf-8"), re.MULTILINE)
     constraints = PLACE / "constraints.txt"
     constraints.write_text("\n".join(pins) + "\n", encoding="utf-8")
     options = ["--quiet", "--universal", "--python-version", "3.11", "--generate-hashes", "--no-emit-index-url"]
