@@ -30,6 +30,7 @@ author = "The course kit's authors"
 language = "en"
 extensions = ["myst_nb", "sphinx_revealjs", "slides", "talk", "programs", "drawings", "claims", "reference", "tables"]
 exclude_patterns = ["_*", "slides"]
+templates_path = ["_templates"]
 pygments_style = "default"
 myst_enable_extensions = ["colon_fence", "deflist"]
 myst_heading_anchors = 3
@@ -50,18 +51,34 @@ nb_mime_priority_overrides = [
     ("revealjs", "text/plain", 100),
 ]
 
+# Why this theme: see instructors/write_a_lecture.md.
+html_theme = "pydata_sphinx_theme"
+html_theme_options = {
+    "logo": {"text": project},
+    "navbar_center": [],
+    "navbar_end": ["theme-switcher"],
+    "article_header_start": [],
+    "article_header_end": ["slides_link"],
+    "secondary_sidebar_items": ["page-toc"],
+    "show_toc_level": 2,
+    "search_bar_text": "Search the book",
+    "footer_start": [],
+    "footer_end": [],
+}
+html_context = {"default_mode": "auto"}  # light or dark, as the reader's system is
+html_sidebars = {"**": ["all_pages"]}
+html_title = project
 html_theme_path = ["_theme"]
-html_theme = "book"
-html_title = "ROS 2 in Python"
 html_static_path = ["_static"]
-html_css_files = ["course.css"]
+html_css_files = ["course.css", "book.css"]
+html_js_files = ["paper.js"]
 html_copy_source = False
 html_use_index = True
 
 revealjs_html_theme = "deck"
-revealjs_style_theme = "course.css"
+revealjs_style_theme = "deck.css"
 revealjs_static_path = ["_static"]
-revealjs_css_files = ["pygments.css"]
+revealjs_css_files = ["pygments.css", "course.css"]
 revealjs_script_conf = {
     "width": 1280,
     "height": 720,

@@ -154,12 +154,13 @@ _PLACES = {
 }
 """The path of the file that is made from each template."""
 _BOOK_ROW = "| `lectures` | the lectures: open `lectures/index.html` in a browser |\n"
-_SLIDES = re.compile(r'\s*<a href="\.\./slides/[^"]*">Slides</a>')
-"""A link from a page to its slides. The slides and their notes are only for teachers."""
+_SLIDES = re.compile(r'\s*<a class="to-slides".*?</a>|<a [^>]*href="[./]*/slides/[^>]*>(?P<words>.*?)</a>')
+"""A link from a page to slides; of one in a sentence the words stay. Slides and their notes are only for teachers."""
 _TEACHERS_PAGES = "instructors"
 """The folder of a book's pages for teachers. They hold exam questions with answers."""
 _TO_TEACHERS_PAGES = re.compile(rf'<a\b[^>]*href="(?:\.\./)*{_TEACHERS_PAGES}/[^"]*"[^>]*>(.*?)</a>', re.DOTALL)
-_NOT_OURS = shutil.ignore_patterns(".*", "__pycache__", "*.pyc", "nodes", "*.new")
+_NOT_OURS = shutil.ignore_patterns(".*", "__pycache__", "*.pyc", "nodes", "*.new", "*.map", "notebooks")
+"""What is not copied: what programs leave behind, and of the book what no reader of its pages needs."""
 _EPOCH = (1980, 1, 1, 0, 0, 0)
 """The time of every file in the zip. It is always the same, so that equal sources give equal zips."""
 
@@ -220,7 +221,7 @@ def _copy_book(book: Path, into: Path) -> None:
     shutil.copytree(book, into, ignore=_NOT_OURS)
     shutil.rmtree(into / _TEACHERS_PAGES, ignore_errors=True)
     for page in into.rglob("*.html"):
-        text = _SLIDES.sub("", page.read_text(encoding="utf-8"))
+        text = _SLIDES.sub(lambda link: link["words"] or "", page.read_text(encoding="utf-8"))
         page.write_text(_TO_TEACHERS_PAGES.sub(r"\1", text), encoding="utf-8")
 
 

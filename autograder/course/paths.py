@@ -64,10 +64,13 @@ def is_students_kit() -> bool:
     return _is_course(ROOT / KIT_FOLDER)
 
 
-def book_of_kit() -> Path | None:
-    """Return the folder of the lectures in a student's kit; None if this is no student's kit or it has no lectures."""
-    folder = ROOT / "lectures"
-    return folder if is_students_kit() and (folder / "index.html").is_file() else None
+def built_book() -> Path | None:
+    """Return the folder of the lectures as HTML: a student's kit has one, and `make lectures` makes one in a checkout.
+
+    None if there is none.
+    """
+    folder = ROOT / "lectures" if is_students_kit() else ROOT / "build" / "lectures" / "book"
+    return folder if (folder / "index.html").is_file() else None
 
 
 def _is_course(folder: Path) -> bool:

@@ -110,9 +110,9 @@ class Book:
     """The link to the folder of the lectures as HTML; empty if there is none."""
 
     def named_in(self, text: str) -> Section | None:
-        """Return the section that a text refers to, as in `Week 2, section 'Groups'`; None if it refers to none."""
+        """Return the first section that a text names, as in `Week 2, section 'Groups'`; None if it names none."""
         names = "|".join(map(re.escape, self.pages)) or "(?!)"
-        found = re.search(rf"\b({names}), (?:section )?'([^']+)'", text, re.IGNORECASE)
+        found = re.search(rf"\b({names}), (?:sections? )?'([^']+)'", text, re.IGNORECASE)
         if found is None:
             return None
         lecture = next(name for name in self.pages if name.casefold() == found[1].casefold())

@@ -1,4 +1,4 @@
-"""Serves the lectures of a student's kit through JupyterLab itself, below `/lectures`.
+"""Serves the lectures of a student's kit, or those that a checkout has built, through JupyterLab, below `/lectures`.
 
 Jupyter shows HTML files in a user's folder in a sandbox, without their pictures and style sheets and with links that do
 not work, because anybody may have written them. The lectures are files of the course itself, so they are not sandboxed.
@@ -11,7 +11,7 @@ from typing import Any
 from jupyter_server.base.handlers import AuthenticatedFileHandler
 from jupyter_server.utils import url_path_join
 
-from autograder.course.paths import book_of_kit
+from autograder.course.paths import built_book
 
 ROUTE = "lectures"
 
@@ -29,7 +29,7 @@ class Pages(AuthenticatedFileHandler):  # type: ignore[misc]
 
 
 def _load_jupyter_server_extension(server: Any) -> None:
-    book = book_of_kit()
+    book = built_book()
     if book is not None:
         place = url_path_join(server.web_app.settings["base_url"], ROUTE, "(.*)")
         options = {"path": str(book), "default_filename": "index.html"}

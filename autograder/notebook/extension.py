@@ -12,11 +12,12 @@ from typing import TYPE_CHECKING, Any
 from autograder.core import front_end
 from autograder.core.errors import KitError
 from autograder.course.cells import CELL_BYTES, BadNameError, CellFile, check_free, check_name, parse
-from autograder.course.paths import book_of_kit, course_root, is_students_kit, trusted_course
+from autograder.course.paths import built_book, course_root, is_students_kit, trusted_course
 from autograder.course.settings import NO_BOOK, Book, read_book
 from autograder.notebook.kernel import Kernel, now
 from autograder.notebook.magics import lab_magic, register_completion, ros2_magic
 from autograder.notebook.program_folder import Written, shown
+from autograder.setup.places import ROOT
 
 if TYPE_CHECKING:
     from autograder.checks.scoring import Score
@@ -102,17 +103,19 @@ def shown_score(score: Score, **_: object) -> dict[str, str]:
 def _book() -> Book:
     """Return the lectures of the student's course; if there is no course, hints have no links."""
     try:
-        return read_book(trusted_course(None) if is_students_kit() else course_root(), _address())
+        root = trusted_course(None) if is_students_kit() else course_root()
+        # The book that lies beside the kit is not that of another course.
+        return read_book(root, _address() if is_students_kit() or root == ROOT else "")
     except KitError:
         return NO_BOOK
 
 
 def _address() -> str:
-    """Return the address of the lectures of a student's kit.
+    """Return the address of the lectures as HTML, if there are any here.
 
     It is below the server's address, or a path in VS Code; elsewhere it is empty.
     """
-    lectures = book_of_kit()
+    lectures = built_book()
     here = front_end.active
     notebook = here.folder.notebook if isinstance(here, Kernel) else None
     if lectures is None or notebook is None:

@@ -26,7 +26,7 @@ from sphinx.writers.html5 import HTML5Translator
 from sphinx_revealjs.nodes import revealjs_break
 from sphinx_revealjs.writers import RevealjsSlideTranslator
 
-# The measures below belong to course.css, section "Slides"; they assume a wide font, so that a narrow one fits too.
+# The measures below belong to deck.css; they assume a wide font, so that a narrow one fits too.
 ROOM = 600  # pixels below a slide's heading
 WIDTH = 1168  # pixels between the margins
 LEAST_FIGURE = 360  # a figure is not shrunk below this height to share a slide

@@ -1,6 +1,6 @@
 """Tables in a narrow window: each row becomes a block, in which every cell says which column it is of.
 
-The name of the column stands in each cell and is shown on a phone only, in place of the head row; see course.css.
+The name of the column stands in each cell and is shown on a phone only, in place of the head row; see book.css.
 """
 
 from __future__ import annotations

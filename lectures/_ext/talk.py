@@ -1,4 +1,8 @@
-"""The links between a deck and its page of the book, and figures that can be enlarged."""
+"""The links between a deck and its page of the book, and figures that can be enlarged.
+
+The role `slides` links to a lecture's talk, as in `` {slides}`lecture 2 <02_executors>` ``. The talks are built beside
+the book.
+"""
 
 from __future__ import annotations
 
@@ -11,11 +15,24 @@ from typing import Any
 from docutils import nodes
 from sphinx import addnodes
 from sphinx.application import Sphinx
+from sphinx.errors import ExtensionError
+from sphinx.util.docutils import ReferenceRole
 
 LECTURES = Path(__file__).resolve().parent.parent
 _FIGURE = re.compile(r'<img ([^>]*?)src="data:image/svg\+xml;base64,([A-Za-z0-9+/=]+)"([^>]*)>')
 
 _FILE = re.compile(r'(<a [^>]*>)?(<img [^>]*?src="([^":]+\.svg)"[^>]*>)')
+
+
+class Slides(ReferenceRole):
+    """The role `slides`: a link from a page of the book to a talk."""
+
+    def run(self) -> tuple[list[nodes.Node], list[nodes.system_message]]:
+        """Make the link; what is no talk ends the build."""
+        if not (LECTURES / "slides" / f"{self.target}.md").exists():
+            raise ExtensionError(f"{self.env.docname}: there are no slides {self.target}")
+        above = "../" * (self.env.docname.count("/") + 1)
+        return [nodes.reference("", self.title, refuri=f"{above}slides/{self.target}.html", internal=True)], []
 
 
 def on_page(app: Sphinx, pagename: str, template: str, context: dict[str, Any], doctree: nodes.document | None) -> None:
@@ -56,6 +73,7 @@ def on_doctree(app: Sphinx, doctree: nodes.document) -> None:
 
 def setup(app: Sphinx) -> dict[str, Any]:
     """Register with Sphinx."""
+    app.add_role("slides", Slides())
     app.connect("html-page-context", on_page)
     app.connect("doctree-read", on_doctree)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

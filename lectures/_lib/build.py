@@ -6,6 +6,7 @@ experiment; a statement that is wrong fails the second time, too, and with it th
 
 from __future__ import annotations
 
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -20,8 +21,8 @@ def build(output: Path, options: list[str]) -> int:
     """Build both into a folder, and return Sphinx' exit status.
 
     Args:
-        output: gets `book`, `slides` and what Sphinx keeps for the next time. Lectures that have run are not run again
-            as long as their cells are the same.
+        output: gets `book` and `slides`, in each of them its executed `notebooks`, and what Sphinx keeps for the next
+            time. Lectures that have run are not run again as long as their cells are the same.
         options: for Sphinx.
     """
     for builder, name, source in TARGETS:
@@ -36,6 +37,10 @@ def build(output: Path, options: list[str]) -> int:
         if done.returncode != 0:
             print(done.stderr, file=sys.stderr)
             return done.returncode
+        # MyST-NB writes those of both builds into one folder, where a talk would take the place of its lecture.
+        if (output / "jupyter_execute").is_dir():
+            shutil.copytree(output / "jupyter_execute", output / name / "notebooks", dirs_exist_ok=True)
+            shutil.rmtree(output / "jupyter_execute")
     return 0
 
 

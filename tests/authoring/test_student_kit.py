@@ -217,7 +217,10 @@ def test_from_an_unpacked_zip_to_a_verdict(course: Path, tmp_path: Path) -> None
     book = tmp_path / "book"
     book.mkdir()
     (book / "index.html").write_text("<h1>Lectures</h1>", encoding="utf-8")
-    links = '<a href="index.html">Index</a>\n      <a href="../slides/01_nodes.html">Slides</a>\n'
+    links = (
+        '<a href="index.html">Index</a>\n      <a class="to-slides" href="../slides/01_nodes.html">Slides</a>\n'
+        'Lecture <a class="internal" href="../slides/01_nodes.html"><span>1</span></a>.\n'
+    )
     (book / "01_nodes.html").write_text(links, encoding="utf-8")
     (book / "appendix").mkdir()
     to_teachers = (
@@ -231,7 +234,9 @@ def test_from_an_unpacked_zip_to_a_verdict(course: Path, tmp_path: Path) -> None
         archive.extractall(tmp_path / "für Übungen")
     kit = tmp_path / "für Übungen" / NAME
     page = (kit / "lectures" / "01_nodes.html").read_text(encoding="utf-8")
-    assert page == '<a href="index.html">Index</a>\n', "a link to slides, which students do not get"
+    assert page == '<a href="index.html">Index</a>\nLecture <span>1</span>.\n', (
+        "a link to slides, which students do not get"
+    )
     assert not (kit / "lectures" / "instructors").exists(), "exam questions with their answers"
     for place in ("appendix/words.html", "search.html"):
         assert (kit / "lectures" / place).read_text(encoding="utf-8") == '<span>Exam</span> <a href="#t">t</a>'

@@ -62,11 +62,14 @@ UNFIT = """() => Reveal.getSlides().flatMap((slide, number) => {
   }
   return found.length ? [`slide ${number + 1} "${slide.querySelector('h1, h2').innerText}": ${found}`] : [];
 })"""
-# Runs in a page of the book: what would have to be scrolled sideways, the window or a part of it.
-WIDE = """() => [document.documentElement, ...document.querySelectorAll('main *')].filter(element =>
+# Runs in a page of the book: what would have to be scrolled sideways, the window or a part of it that is no listing.
+WIDE = """() => [document.documentElement, ...document.querySelectorAll('main *:not(pre)')].filter(element =>
   element.scrollWidth > element.clientWidth + 1 &&
   (element === document.documentElement || ['auto', 'scroll'].includes(getComputedStyle(element).overflowX))
 ).map(element => `${element.tagName} ${element.innerText.slice(0, 60)}`)"""
+# Runs in a page of the book: listings whose lines wrap, so that their indentation is lost.
+WRAPPED = """() => [...document.querySelectorAll('.cell_input pre, .program pre')].filter(block =>
+  getComputedStyle(block).whiteSpace !== 'pre').map(block => block.innerText.slice(0, 60))"""
 BROKEN_IMAGES = """async () => {
   const images = [...document.images];
   await Promise.all(images.map(image => image.decode().catch(() => null)));
@@ -107,6 +110,7 @@ def test_a_page_of_which_a_cell_failed_is_run_once_more(tmp_path: Path, fails: i
     assert "what failed is run once more" in done.stderr
     assert (tmp_path / "runs").read_text() == "xx"
     assert (tmp_path / "out" / "slides" / "index.html").is_file() == (status == 0)
+    assert (tmp_path / "out" / "book" / "notebooks" / "index.ipynb").is_file() == (status == 0)
 
 
 @pytest.fixture
@@ -141,18 +145,45 @@ def contrast(request: pytest.FixtureRequest, name: str) -> bool:
 
 @pytest.mark.parametrize("name", PAGES)
 def test_every_page_of_the_book_can_be_read(site: Path, page: Any, name: str, contrast: bool) -> None:
-    """No broken or undescribed picture, nothing that axe objects to, nothing to scroll sideways, on a phone neither.
+    """No broken or undescribed picture, nothing that axe objects to, and nothing but code to scroll sideways.
 
-    What a phone shows too small leads to a file that can be enlarged.
+    What a phone shows too small leads to a file that can be enlarged. A dark page has other colours only.
     """
     page.goto(f"file://{site}/book/{name}.html")
     assert page.evaluate(BROKEN_IMAGES) == []
     assert page.evaluate(WIDE) == []
     assert violations(page, contrast) == []
+    if contrast:
+        page.emulate_media(color_scheme="dark")
+        page.wait_for_function("document.documentElement.dataset.theme === 'dark'")
+        assert violations(page, contrast) == []
     page.set_viewport_size({"width": 390, "height": 800})
     page.evaluate("document.querySelectorAll('details').forEach(fold => { fold.open = true })")
     assert page.evaluate(WIDE) == []
+    assert page.evaluate(WRAPPED) == []
     assert page.evaluate("[...document.querySelectorAll('main img[src$=svg]')].every(one => one.closest('a[href]'))")
+
+
+def test_the_search_finds_a_lecture_without_a_network(site: Path, browser: Any) -> None:
+    """In a window of its own: a page that was opened as a file may not fetch the excerpts of what it has found."""
+    window = browser.new_page()
+    window.set_default_timeout(1000 * BROWSER_SECONDS)
+    window.goto(f"file://{site}/book/search.html?q=deadlock")
+    window.wait_for_selector("#search-results a[href*='02_executors']")
+    window.close()
+
+
+def test_paper_shows_what_is_folded_and_is_white(site: Path, page: Any) -> None:
+    page.emulate_media(color_scheme="dark")
+    page.goto(f"file://{site}/book/02_executors.html")
+    closed = "document.querySelectorAll('article details:not([open])').length"
+    look = f"() => [document.documentElement.dataset.theme, {closed}]"
+    scheme, folded = page.evaluate(look)
+    assert scheme == "dark" and folded > 10
+    page.evaluate("dispatchEvent(new Event('beforeprint'))")
+    assert page.evaluate(look) == ["light", 0]
+    page.evaluate("dispatchEvent(new Event('afterprint'))")
+    assert page.evaluate(look) == ["dark", folded]
 
 
 @pytest.mark.parametrize("name", TALKS)

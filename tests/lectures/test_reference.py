@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 import yaml
+from docutils import nodes
 from places import ROOT
 
 sys.path.append(str(ROOT / "lectures" / "_ext"))
@@ -19,7 +20,7 @@ import reason_codes
 import reference
 
 from autograder.checks.nouns import NOUNS
-from autograder.course.settings import read_book
+from autograder.course.settings import Section, read_book
 from autograder.reasons import KINDS, Group, Kind, all_kinds, kind_of_lab
 
 BOOK = read_book(ROOT)
@@ -111,11 +112,28 @@ def sections_of(lecture: str) -> list[str]:
     return re.findall(r"^##+ (.*)$", text, re.MULTILINE)
 
 
+def sections_named_in(text: str) -> list[tuple[str, str]]:
+    """Each section of a lecture that a text refers to, in any of the forms in which hints do it."""
+    titles = r"'([^'\n]+)'(?: and '([^'\n]+)')?"
+    found = re.findall(rf"\b([Ll]ecture \d), (?:sections? )?{titles}", text)
+    return [(lecture.capitalize(), title) for lecture, *named in found for title in named if title]
+
+
 def test_hints_of_the_labs_lead_to_sections_that_the_lectures_have() -> None:
-    texts = [path.read_text(encoding="utf-8") for path in (ROOT / "solutions").glob("*/*.ipynb")]
-    named = {found for text in texts for found in re.findall(r"(Lecture \d), section '([^']+)'", text)}
-    assert len(named) > 3
+    notebooks = [json.loads(path.read_text(encoding="utf-8")) for path in (ROOT / "solutions").glob("*/*.ipynb")]
+    texts = ["".join(cell["source"]) for notebook in notebooks for cell in notebook["cells"]]
+    # A hint may be written as two strings, one below the other.
+    named = {found for text in texts for found in sections_named_in(re.sub(r'"\s*\n\s*f?"', "", text))}
+    assert len(named) > 40
     assert [(lecture, title) for lecture, title in sorted(named) if title not in sections_of(lecture)] == []
+
+
+def test_links_to_sections_have_the_addresses_that_the_book_has() -> None:
+    """A hint's link is made from the title by the kit, and a heading's address by Sphinx."""
+    for lecture in BOOK.pages:
+        for title in sections_of(lecture):
+            place = Section(lecture, title, BOOK.pages[lecture]).place
+            assert place == f"{BOOK.pages[lecture]}.html#{nodes.make_id(title)}"
 
 
 @pytest.mark.parametrize("code", BOOK.sections)
