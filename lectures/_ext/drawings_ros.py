@@ -33,7 +33,8 @@ def layers_of_ros() -> Picture:
             canvas.line([(140, y - 16), (140, y - 2)], arrow=True, line=2)
     return canvas.picture(
         "The layers of ROS 2, from top to bottom: your node; the client library, rclpy or rclcpp; rcl, which both "
-        "languages share; rmw, an interface that hides the middleware; the middleware, for example Fast DDS; the network."
+        "languages share; rmw, an interface that hides the middleware; the middleware, for example Fast DDS; the "
+        "network."
     )
 
 
@@ -60,9 +61,9 @@ def discovery() -> Picture:
         canvas.words(450, y - 12, head, anchor="middle", bold=True, size=17)
         canvas.words(450, y + 30, below, anchor="middle", size=16)
     return canvas.picture(
-        "How two processes find each other. First each announces itself to all, every few seconds (SPDP). Then they send "
-        "each other the lists of their publishers and subscriptions (SEDP). After that, messages go directly from the "
-        "publisher to the subscription."
+        "How two processes find each other. First each announces itself to all, every few seconds (SPDP). Then they "
+        "send each other the lists of their publishers and subscriptions (SEDP). After that, messages go directly "
+        "from the publisher to the subscription."
     )
 
 
@@ -120,9 +121,9 @@ def mobile_robot() -> Picture:
             ("controller", "wheels", "cmd_vel"),
             ("task", "planner", "drive to (a)"),
         ),
-        "A mobile robot as a graph of nodes. The lidar sends scan, the wheels send odom and the map server sends map to the "
-        "localization, which tells the planner the pose. The planner gets a goal from the task as an action, reads the map "
-        "and sends a path to the controller. The controller sends cmd_vel to the wheels.",
+        "A mobile robot as a graph of nodes. The lidar sends scan, the wheels send odom and the map server sends "
+        "map to the localization, which tells the planner the pose. The planner gets a goal from the task as an "
+        "action, reads the map and sends a path to the controller. The controller sends cmd_vel to the wheels.",
     )  # fmt: skip
 
 
@@ -144,10 +145,10 @@ def manipulator() -> Picture:
             ("controller", "joints", "commands"),
             ("task", "motion planner", "grasp (a)"),
         ),
-        "A robot arm as a graph of nodes. The camera sends images to the perception, which tells the motion planner where "
-        "objects are. The joints report joint_states to the state publisher, which publishes all frames on tf. The motion "
-        "planner gets a goal from the task as an action and sends a trajectory as an action to the controller, which "
-        "commands the joints.",
+        "A robot arm as a graph of nodes. The camera sends images to the perception, which tells the motion planner "
+        "where objects are. The joints report joint_states to the state publisher, which publishes all frames on "
+        "tf. The motion planner gets a goal from the task as an action and sends a trajectory as an action to the "
+        "controller, which commands the joints.",
     )  # fmt: skip
 
 
@@ -191,10 +192,10 @@ def rqt_graph() -> Picture:
     canvas.words(615, 370, "a box for each namespace;", size=16)
     canvas.words(615, 394, "/rosout and debugging hidden", size=16)
     return canvas.picture(
-        "One system in three views: a camera in the namespace /front and a display. In ros.draw.graph() nodes are ovals and the "
-        "topic /front/image is a box between them. In the view Nodes only of rqt_graph, the topic's name stands on an arrow "
-        "from the camera to the display. In the view Nodes/Topics (all), the topic is a box again, and a dashed frame named "
-        "front surrounds what belongs to the namespace."
+        "One system in three views: a camera in the namespace /front and a display. In ros.draw.graph() nodes are "
+        "ovals and the topic /front/image is a box between them. In the view Nodes only of rqt_graph, the topic's "
+        "name stands on an arrow from the camera to the display. In the view Nodes/Topics (all), the topic is a box "
+        "again, and a dashed frame named front surrounds what belongs to the namespace."
     )
 
 
