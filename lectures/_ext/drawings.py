@@ -12,6 +12,7 @@ import drawings_names
 import drawings_nodes
 import drawings_packages
 import drawings_qos
+import drawings_ros
 from docutils import nodes
 from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
@@ -106,6 +107,7 @@ DRAWINGS: dict[str, Callable[[], Picture]] = {
     **drawings_lifecycle.DRAWINGS,
     **drawings_names.DRAWINGS,
     **drawings_nodes.DRAWINGS,
+    **drawings_ros.DRAWINGS,
     **drawings_qos.DRAWINGS,
     **drawings_packages.DRAWINGS,
     **drawings_bringup.DRAWINGS,

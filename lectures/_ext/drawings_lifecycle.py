@@ -66,6 +66,7 @@ def three_endings() -> Picture:
         canvas.words(633, y + 36, goal, anchor="middle", bold=goal == "on_error")
     canvas.words(724, 66, "for example active", size=16)
     canvas.words(724, 180, "try again later", size=16)
+    canvas.words(633, 230, "shutdown: finalized", anchor="middle", size=16, italic=True)
     canvas.line([(718, 292), (746, 272)], arrow=True, line=2.2)
     canvas.line([(718, 308), (746, 328)], arrow=True, line=2.2)
     canvas.words(740, 234, "SUCCESS:", size=16)
@@ -74,8 +75,8 @@ def three_endings() -> Picture:
     canvas.words(740, 372, "(not SUCCESS)", size=16)
     return canvas.picture(
         "Three ways in which a transition callback ends. SUCCESS leads to the next state. FAILURE leads back to the "
-        "state before. ERROR, or an exception, leads to on_error: if that returns SUCCESS the node is unconfigured, "
-        "otherwise it is finalized."
+        "state before; only shutdown ends in finalized all the same. ERROR, or an exception, leads to on_error: if "
+        "that returns SUCCESS the node is unconfigured, otherwise it is finalized."
     )
 
 
