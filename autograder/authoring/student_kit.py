@@ -138,7 +138,7 @@ STUDENTS = {
         "ros2",
         "submit",
         "world",
-    ),  # fmt: skip
+    ),
     "intake": ("__init__", "record"),
 }
 """The modules that students get from each of these folders. The others are for instructors."""

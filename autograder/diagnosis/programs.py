@@ -115,7 +115,8 @@ def _why_over(inside: Inside) -> str:
     name, number = spins.popitem()
     line = f"Line {number} (`{inside.source.line(number)}`)"
     if name == "spin_once":
-        return f"{line} runs at most one callback and then returns. Use `spin()`, which runs until the program is stopped."
+        once = "runs at most one callback and then returns"
+        return f"{line} {once}. Use `spin()`, which runs until the program is stopped."
     return (
         f"{line} spins until its future is done and then returns. Look at what completes this future, and when. If "
         "nothing should end the program but a signal, use `spin()`."

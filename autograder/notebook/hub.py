@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 
 from autograder.core.files import write_beside
-from autograder.course.paths import book_of_kit
+from autograder.course.paths import built_book
 from autograder.notebook.book_server import ROUTE
 from autograder.setup.places import KIT_FOLDER, ROOT
 
@@ -38,6 +38,6 @@ def own_labs() -> Path:
     labs.mkdir(exist_ok=True)
     page = (ROOT / KIT_FOLDER / "labs" / "README.md").read_text(encoding="utf-8")
     title, _, below = page.partition("\n")
-    book = f"\n[Read the lectures]({os.environ[_PREFIX]}{ROUTE}/index.html).\n" if book_of_kit() else ""
+    book = f"\n[Read the lectures]({os.environ[_PREFIX]}{ROUTE}/index.html).\n" if built_book() else ""
     write_beside(labs / "README.md", f"{title}\n\n{_GET}{book}{below}")
     return labs
