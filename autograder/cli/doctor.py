@@ -18,6 +18,7 @@ from rich.text import Text
 from autograder.core.errors import KitError
 from autograder.core.version import VERSION
 from autograder.course.paths import course_root
+from autograder.notebook.hub import is_on_hub
 from autograder.sandbox.environment import profile_environment
 from autograder.setup.environment import digest, read_marker
 from autograder.setup.interpreter import NEWEST, OLDEST
@@ -76,8 +77,21 @@ class Finding:
     """What to do to fix it or, if `good`, to improve something."""
 
 
-def run(as_json: bool) -> int:
-    """Run all tests and print their findings. Return 0 if the machine can grade, and 2 if something is missing."""
+def run(as_json: bool, course: Path | None = None) -> int:
+    """Run all tests and print their findings. Return 0 if the machine can grade, and 2 if something is missing.
+
+    Args:
+        as_json: print JSON.
+        course: the course in whose folder results are written; None means the course around the working folder.
+
+    Raises:
+        KitError: there is no such course.
+    """
+    place = _writes_to(course)
+
+    def space() -> Finding:
+        return free_space(place)
+
     looks = (python, environment, foreign_ros, ros, probe, isolation, cores, compiler, space)
     findings: list[Finding] = []
     for look in looks:
@@ -230,12 +244,19 @@ def compiler() -> Finding:
     return Finding("compiler", True, f"without {', '.join(lacking)}", do)
 
 
-def space() -> Finding:
-    """Check the free space in the folder in which results are written."""
+def _writes_to(course: Path | None) -> Path:
+    """Return the folder in which results are written. The kit of a JupyterHub belongs to nobody who uses it."""
+    if course is not None:
+        return course_root(course)
     try:
         folder = course_root()
     except KitError:
-        folder = Path.cwd()
+        return Path.cwd()
+    return Path.cwd() if is_on_hub() and not os.access(folder, os.W_OK) else folder
+
+
+def free_space(folder: Path) -> Finding:
+    """Check the free space in the folder in which results are written."""
     free = shutil.disk_usage(folder).free
     do = "" if free >= NEEDED_SPACE else f"Free {NEEDED_SPACE // GIB} GiB; what was built is in {folder / 'build'}."
     if not os.access(folder, os.W_OK):

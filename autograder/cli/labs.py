@@ -1,4 +1,4 @@
-"""Commands for the authors of a course: `new`, `trust`, `lint`, `release`, `kit` and `gradescope`."""
+"""Commands for the authors of a course: `new`, `trust`, `lint`, `release`, `kit`, `hub` and `gradescope`."""
 
 from __future__ import annotations
 
@@ -141,6 +141,28 @@ def kit(
     print(archive)
     if not pages.is_dir():
         print("It contains no lectures because they have not been built. Run `make lectures`, then this command again.")
+
+
+@app.command()
+def hub(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="The folder of the hub, such as /srv/ros2.")],
+    course: CourseOption = None,
+) -> None:
+    """Write the folder from which a JupyterHub serves the course, or bring it up to date. Only root can do this."""
+    from autograder.authoring.hub import CONFIGURATION, write_hub
+    from autograder.course.paths import CoursePaths, course_root
+
+    root = course_root(course)
+    pages = CoursePaths(root).book
+    print("\n".join(write_hub(root, pages if pages.is_dir() else None, folder)))
+    if not pages.is_dir():
+        print(
+            "Students get no lectures because they have not been built. Run `make lectures`, then this command again."
+        )
+    kit = shlex.quote(str(folder.resolve() / "ros2-labs"))
+    print(f"\nNext, as root, with a Python that every user may run:\n  make -C {kit} setup PYTHON=/usr/bin/python3")
+    print(f"  {kit}/.venv/bin/python -m pip install jupyterhub jupyterhub-idle-culler")
+    print(f"  {kit}/.venv/bin/jupyterhub -f {shlex.quote(str(folder.resolve() / CONFIGURATION))}")
 
 
 @app.command()

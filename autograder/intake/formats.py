@@ -57,8 +57,10 @@ _BLACKBOARD_NAME = re.compile(r"Name:.*\((?P<user>[^()]+)\)\s*")
 _SUBMISSION = re.compile(r"submission_(?P<number>\d+)")
 """Gradescope's folders. The file `submission_metadata.yml` says to whom they belong."""
 _DOWNLOAD = re.compile(r".+_submissions_\d{4}(_\d\d){2}_T(_\d\d){3}")
-"""The folder that Classroom 50 downloads into, `class-lab2_submissions_2026_11_20_T_18_30_00`. Its numbers also have the
-form of Canvas."""
+"""The folder that Classroom 50 downloads into, `class-lab2_submissions_2026_11_20_T_18_30_00`. Its numbers also have
+the form of Canvas."""
+_SCORES = "scores.csv"
+"""The table of scores that Classroom 50 writes beside the repositories."""
 _INBOUND = re.compile(r"(?P<student>.+?)\+(?P<lab>[^+]+)\+(?P<when>\d{4}-\d\d-\d\d \d\d:\d\d:\d\d(\.\d+)?[^+]*)(\+.+)?")
 """nbgrader's exchange: `inbound/jane+lab2_executors+2026-11-20 18:30:00.123456 UTC+Hc2x`. The random text after the
 time keeps others from guessing the folder's name. It can be switched off, and says nothing about the student."""
@@ -168,7 +170,7 @@ def _gradescope_metadata(entry: Entry) -> dict[str, tuple[list[dict[str, str]], 
 
 
 def classroom50(entries: Sequence[Entry], lab: str) -> Recognised:
-    """Recognise `gh teacher download` of Classroom 50: a clone of each student's repository, named after the student."""
+    """Recognise what Classroom 50 downloads: a repository for each student, with the student's name at its end."""
     found = Recognised()
     folders = [entry for entry in entries if entry.kind in (Kind.FOLDER, Kind.ZIP) and "-" in entry.stem]
     with_lab = [entry for entry in folders if _has_labs(entry, lab)]
@@ -179,6 +181,7 @@ def classroom50(entries: Sequence[Entry], lab: str) -> Recognised:
         if entry.stem.startswith(start):
             owner = {"github": entry.stem[len(start) :], "repository": entry.stem}
             found.claims.append(Claim(entry, owner))
+    found.aside += [entry for entry in entries if entry.name == _SCORES]
     return found
 
 

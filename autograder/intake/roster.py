@@ -1,8 +1,8 @@
 """The roster: a table of the class that maps a platform's names to the names in the gradebook.
 
 The roster is a CSV file with a line of headings, or the `roster.csv` of a classroom in Classroom 50. The column `id` is
-the name in the gradebook. Columns such as `name`, `email`, `canvas_id`, `moodle_id` and `github` hold the names of the same
-student on platforms.
+the name in the gradebook. Columns such as `name`, `email`, `canvas_id`, `moodle_id` and `github` hold the names of the
+same student on platforms.
 
 Without a roster, students keep the names that they had before, or get the names that the platform uses.
 """
@@ -107,7 +107,7 @@ def read_roster(path: Path) -> Roster:
     except (OSError, UnicodeError, csv.Error) as error:
         raise KitError(f"The roster {path} cannot be read: {error}.", "It is a CSV file in UTF-8.") from error
     columns = [(name or "").strip().lower() for name in reader.fieldnames or []]
-    of_classroom50 = "id" not in columns and _OF_CLASSROOM50 <= set(columns)
+    of_classroom50 = "id" not in columns and set(columns) >= _OF_CLASSROOM50
     if "id" not in columns and not of_classroom50:
         raise KitError(
             f"The roster {path} has no column `id`; its first line is {heading[:80]!r}.",
