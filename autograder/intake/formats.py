@@ -59,6 +59,8 @@ _SUBMISSION = re.compile(r"submission_(?P<number>\d+)")
 _DOWNLOAD = re.compile(r".+_submissions_\d{4}(_\d\d){2}_T(_\d\d){3}")
 """The folder that Classroom 50 downloads into, `class-lab2_submissions_2026_11_20_T_18_30_00`. Its numbers also have
 the form of Canvas."""
+_SCORES = "scores.csv"
+"""The table of scores that Classroom 50 writes beside the repositories."""
 _INBOUND = re.compile(r"(?P<student>.+?)\+(?P<lab>[^+]+)\+(?P<when>\d{4}-\d\d-\d\d \d\d:\d\d:\d\d(\.\d+)?[^+]*)(\+.+)?")
 """nbgrader's exchange: `inbound/jane+lab2_executors+2026-11-20 18:30:00.123456 UTC+Hc2x`. The random text after the
 time keeps others from guessing the folder's name. It can be switched off, and says nothing about the student."""
@@ -179,6 +181,7 @@ def classroom50(entries: Sequence[Entry], lab: str) -> Recognised:
         if entry.stem.startswith(start):
             owner = {"github": entry.stem[len(start) :], "repository": entry.stem}
             found.claims.append(Claim(entry, owner))
+    found.aside += [entry for entry in entries if entry.name == _SCORES]
     return found
 
 

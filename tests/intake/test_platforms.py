@@ -95,6 +95,8 @@ PLATFORMS: dict[str, tuple[str, dict[str, str], dict[str, str], dict[str, str]]]
         {
             "cs-toy_submissions_2026_11_20_T_18_30_00/cs-toy-janedoe/labs/toy/toy.ipynb": "jd",
             "cs-toy_submissions_2026_11_20_T_18_30_00/cs-toy-janedoe/README.md": "# Toy",
+            "cs-toy_submissions_2026_11_20_T_18_30_00/cs-toy-janedoe/result.json": "{}",
+            "cs-toy_submissions_2026_11_20_T_18_30_00/scores.csv": "username,score",
             "cs-toy_submissions_2026_11_20_T_18_30_00/cs-toy-nora-ob/labs/toy/toy.ipynb": "no",
         },
         {"janedoe": "jd", "nora-ob": "no"},
@@ -181,7 +183,7 @@ def test_the_roster_of_classroom_50_names_its_students_by_their_github_names(tmp
     (course / "roster.csv").write_text("\n".join([heading, *lines]), encoding="utf-8")
     files = PLATFORMS["classroom50"][1]
     collected = taken_in(lay_out(files, tmp_path, True), toy.LAB, course)  # the assistant is not missed
-    assert texts(collected) == {"janedoe": "jd", "Nora-OB": "no"}
+    assert texts(collected) == {"janedoe": "jd", "Nora-OB": "no"} and not collected.refused
 
 
 def test_what_was_replaced_late_or_no_notebook_is_said(tmp_path: Path) -> None:
