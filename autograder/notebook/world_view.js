@@ -164,6 +164,8 @@ function render({ model, el }) {
   const show = (message) => {
     if (message.gone) {
       clearInterval(here);
+      stop();
+      el.innerHTML = message.gone; // the picture, as an `<img>` of Python's own making
       return;
     }
     move(message);

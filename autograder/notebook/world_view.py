@@ -84,9 +84,10 @@ class WorldView:
         self._over.set()
         self._thread.join(timeout=2.0)
         with contextlib.suppress(Exception):  # the kernel may be about to end
-            self._widget.send({"gone": True})
-            self._display.update(self._still(), raw=True)
-            self._widget.close()
+            left = self._still()
+            # A page that was loaded again does not know the output any more that is updated here: it gets the picture.
+            self._widget.send({"gone": left["text/html"]})
+            self._display.update(left, raw=True)
 
     def _make_widget(self) -> Any:
         import anywidget
