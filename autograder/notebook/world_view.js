@@ -158,11 +158,14 @@ function render({ model, el }) {
   const table = element(right, "table");
   element(table, "caption", {}, "Messages a second");
   const rates = element(table, "tbody");
-  const news = element(el, "ul", { class: "aw-news", role: "log", "aria-live": "polite", "aria-label": "What happens" });
+  const log = element(el, "div", { role: "log", "aria-live": "polite", "aria-label": "What happens" });
+  const news = element(log, "ul", { class: "aw-news" });
 
   const show = (message) => {
     if (message.gone) {
       clearInterval(here);
+      stop();
+      el.innerHTML = message.gone; // the picture, as an `<img>` of Python's own making
       return;
     }
     move(message);

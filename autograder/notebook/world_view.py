@@ -74,6 +74,7 @@ class WorldView:
         self._over = threading.Event()
         self._thread = threading.Thread(target=self._feed, name="world view", daemon=True)
         self._show()
+        self._answer_meanwhile()
         self._thread.start()
 
     def close(self) -> None:
@@ -83,9 +84,10 @@ class WorldView:
         self._over.set()
         self._thread.join(timeout=2.0)
         with contextlib.suppress(Exception):  # the kernel may be about to end
-            self._widget.send({"gone": True})
-            self._display.update(self._still(), raw=True)
-            self._widget.close()
+            left = self._still()
+            # A page that was loaded again does not know the output any more that is updated here: it gets the picture.
+            self._widget.send({"gone": left["text/html"]})
+            self._display.update(left, raw=True)
 
     def _make_widget(self) -> Any:
         import anywidget
@@ -200,6 +202,16 @@ class WorldView:
                 continue
             with contextlib.suppress(Exception):  # a view that breaks must not end the kernel's other threads
                 self._widget.send(self._message())
+                self._answer_meanwhile()
+
+    def _answer_meanwhile(self) -> None:
+        """Let the page's messages be dealt with while a cell runs.
+
+        JupyterLab sends them to a subshell of the kernel, but ipykernel leads them to the one that has sent something
+        last, which is the main shell, and that waits for the cell. Without this note it does not; where ipykernel has
+        no such note, buttons take effect when the cell ends.
+        """
+        vars(self._widget.comm).pop("_reply_subshell_id", None)
 
     def _message(self) -> dict[str, Any]:
         whole, self._whole = self._whole, False

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -47,6 +48,19 @@ def test_the_view_does_not_block_and_leaves_a_picture_with_the_trail(notebook: N
     assert "update_display_data" in ended.types and "The car drove" in ended.text, ended
     assert "The car drove" in notebook.run("robot.draw.world()").result
     assert "moments from" in notebook.run("robot.draw.film()").result
+
+
+def test_a_button_works_while_a_cell_runs(notebook: Notebook) -> None:
+    notebook.run(DRIVER)
+    notebook.run(SHOWN)
+    comm = notebook.run("robot._running.view._widget.comm.comm_id").result.strip("'")
+    subshell = notebook.open_subshell()
+    press = threading.Timer(1.0, notebook.tell_widget, (comm, {"do": "kill", "name": "driver", "car": 0}, subshell))
+    press.start()
+    waits = 'import time\nend = time.monotonic() + 60\nprogram = robot.program("driver")\n'
+    waits += "while program.running() and time.monotonic() < end:\n    time.sleep(0.1)\nprogram.running()"
+    assert notebook.run(waits).result == "False"
+    press.join()
 
 
 def test_what_cannot_be_shown_is_told(notebook: Notebook) -> None:

@@ -110,6 +110,13 @@ class Notebook:
                 if reply["parent_header"].get("msg_id") == request["header"]["msg_id"]:
                     break
 
+    def tell_widget(self, comm: str, content: dict[str, Any], subshell: str) -> None:
+        """Send a widget's comm what a page sends when somebody presses a button; a cell may run meanwhile."""
+        data = {"method": "custom", "content": content}
+        message = self._client.session.msg("comm_msg", {"comm_id": comm, "data": data})
+        message["header"]["subshell_id"] = subshell
+        self._client.shell_channel.send(message)
+
     def interrupt(self) -> None:
         self._manager.interrupt_kernel()
 
