@@ -113,10 +113,17 @@ def _as_text(name: str, content: bytes) -> Iterator[tuple[str, str]]:
 
 NAME = "ros2-labs"
 """The name of the folder and of the zip."""
-INSTRUCTORS = ("authoring", "gradebook", "report/class_page.py", "report/templates/class.html")
+INSTRUCTORS = (
+    "authoring",
+    "gradebook",
+    "report/class_page.py",
+    "report/term_page.py",
+    "report/templates/class.html",
+    "report/templates/term.html",
+)
 """The parts of the package `autograder` that students do not get."""
 STUDENTS = {
-    "cli": ("__init__", "app", "check", "doctor", "machine", "main", "package", "ros2", "submit"),
+    "cli": ("__init__", "app", "appeal", "check", "chosen", "doctor", "machine", "main", "package", "ros2", "submit"),
     "intake": ("__init__", "record"),
 }
 """The modules that students get from each of these folders. The others are for instructors."""

@@ -68,6 +68,8 @@ class Findings:
         self.flags: list[str] = []
         """Contradictions between what the graph showed and what was seen inside the programs."""
         self.logs: list[NodeLog] = []
+        self.varied: list[str] = []
+        """The random values that the check drew."""
         self.patience = Patience(self.alone)
         """How much longer the waits of this check may still take on a busy machine."""
         self.starved = 0.0

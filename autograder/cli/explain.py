@@ -26,6 +26,7 @@ def explain(
 
     To get the messages, the check is run again with the same random values.
     """
+    from autograder.cli.chosen import chosen as named
     from autograder.course.paths import CoursePaths, course_root
     from autograder.course.settings import read_book
     from autograder.report.terminal import console, evidence_view, submission_view
@@ -36,15 +37,15 @@ def explain(
     screen = console()
     if not check:
         screen.print(submission_view(result, "instructor", book))
-        for path in _pictures(result.checks, folder):
+        for path in pictures(result.checks, folder):
             print(path)
         _history(root, result)
         screen.print("To see all evidence and messages of a check, name the check, such as: ", end="")
         screen.print(f"autograder explain {student} 1 --lab {result.lab}", markup=False)
         return
-    chosen = _chosen(result, check)
+    chosen = named(result.checks, check, result.lab)
     screen.print(evidence_view(chosen, book))
-    for path in _pictures([chosen], folder):
+    for path in pictures([chosen], folder):
         print(path)
     _history(root, result, chosen.grade_id)
     _messages(root, result, chosen, folder / _name(chosen))
@@ -61,24 +62,11 @@ def _result(root: Path, student: str, lab: str) -> SubmissionResult:
     return found[0]
 
 
-def _chosen(result: SubmissionResult, named: str) -> CheckResult:
-    if named.isdigit() and 0 < int(named) <= len(result.checks):
-        return result.checks[int(named) - 1]
-    by_id = [check for check in result.checks if check.grade_id == named]
-    by_title = [check for check in result.checks if named.casefold() in check.title.casefold()]
-    found = by_id or by_title
-    if len(found) != 1:
-        listed = "".join(f"\n  {n}  {c.grade_id}  {c.title}" for n, c in enumerate(result.checks, start=1))
-        several = f"{len(found)} checks" if found else "No check"
-        raise KitError(f"{several} of {result.lab} match{'' if found else 'es'} {named!r}.", f"The checks are:{listed}")
-    return found[0]
-
-
 def _name(check: CheckResult) -> str:
     return re.sub(r"[^A-Za-z0-9_-]", "-", check.grade_id)
 
 
-def _pictures(checks: list[CheckResult], folder: Path) -> list[Path]:
+def pictures(checks: list[CheckResult], folder: Path) -> list[Path]:
     """Write the pictures of checks to files, and return their paths."""
     from autograder.core.files import write_beside
 

@@ -11,7 +11,7 @@ from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 
-from autograder.cli import check, machine, package, submit  # noqa: F401  each module registers its commands
+from autograder.cli import appeal, check, machine, package, submit  # noqa: F401  each module registers its commands
 from autograder.cli.app import app
 from autograder.core.errors import GRADEBOOK_REFUSED, KitError
 from autograder.setup.refusals import SetUpError, refuse_foreign_ros

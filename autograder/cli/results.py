@@ -40,6 +40,31 @@ def report(course: CourseOption = None) -> None:
 
 
 @app.command()
+def term(course: CourseOption = None) -> None:
+    """Write a page about the whole term, build/report/term.html, for instructors and not for students."""
+    import datetime
+
+    from autograder.course.lab import lab_names
+    from autograder.course.paths import CoursePaths, course_root
+    from autograder.course.settings import read_settings
+    from autograder.gradebook.appeals import waiting
+    from autograder.gradebook.grades import class_entries
+    from autograder.gradebook.renewal import renew_pages
+    from autograder.report.term_page import write_term_page
+
+    root = course_root(course)
+    renew_pages(root)
+    entries, settings = class_entries(root), read_settings(root)
+    if not entries:
+        raise KitError("There are no results yet.", "Grade a class first: autograder grade LAB")
+    page, today = CoursePaths(root).term_page, datetime.date.today()
+    appeals, damaged = waiting(root)
+    print(write_term_page(page, settings.title, entries, lab_names(root), settings.weights, appeals, today))
+    for sentence in damaged:
+        print(sentence, file=sys.stderr)
+
+
+@app.command()
 def export(
     form: Annotated[str, typer.Argument(metavar="FORMAT", help=f"One of: {', '.join(FORMATS)}.")],
     lab: Annotated[str | None, typer.Option(help="Only this lab.")] = None,

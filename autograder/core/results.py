@@ -156,6 +156,8 @@ class CellResult(_Model):
     """Files of answer cells that are still as students receive them. If there are any, the check has not passed."""
     logs: list[NodeLog] = Field(default_factory=list)
     """The output of the programs that the check launched."""
+    varied: list[Text] = Field(default_factory=list)
+    """The random values that the check drew, in their order."""
 
     @property
     def sure_points(self) -> float | None:

@@ -170,6 +170,20 @@ class CoursePaths:
         return self.build / "report" / f"{lab}.html"
 
     @property
+    def appeals(self) -> Path:
+        """The appeals that instructors have received, beside the gradebook, which has the answers to them."""
+        return self.gradebook.parent / "appeals"
+
+    def sample_students(self, lab: str) -> Path:
+        """Return the folder that describes the sample students of a lab."""
+        return self.root / "tests" / "classes" / lab
+
+    @property
+    def term_page(self) -> Path:
+        """The page about all labs of a term, which is for instructors."""
+        return self.build / "report" / "term.html"
+
+    @property
     def explained(self) -> Path:
         """Pictures and messages of single submissions."""
         return self.build / "explained"

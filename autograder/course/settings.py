@@ -32,6 +32,8 @@ class CourseSettings(BaseModel):
     """The executor that runs the jobs of a class, as `NAME` or `NAME://ADDRESS`; see `autograder.grading.executors`."""
     history_for_students: bool = False
     """Whether the feedback page shows the history of the points: when the lab was graded, and what changed and why."""
+    weights: dict[str, float] = {}
+    """The weight of each lab in the term's total; a lab that is not listed has the weight 1."""
     lectures: dict[str, str] = {}
     """The page of each lecture in the book, by the name that hints use for the lecture, such as `Week 2`."""
     sections: dict[str, dict[str, list[str]]] = {}

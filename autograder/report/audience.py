@@ -32,8 +32,9 @@ def outcome_for(outcome: Outcome, audience: Audience) -> Outcome:
 def check_for(check: _Result, audience: Audience) -> _Result:
     """Return the part of a check's result that this audience may see."""
     flags = check.flags if audience == "instructor" else []
+    varied = check.varied if audience == "instructor" else []  # hidden tests draw some of them
     shown = [outcome_for(outcome, audience) for outcome in check.outcomes]
-    return check.model_copy(update={"outcomes": shown, "flags": flags})
+    return check.model_copy(update={"outcomes": shown, "flags": flags, "varied": varied})
 
 
 def result_for(result: SubmissionResult, audience: Audience) -> SubmissionResult:

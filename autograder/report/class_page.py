@@ -32,7 +32,8 @@ _BINS = 10
 """The number of bars in the distribution. All of them have the same width in points."""
 _FEWEST = 5
 """The number of students that is needed to compute a discrimination."""
-_SCRIPT = Path(__file__).with_name("templates") / "class.js"
+SCRIPT = Path(__file__).with_name("templates") / "class.js"
+"""The program in the page, which sorts and searches its tables."""
 
 
 @dataclass(frozen=True)
@@ -63,21 +64,21 @@ def write_class_page(path: Path, entries: Sequence[Entry], written: datetime.dat
         entries: the lab's submissions.
         written: the date that is shown on the page.
     """
-    scores = [_earned(entry) for entry in entries]
-    top = max((_top(entry) for entry in entries), default=0.0)
-    script = _SCRIPT.read_text(encoding="utf-8")
+    scores = [earned(entry) for entry in entries]
+    most = max((top(entry) for entry in entries), default=0.0)
+    script = SCRIPT.read_text(encoding="utf-8")
     digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
     page = render(
         "class.html",
         lab=entries[0].lab,
         written=f"{written.day} {written:%B %Y}",
         count=len(entries),
-        top=points(top),
+        top=points(most),
         mean=points(statistics.fmean(scores)),
         median=points(statistics.median(scores)),
         lowest=points(min(scores)),
         highest=points(max(scores)),
-        bars=_distribution(scores, top),
+        bars=_distribution(scores, most),
         persons=_together(_persons(entries)),
         checks=_checks(entries),
         students=[_student(entry, path) for entry in entries],
@@ -88,11 +89,13 @@ def write_class_page(path: Path, entries: Sequence[Entry], written: datetime.dat
     return path
 
 
-def _earned(entry: Entry) -> float:
+def earned(entry: Entry) -> float:
+    """Return the points of a submission."""
     return entry.result.points if entry.grade is None else entry.grade.earned
 
 
-def _top(entry: Entry) -> float:
+def top(entry: Entry) -> float:
+    """Return the most points that a submission can get."""
     return entry.result.max_points if entry.grade is None else entry.grade.max_score
 
 
@@ -142,7 +145,7 @@ def _checks(entries: Sequence[Entry]) -> list[dict[str, object]]:
     for grade_id in order:
         found = [(entry, check) for entry in entries for check in entry.result.checks if check.grade_id == grade_id]
         verdicts = Counter(words.verdict(check) for _, check in found)
-        shares = [_share(entry, check) for entry, check in found]
+        shares = [share(entry, check) for entry, check in found]
         first = found[0][1]
         rows.append(
             {
@@ -163,7 +166,7 @@ def _checks(entries: Sequence[Entry]) -> list[dict[str, object]]:
     return rows
 
 
-def _share(entry: Entry, check: CheckResult) -> float:
+def share(entry: Entry, check: CheckResult) -> float:
     """Return the share of a check's points that a student has, from 0 to 1."""
     cells = entry.grade.cells if entry.grade is not None else ()
     earned = next((cell.points for cell in cells if cell.grade_id == check.grade_id), check.points)
@@ -172,7 +175,7 @@ def _share(entry: Entry, check: CheckResult) -> float:
 
 def _discrimination(found: Sequence[tuple[Entry, CheckResult]], shares: Sequence[float]) -> str:
     """Return the correlation of a check's points with those of all other checks, or a word if there is none."""
-    rest = [_earned(entry) - share * check.max_points for (entry, check), share in zip(found, shares, strict=True)]
+    rest = [earned(entry) - share * check.max_points for (entry, check), share in zip(found, shares, strict=True)]
     if len(found) < _FEWEST:
         return "too few"
     try:
@@ -204,7 +207,7 @@ def _student(entry: Entry, page: Path) -> dict[str, object]:
         "student": entry.student,
         "name": entry.known.get("name", ""),
         "section": entry.known.get("section", ""),
-        "points": points(_earned(entry)),
+        "points": points(earned(entry)),
         "waiting": waiting,
         "by_hand": sum(cell.by_hand for cell in grade.cells) if grade is not None else 0,
         "late": entry.late,
