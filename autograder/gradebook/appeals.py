@@ -65,7 +65,7 @@ def waiting(root: Path) -> tuple[list[Waiting], list[str]]:
         if (appeal.check, appeal.sentence) not in answered:
             name = who or f"nobody's answers; the file says {appeal.student!r}"
             when = f"{appeal.made:%Y-%m-%d}"
-            found.append(Waiting(name, lab.name, appeal.check, when, appeal.sentence, str(path)))
+            found.append(Waiting(name, lab.name, appeal.check, when, appeal.sentence, str(path.relative_to(root))))
     return found, damaged
 
 
