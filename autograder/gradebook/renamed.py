@@ -20,7 +20,7 @@ _LABS = text(
 )
 _COPY = text(
     "INSERT INTO student (id, first_name, last_name, email, lms_user_id)"
-    " SELECT :new, first_name, last_name, email, lms_user_id FROM student WHERE id = :old"
+    " SELECT CAST(:new AS VARCHAR(128)), first_name, last_name, email, lms_user_id FROM student WHERE id = :old"
     " AND NOT EXISTS (SELECT 1 FROM student WHERE id = :new)"
 )
 _MOVE = text(

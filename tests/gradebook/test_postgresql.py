@@ -45,6 +45,15 @@ with Gradebook(sys.argv[1]) as gradebook:
     grade.manual_score, grade.needs_manual_grade = 3, False
     gradebook.db.commit()
 """
+HISTORY = """
+import sys
+from pathlib import Path
+import toy
+from autograder.core.history import told
+from autograder.gradebook.grades import read_history
+events = told(read_history(Path(sys.argv[1]), toy.LAB)["ann"])
+print([change.why for event in events for change in event.changes if change.cell != "check_speaker"])
+"""
 
 
 @pytest.fixture
@@ -106,6 +115,7 @@ def test_a_class_is_graded_into_a_server_and_again(server: str, tmp_path: Path) 
     told = python(GRADER, root)
     assert told.startswith("{} ['toy has other cells than the gradebook: check_talker is called check_speaker now")
     assert told.endswith("[('ann', 8.0, 1), ('bob', 5.0, 0)]")
+    assert python(HISTORY, root) == "['graded by hand']"
     assert "ann,toy,8,9,1\nbob,toy,5,9,1\n" in (root / "build" / "grades.csv").read_text()
     assert "8" in (root / "build" / "feedback" / "ann" / "toy" / "toy.html").read_text()
     assert not list((root / "gradebook").iterdir())
