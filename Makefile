@@ -20,7 +20,7 @@ echo "No Python was found. The kit needs Python 3.11 to 3.14." >&2; \
 echo "What to do: sudo apt-get install python3 python3-venv   or name one: make PYTHON=/path/to/python3.12" >&2; exit 2
 endef
 
-.PHONY: help setup setup-dev doctor grade check submit test test-all lint jupyter lectures pdf release wheel soak machines margins mutants bench lock clean distclean
+.PHONY: help setup setup-dev doctor grade check submit test test-all lint jupyter lectures pdf release wheel soak machines margins mutants bank bench lock clean distclean
 
 help: ## show this list
 	@echo 'make TARGET [LAB=$(LAB)] [PYTHON=python3.12] [ARGS="more options"]'; echo
@@ -89,6 +89,9 @@ margins: setup-dev ## say how far each bound on time in a check is from the samp
 
 mutants: setup-dev ## change LAB's solution by rule, one change at a time, and grade each; a change that keeps its points may lack a check
 	@$(RUN) python tests/tools/mutants.py $(LAB) $(ARGS)
+
+bank: setup-dev ## run today's checks on the answers of past terms (folder bank), and list every difference
+	@$(RUN) autograder bank check $(if $(filter command line,$(origin LAB)),$(LAB)) $(ARGS)
 
 bench: setup-dev ## measure this grader against stock nbgrader, and how it scales with jobs, classes and Dask
 	@$(RUN) python tests/tools/bench.py $(ARGS)

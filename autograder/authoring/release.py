@@ -6,6 +6,7 @@ import json
 import re
 from pathlib import Path
 
+from autograder.authoring.bank import refuse_unexplained
 from autograder.authoring.lint.static import read_findings, release_findings
 from autograder.core.errors import KitError
 from autograder.core.files import write_beside
@@ -79,6 +80,7 @@ def release(root: Path, lab: str) -> Path:
         errors = release_findings(files)
     if errors:
         raise KitError(f"{lab} is not released:\n" + "\n".join(f"  {one}" for one in errors), "Repair these cells.")
+    refuse_unexplained(root, load_lab(root, lab))
     remember(root, lab, load_lab(root, lab).released)
     folder = CoursePaths(root).labs / lab
     for path, content in files.items():

@@ -178,6 +178,14 @@ class CoursePaths:
         """Return the folder that describes the sample students of a lab."""
         return self.root / "tests" / "classes" / lab
 
+    def bank(self, lab: str) -> Path:
+        """Return the folder with anonymous answers of past terms to a lab."""
+        return self.root / "bank" / lab
+
+    def bank_checked(self, lab: str) -> Path:
+        """Return the file that says with which version the bank of a lab was run, and with which outcome."""
+        return self.build / "bank" / f"{lab}.json"
+
     @property
     def term_page(self) -> Path:
         """The page about all labs of a term, which is for instructors."""

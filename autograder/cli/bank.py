@@ -1,0 +1,88 @@
+"""The commands `autograder bank add`, `check` and `explain`, for the bank of past terms."""
+
+from __future__ import annotations
+
+import sys
+from typing import Annotated
+
+import typer
+
+from autograder.cli.app import CourseOption, IsolationOption, app
+from autograder.core.errors import KitError
+from autograder.core.results import Isolation
+
+bank = typer.Typer(no_args_is_help=True)
+app.add_typer(bank, name="bank", help="Keep answers of past terms, and find out whether they still get their points.")
+
+LabArgument = Annotated[str, typer.Argument(help="The lab, such as lab2_executors.")]
+
+
+@bank.command("add")
+def add_class(lab: LabArgument, course: CourseOption = None) -> None:
+    """Add the graded class of a lab to the folder `bank`: programs and files without names, with their final points."""
+    from autograder.authoring.bank import add
+    from autograder.course.paths import CoursePaths, course_root
+    from autograder.intake.words import count
+
+    root = course_root(course)
+    new, known = add(root, lab)
+    print(f"Added {new} {'entry' if new == 1 else 'entries'} to {CoursePaths(root).bank(lab)}.")
+    if known:
+        print(f"The answers of {count(known, 'student')} are there already, or cannot be read.")
+
+
+@bank.command("check")
+def check_bank(
+    lab: Annotated[str | None, typer.Argument(help="The lab; default: all labs in the bank.")] = None,
+    isolation: IsolationOption = Isolation.FULL,
+    jobs: Annotated[int, typer.Option(min=0, help="How many entries run at once; 0: depends on the CPUs.")] = 0,
+    course: CourseOption = None,
+) -> None:
+    """Run today's checks on all entries, and list every difference. Exit status: 0, or 1 if one is unexplained."""
+    from autograder.authoring.bank import check
+    from autograder.course.lab import lab_names
+    from autograder.course.paths import CoursePaths, course_root
+    from autograder.grading.runner import Settings
+    from autograder.report.terminal import plain
+    from autograder.sandbox.isolation import choose
+
+    root = course_root(course)
+    names = [lab] if lab else [name for name in lab_names(root) if CoursePaths(root).bank(name).is_dir()]
+    if not names:
+        raise KitError("The bank is empty.", "Add a graded class: autograder bank add LAB")
+    settings = Settings(isolation=choose(isolation), jobs=jobs)
+    bad = 0
+    for name in names:
+        ran: list[str] = []
+        for one in check(root, name, settings, ran.append):
+            bad += 1
+            points = f"{_number(one.before)} → {_number(one.now)}"
+            print(plain(f"{name} {one.entry} {one.check}: {points}{f': {one.because}' if one.because else ''}"))
+        print(f"{name}: {len(ran)} entries", file=sys.stderr)
+    if bad:
+        how = "autograder bank explain LAB ENTRY CHECK REASON --points NOW"
+        print(f"{bad} unexplained. Correct the check, or say why it is right: {how}", file=sys.stderr)
+    raise typer.Exit(1 if bad else 0)
+
+
+@bank.command("explain")
+def explain_difference(
+    lab: LabArgument,
+    entry: Annotated[str, typer.Argument(help="The entry, as `bank check` names it.")],
+    check: Annotated[str, typer.Argument(help="The check, by its id.")],
+    reason: Annotated[str, typer.Argument(help="Why today's points are right.")],
+    now: Annotated[float, typer.Option("--points", help="The points that the check gives today.")],
+    course: CourseOption = None,
+) -> None:
+    """Record why today's points of an entry are right. `bank check` lists the entry again if they change once more."""
+    from autograder.authoring.bank import Difference, explain
+    from autograder.course.paths import CoursePaths, course_root
+
+    root = course_root(course)
+    if not (CoursePaths(root).bank(lab) / f"{entry}.json").is_file():
+        raise KitError(f"The bank of {lab} has no entry {entry!r}.", "`autograder bank check` lists the entries.")
+    explain(root, lab, Difference(entry, check, None, now, ""), reason)
+
+
+def _number(points: float | None) -> str:
+    return "?" if points is None else f"{points:g}"

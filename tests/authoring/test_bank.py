@@ -1,0 +1,60 @@
+"""Answers of past terms must still get their points, or somebody says why not, before a lab is released."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import by_hand
+import pytest
+import toy
+from typer.testing import CliRunner
+
+from autograder.authoring.release import release
+from autograder.cli.main import app
+from autograder.core.errors import KitError
+from autograder.core.results import Isolation
+from autograder.course.lab import load_lab
+from autograder.gradebook.class_run import grade_class
+from autograder.grading.runner import Settings
+
+
+def run(root: Path, *arguments: str) -> tuple[int, str]:
+    done = CliRunner().invoke(app, ["bank", *arguments, "--course", str(root)])
+    return done.exit_code, done.output
+
+
+def test_a_release_waits_until_every_difference_is_explained(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("autograder.grading.executors.local.run_in_worker", lambda job, *_: toy.judge(job))
+    root = toy.make_course(tmp_path / "course")
+    for student, talker in (("ann", "print('hello')"), ("bob", "print('no')"), ("cem", "print('hello')")):
+        answers = {"talker": f"%%node talker\n{talker}", "answers": "%%file answers.yaml\nanswer: 42", "why": student}
+        cells = load_lab(root, toy.LAB).clean_notebook(answers)["cells"]
+        cells.append(toy.cell("code", "%%file more.yaml\nmine: 1", 99))
+        toy.hand_in(tmp_path / "class", student, cells)
+    grade_class(root, toy.LAB, tmp_path / "class", Settings(Isolation.NONE, canaries=False))
+    by_hand.give(root, "bob", "check_talker", 3)
+    release(root, toy.LAB)  # there is no bank yet
+
+    assert run(root, "add", toy.LAB) == (
+        0,
+        f"Added 2 entries to {root}/bank/toy.\nThe answers of 1 student are there already, or cannot be read.\n",
+    )
+    texts = [path.read_text() for path in (root / "bank" / toy.LAB).glob("*.json")]
+    assert not any(name in text for text in texts for name in ("ann", "bob", "cem"))
+    assert all("mine: 1" in text for text in texts)
+    with pytest.raises(KitError, match="was not run with today's version"):
+        release(root, toy.LAB)
+
+    status, said = run(root, "check", "--isolation", "none")
+    entry = said.split()[1]
+    assert status == 1 and f"toy {entry} check_talker: 3 → 0: It says something else" in said
+    with pytest.raises(KitError, match="1 difference is unexplained in the bank of past terms"):
+        release(root, toy.LAB)
+    assert run(root, "explain", toy.LAB, entry, "check_talker", "It was too lenient.", "--points", "0")[0] == 0
+    assert run(root, "check", toy.LAB, "--isolation", "none")[0] == 0
+    release(root, toy.LAB)
+
+    notebook = root / "solutions" / toy.LAB / "toy.ipynb"
+    notebook.write_text(notebook.read_text().replace("within=60", "within=50"))
+    with pytest.raises(KitError, match="was not run with today's version"):
+        release(root, toy.LAB)
