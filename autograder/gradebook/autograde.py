@@ -32,6 +32,7 @@ from autograder.core.results import CheckResult, Isolation
 from autograder.course.lab import Lab, load_lab
 from autograder.gradebook import own_tables
 from autograder.gradebook.exchange_files import carry, only_notebooks
+from autograder.gradebook.history import note_graded
 from autograder.gradebook.private_nbgrader import SaveScores, in_first_pass
 from autograder.grading.runner import Settings, run_submission
 from autograder.grading.store import ResultStore
@@ -203,7 +204,7 @@ class SaveCheckedGrades(SaveScores):
 
     def preprocess(self, nb: Any, resources: dict[str, Any]) -> tuple[Any, dict[str, Any]]:
         """Record all grades of a submission, and a digest of what was recorded."""
-        root, student, lab, _ = _submitted(self.parent.parent, resources)
+        root, student, lab, path = _submitted(self.parent.parent, resources)
         self._programs = [cell.source for cell in nb.cells if cell.cell_type == "code" and utils.is_solution(cell)]
         digest = own_tables.recordable(root, lab.name, lab.source_digest, student)
         with Gradebook(resources["nbgrader"]["db_url"]) as gradebook:
@@ -211,6 +212,7 @@ class SaveCheckedGrades(SaveScores):
         made: tuple[Any, dict[str, Any]] = super().preprocess(nb, resources)
         with Gradebook(resources["nbgrader"]["db_url"]) as gradebook:
             own_tables.note_recorded(gradebook.db, lab.name, student, digest)
+            note_graded(gradebook.db.connection(), lab, student, path)
             gradebook.db.commit()
         return made
 

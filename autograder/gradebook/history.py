@@ -1,6 +1,6 @@
 """Keep the history of every submission's points in the gradebook, in a table of the kit's own that only grows.
 
-An entry is written when a feedback page is made, which follows every grading, and whenever a person gives points in
+An entry is written whenever points are recorded or a feedback page is made, and whenever a person gives points in
 formgrader, in the same transaction as these points.
 """
 

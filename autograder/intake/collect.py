@@ -265,8 +265,7 @@ def collect(
         else:
             taken[name] = _taken(source, reading, student, chosen)
     if tried_in is None:
-        left = {**missing.lost, **{old: before[old] for old in missing.renamed}}
-        keep_class(root, lab, taken, left, missing.renamed)
+        keep_class(root, lab, taken, missing.lost, missing.renamed)
         collected.notes += _farewells(missing, before)
     return collected
 

@@ -161,10 +161,10 @@ def keep_class(
     """
     _remember_persons(root, lab, taken)
     known = read_class(root, lab)
-    for student in gone:
+    for student in (*gone, *renamed):
         CoursePaths(root).feedback_page(student, lab).unlink(missing_ok=True)
-    for student, one in gone.items():
-        known[student] = one.model_copy(update={"left": True, "now": renamed.get(student, "")})
+        left = gone.get(student) or known[student]
+        known[student] = left.model_copy(update={"left": True, "now": renamed.get(student, "")})
     known.update(taken)
     content = _CLASS.dump_json(dict(sorted(known.items())), indent=1) + b"\n"
     path = CoursePaths(root).taken(lab)

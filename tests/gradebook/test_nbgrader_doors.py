@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import getpass
 import json
 import os
 import shutil
@@ -18,7 +19,9 @@ import toy
 from places import ROOT
 from served import address_of
 
+from autograder.core.history import Change, told
 from autograder.course.lab import load_lab
+from autograder.gradebook.grades import read_history
 from autograder.gradebook.own_courses import TEMPLATE, prepare_nbgrader
 from autograder.intake.collect import collect
 
@@ -182,12 +185,32 @@ def test_buttons_in_jupyterlab_take_the_same_way(root: Path, mark: Path) -> None
         assert fine == {"success": True, "value": {}}
         answer = post(address, "assignments/validate", path="build/submitted/bob/toy/toy.ipynb")
         graded = post(address, "formgrader/api/submission/toy/ann/autograde")
+        put(address, f"formgrader/api/grade/{grade_of(root, 'ann', 'check_talker')}", manual_score=1, extra_credit=None)
     assert answer["success"]
     assert [entry["source"] for entry in answer["value"]["failed"]] == ["The talker: failed, 0 of 3 points"]
     assert "A hidden check failed" in answer["value"]["failed"][0]["error"]
     assert graded["success"], graded
     assert points(root) == {"ann": 5.0}
+    first, second = told(read_history(root, toy.LAB)["ann"])
+    assert first.what.startswith("Graded with") and second.by == getpass.getuser()
+    assert second.changes == (Change("check_talker", "3 of 3", "1 of 3", "overruled by hand"),)
     assert not mark.exists()
+
+
+def put(address: str, where: str, **content: float | None) -> None:
+    """Give points as formgrader's page does."""
+    request = urllib.request.Request(f"{address}{where}", json.dumps(content).encode(), {"Authorization": "token x"})
+    request.method = "PUT"
+    with urllib.request.urlopen(request, timeout=300) as answer:
+        assert answer.status == 200
+
+
+def grade_of(root: Path, student: str, cell: str) -> str:
+    prepare_nbgrader()
+    from nbgrader.api import Gradebook
+
+    with Gradebook(f"sqlite:///{root / 'gradebook' / 'gradebook.db'}") as gradebook:
+        return str(gradebook.find_grade(cell, toy.LAB, toy.LAB, student).id)
 
 
 def points(root: Path) -> dict[str, float]:
