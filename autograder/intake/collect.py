@@ -239,9 +239,9 @@ def collect(
     students = named(recognised.claims, roster, known_persons(root, lab))
     missing = gone(source, students, roster, before)
     stop(source, students, reading, missing, before, accepted)
-    collected = Collected(_title(reading), reading.around, notes=list(reading.notes))
+    notes = [*reading.notes, *(roster.shared if roster is not None else [])]
+    collected = Collected(_title(reading), reading.around, notes=notes)
     others = [name for name in lab_names(root) if name != lab]
-    collected.notes += roster.shared if roster is not None else []
     collected.refused += [f"{sentence} It was left out." for sentence in recognised.strange]
     handed_in = {
         student.name: (student, *found)
