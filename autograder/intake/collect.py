@@ -239,8 +239,7 @@ def collect(
     students = named(recognised.claims, roster, known_persons(root, lab))
     missing = gone(source, students, roster, before)
     stop(source, students, reading, missing, before, accepted)
-    notes = [*reading.notes, *(roster.shared if roster is not None else [])]
-    collected = Collected(_title(reading), reading.around, notes=notes)
+    collected = Collected(_title(reading), reading.around, notes=[*reading.notes, *(roster.shared if roster else [])])
     others = [name for name in lab_names(root) if name != lab]
     collected.refused += [f"{sentence} It was left out." for sentence in recognised.strange]
     handed_in = {
