@@ -117,7 +117,9 @@ INSTRUCTORS = (
     "authoring",
     "gradebook",
     "report/class_page.py",
+    "report/answers_page.py",
     "report/term_page.py",
+    "report/templates/answers.html",
     "report/templates/class.html",
     "report/templates/term.html",
 )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -185,6 +186,10 @@ class CoursePaths:
     def bank_checked(self, lab: str) -> Path:
         """Return the file that says with which version the bank of a lab was run, and with which outcome."""
         return self.build / "bank" / f"{lab}.json"
+
+    def answers_page(self, lab: str, cell: str) -> Path:
+        """Return the page with all answers to a question, which is for instructors."""
+        return self.build / "report" / f"{lab}_{re.sub(r'[^A-Za-z0-9_-]', '-', cell)}.html"
 
     @property
     def term_page(self) -> Path:
