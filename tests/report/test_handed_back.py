@@ -39,6 +39,7 @@ from autograder.intake.which_format import read_class
 from autograder.report.class_page import write_class_page
 from autograder.report.export import FORMATS
 from autograder.report.feedback_page import Heading, Task, feedback_html
+from autograder.report.term_page import Appeal, write_term_page
 
 ROSTER = """id,name,email,section,canvas_id,moodle_id
 ann,"=Doe, Ann",ann@example.edu,A,12345,501
@@ -296,15 +297,19 @@ def test_a_page_on_which_most_is_wrong_is_no_longer_than_eight_screens(browser: 
     window.close()
 
 
-def test_both_pages_can_be_read_by_everybody_on_a_phone_and_on_paper(graded: Graded, browser: Any) -> None:
+def test_all_pages_can_be_read_by_everybody_on_a_phone_and_on_paper(graded: Graded, browser: Any) -> None:
     axe = pytest.importorskip("axe_playwright_python.sync_playwright")
     page = graded.root / "build" / "report" / "toy.html"
-    write_class_page(page, class_entries(graded.root, toy.LAB), datetime.date(2026, 11, 22))
+    entries, day = class_entries(graded.root, toy.LAB), datetime.date(2026, 11, 22)
+    write_class_page(page, entries, day)
+    appeal = Appeal("bob", toy.LAB, "check_talker", "2026-11-22", "It said hello.", "gradebook/appeals/toy.appeal.json")
+    term = write_term_page(page.with_name("term.html"), "ROS 2", entries, [toy.LAB], {toy.LAB: 2.0}, [appeal], day)
+    assert "weight 2" in term.read_text() and "autograder replay gradebook" in term.read_text()
     window = browser.new_page(viewport={"width": 390, "height": 800})
     window.set_default_timeout(1000 * BROWSER_SECONDS)
     outside: list[str] = []
     window.on("request", lambda request: None if request.url.startswith("file:") else outside.append(request.url))
-    for path in (page, graded.root / "build" / "feedback" / "bob" / "toy" / "toy.html"):
+    for path in (page, term, graded.root / "build" / "feedback" / "bob" / "toy" / "toy.html"):
         window.goto(path.as_uri())
         assert window.evaluate("document.documentElement.scrollWidth <= innerWidth")
         found = axe.Axe().run(window, options={"preload": False}).response["violations"]
@@ -316,5 +321,9 @@ def test_both_pages_can_be_read_by_everybody_on_a_phone_and_on_paper(graded: Gra
     window.click("#students th:nth-child(2) button")
     first = "#students tbody tr:first-child td:first-child a"
     assert window.inner_text(first) == "cem"
+    window.goto(page.as_uri())
+    window.emulate_media(media="print")
+    window.set_viewport_size({"width": 1030, "height": 700})  # a sheet of A4 across, within its margins
+    assert window.evaluate("document.documentElement.scrollWidth <= innerWidth")
     window.close()
     assert outside == []
