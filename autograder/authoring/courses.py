@@ -33,6 +33,7 @@ _IGNORED = """\
 # Files that can be generated again, and files with students' data.
 /build/
 /gradebook/
+/bank/
 /handed_in/
 /labs/*/nodes/
 /solutions/*/nodes/

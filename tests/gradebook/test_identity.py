@@ -15,6 +15,7 @@ from autograder.course.lab import load_lab
 from autograder.course.paths import CoursePaths
 from autograder.gradebook.class_run import ClassRun, Intake, grade_class
 from autograder.gradebook.grades import class_entries, read_grades, read_history
+from autograder.gradebook.renewal import renew_pages
 from autograder.grading.runner import Settings
 from autograder.intake.options import Accepted
 
@@ -83,6 +84,32 @@ def test_a_new_id_in_the_roster_is_the_same_person_after_a_question(course: Cour
     assert "8 of 9 points" in page and "(al07)" in page
     assert not any((folder / "ann").exists() for folder in (course.root / "build").iterdir())
     assert course.grade().told == []
+
+
+def test_all_labs_move_to_the_new_name(course: Course) -> None:
+    other = course.root / "solutions" / "other"
+    shutil.copytree(course.root / "solutions" / toy.LAB, other)
+    (other / f"{toy.LAB}.ipynb").rename(other / "other.ipynb")
+    course.roster("ann,Ann Lee,111")
+    course.hand_in("annlee_111_1")
+    course.grade()
+    (course.class_ / "annlee_111_1_toy.ipynb").rename(course.class_ / "annlee_111_1_other.ipynb")
+    settings = Settings(Isolation.NONE, canaries=False)
+    grade_class(course.root, "other", course.class_, settings)
+    course.roster("al07,Ann Lee,111")
+    run = grade_class(course.root, "other", course.class_, settings, Intake(accepted=[Accepted.RENAMED]))
+    assert run.told == ["ann is called al07 now; the grades and the history of other, toy have moved."]
+    assert {(one.student, one.lab): one.score for one in read_grades(course.root)} == {
+        ("al07", "other"): 5,
+        ("al07", toy.LAB): 5,
+    }
+    renew_pages(course.root)
+    entries = class_entries(course.root)
+    assert [(one.student, one.lab, one.stale) for one in entries] == [
+        ("al07", "other", False),
+        ("al07", toy.LAB, False),
+    ]
+    assert all(one.feedback is not None and one.known["canvas_id"] == "111" for one in entries)
 
 
 def test_one_number_of_two_students_is_told(course: Course) -> None:

@@ -54,6 +54,17 @@ from autograder.gradebook.grades import read_history
 events = told(read_history(Path(sys.argv[1]), toy.LAB)["ann"])
 print([change.why for event in events for change in event.changes if change.cell != "check_speaker"])
 """
+RENAME = """
+import sys
+from pathlib import Path
+import toy
+from autograder.gradebook.grades import read_grades
+from autograder.gradebook.renamed import move_renamed
+from autograder.intake.record import keep_class
+root = Path(sys.argv[1])
+keep_class(root, toy.LAB, {}, {}, {"bob": "rob"})
+print(move_renamed(root), [(one.student, one.score) for one in read_grades(root)])
+"""
 
 
 @pytest.fixture
@@ -119,3 +130,5 @@ def test_a_class_is_graded_into_a_server_and_again(server: str, tmp_path: Path) 
     assert "ann,toy,8,9,1\nbob,toy,5,9,1\n" in (root / "build" / "grades.csv").read_text()
     assert "8" in (root / "build" / "feedback" / "ann" / "toy" / "toy.html").read_text()
     assert [path.name for path in (root / "gradebook").iterdir()] == ["versions"]
+    moved = "['bob is called rob now; the grades and the history of toy have moved.']"
+    assert python(RENAME, root) == f"{moved} [('ann', 8.0), ('rob', 5.0)]"
