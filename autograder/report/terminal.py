@@ -227,7 +227,7 @@ def class_view(results: Sequence[SubmissionResult], by_hand: Mapping[str, str], 
             Text(f"{SYMBOL[status]} {_WORD[status]}", STYLE[status]),
             *([] if narrow else [Text(why_lost(result))]),
         )
-    below = [Text(), _reasons(results)] if narrow and any(map(why_lost, results)) else []
+    below: list[RenderableType] = [Text(), _reasons(results)] if narrow and any(map(why_lost, results)) else []
     return Group(table, *below, Text(), Text("\n".join(_legend(checks)), style="dim"))
 
 
