@@ -188,7 +188,7 @@ def test_help_on_each_command(root: Path) -> None:
 def test_a_class_is_graded_once_and_only_what_changed_again(root: Path) -> None:
     status, out, err = run(root, "grade", "toy", "class")
     assert status == 3, err
-    assert out.startswith("4 files of 4 students. All are used.")
+    assert out.startswith("4 files of 4 students. All are used.") and "\n4 submissions in " in out
     rows = {line.split()[0]: line for line in out.splitlines() if line[:4] in ("ann ", "bob ", "cem ", "dan ")}
     assert "5/5" in rows["ann"] and "✓ passed" in rows["ann"]
     assert "2/5" in rows["bob"] and "1 to grade" in rows["bob"] and "ZeroDiv" in rows["bob"]

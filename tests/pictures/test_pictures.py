@@ -92,7 +92,8 @@ def test_a_graph_and_a_table_of_pairs_cross_out_what_does_not_match() -> None:
     assert "/planner subscribes to /frames (reliable, deadline 0.05 s), no match: reliability." in drawn.alt
     pairs = qos("/frames", ENDS, mismatch)
     assert words(pairs).count("✗") == words(pairs).count("✓") == 1
-    assert "there is no subscription" in words(qos("/frames", ENDS[:1], mismatch))
+    lonely = qos("/frames", ENDS[:1], mismatch)
+    assert "there is no subscription" in words(lonely) and lonely.alt.endswith("There is no subscription.")
     assert "no node is on the graph" in words(graph([], []))
     assert drawn.alt.startswith("Graph of 4 nodes: /camera, /lonely, /planner, /viewer.")
     assert graph(["/camera"], []).alt.startswith("Graph of 1 node: /camera.")

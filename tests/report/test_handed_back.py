@@ -38,6 +38,7 @@ from autograder.intake.roster import read_roster
 from autograder.intake.which_format import read_class
 from autograder.report.class_page import write_class_page
 from autograder.report.export import FORMATS
+from autograder.report.export.entry import Entry
 from autograder.report.feedback_page import Heading, Task, feedback_html
 from autograder.report.term_page import Appeal, write_term_page
 
@@ -294,6 +295,29 @@ def test_a_page_on_which_most_is_wrong_is_no_longer_than_eight_screens(browser: 
     window.set_default_timeout(1000 * BROWSER_SECONDS)
     window.set_content(text)
     assert window.evaluate("document.documentElement.scrollHeight") < 8 * 800
+    window.close()
+
+
+def test_no_table_of_the_class_page_scrolls_sideways_at_1200_pixels(browser: Any, tmp_path: Path) -> None:
+    why = "The topic `/car/sensors/temperature_monitor/state` has another type, std_msgs/msg/Float64MultiArray."
+    failed = Outcome(status=Status.FAILED, title="a title", because=why, code="waits-for-a-service")
+    check = CheckResult(
+        grade_id="check_temperature_monitor", title="Warnings", max_points=3, points=0, outcomes=[failed]
+    )
+    entries = [
+        Entry(
+            student,
+            "toy",
+            SubmissionResult(student=student, lab="toy", digest="d", isolation=Isolation.FULL, checks=[check]),
+        )
+        for student in ("first.lastname@students.example.edu", "second.lastname@students.example.edu")
+    ]
+    page = write_class_page(tmp_path / "toy.html", entries, datetime.date(2026, 11, 22))
+    window = browser.new_page(viewport={"width": 1200, "height": 800})
+    window.set_default_timeout(1000 * BROWSER_SECONDS)
+    window.goto(page.as_uri())
+    too_wide = "[...document.querySelectorAll('.wide')].filter(one => one.scrollWidth > one.clientWidth).length"
+    assert window.evaluate(too_wide) == 0
     window.close()
 
 
