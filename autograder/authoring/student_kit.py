@@ -166,7 +166,7 @@ def write_kit(root: Path, book: Path | None, into: Path) -> Path:
     shutil.copy(paths.labs / "README.md", labs)
     if book is not None:
         shutil.copytree(book, folder / "lectures", ignore=_NOT_OURS)
-        for page in (folder / "lectures").glob("*.html"):
+        for page in (folder / "lectures").rglob("*.html"):
             text = _SLIDES.sub(lambda link: link["words"] or "", page.read_text(encoding="utf-8"))
             page.write_text(text, encoding="utf-8")
     settings = read_settings(root)
