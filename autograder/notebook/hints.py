@@ -8,7 +8,9 @@ from __future__ import annotations
 
 from typing import Any
 
-NAMES = ("FULL_NAME", "NAME_OR_NONE", "Program", "answers", "build", "command_line", "launch", "launch_file", "vary")
+NAMES = (
+    "FULL_NAME", "NAME_OR_NONE", "Program", "World", "answers", "build", "command_line", "launch", "launch_file", "vary"
+)  # fmt: skip
 """The names that the set-up cell defines: all names of `autograder.checks`, which this extension does not load."""
 _SAY = (
     "Run the first code cell of the notebook, the one with `%load_ext autograder`. It is needed again after every "
