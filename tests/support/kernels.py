@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from jupyter_client.blocking import BlockingKernelClient
 from jupyter_client.manager import KernelManager
 
 START = 180
@@ -42,9 +43,21 @@ class Notebook:
         self._manager.start_kernel(
             cwd=str(place), env={**os.environ, "JPY_SESSION_NAME": str(self.path), **environment}
         )
+        self._connect()
+
+    def _connect(self) -> None:
         self._client = self._manager.client()
         self._client.start_channels()
         self._client.wait_for_ready(timeout=START)
+        # A cell may run in another thread while a test asks a subshell, and neither ZeroMQ's sockets nor a session
+        # may be used by two threads. A page of JupyterLab has one thread.
+        self._beside = BlockingKernelClient()
+        self._beside.load_connection_file(self._manager.connection_file)
+        self._beside.start_channels(iopub=False, stdin=False, hb=False)
+
+    def _disconnect(self) -> None:
+        self._beside.stop_channels()
+        self._client.stop_channels()
 
     def save(self, *cells: tuple[str, str, dict[str, Any]], answers: dict[str, str] | None = None) -> None:
         """Save cells: id, source, metadata; and the answers' files by grade_id, as a released notebook says them."""
@@ -92,43 +105,41 @@ class Notebook:
 
     def open_subshell(self) -> str:
         """Open a subshell, as JupyterLab does for what widgets say, and return its id."""
-        request = self._client.session.msg("create_subshell_request", {})
-        self._client.control_channel.send(request)
+        request = self._beside.session.msg("create_subshell_request", {})
+        self._beside.control_channel.send(request)
         while True:
-            reply = self._client.get_control_msg(timeout=START)
+            reply = self._beside.get_control_msg(timeout=START)
             if reply["parent_header"].get("msg_id") == request["header"]["msg_id"]:
                 return str(reply["content"]["subshell_id"])
 
     def ask(self, subshell: str) -> None:
         """Let a subshell answer a request, and wait until it has; a cell may run meanwhile."""
         for _ in range(2):  # the first has been dealt with in full once the second is answered
-            request = self._client.session.msg("kernel_info_request", {})
+            request = self._beside.session.msg("kernel_info_request", {})
             request["header"]["subshell_id"] = subshell
-            self._client.shell_channel.send(request)
+            self._beside.shell_channel.send(request)
             while True:
-                reply = self._client.get_shell_msg(timeout=START)
+                reply = self._beside.get_shell_msg(timeout=START)
                 if reply["parent_header"].get("msg_id") == request["header"]["msg_id"]:
                     break
 
     def tell_widget(self, comm: str, content: dict[str, Any], subshell: str) -> None:
         """Send a widget's comm what a page sends when somebody presses a button; a cell may run meanwhile."""
         data = {"method": "custom", "content": content}
-        message = self._client.session.msg("comm_msg", {"comm_id": comm, "data": data})
+        message = self._beside.session.msg("comm_msg", {"comm_id": comm, "data": data})
         message["header"]["subshell_id"] = subshell
-        self._client.shell_channel.send(message)
+        self._beside.shell_channel.send(message)
 
     def interrupt(self) -> None:
         self._manager.interrupt_kernel()
 
     def restart(self) -> None:
-        self._client.stop_channels()
+        self._disconnect()
         self._manager.restart_kernel(now=True)
-        self._client = self._manager.client()
-        self._client.start_channels()
-        self._client.wait_for_ready(timeout=START)
+        self._connect()
 
     def close(self) -> None:
-        self._client.stop_channels()
+        self._disconnect()
         self._manager.shutdown_kernel()
 
 
