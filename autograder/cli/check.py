@@ -35,6 +35,9 @@ def check(
     as_json: JsonOption = False,
     junit: Annotated[Path | None, typer.Option(help="Also write JUnit XML to this file.")] = None,
     gradescope: Annotated[Path | None, typer.Option(help="Also write Gradescope's results.json to this file.")] = None,
+    classroom50: Annotated[
+        Path | None, typer.Option(help="Also write Classroom 50's result.json to this file.")
+    ] = None,
     instructor: Annotated[bool, typer.Option("--instructor", help="Show what the hidden checks look at.")] = False,
     isolation: Annotated[
         Isolation | None,
@@ -70,7 +73,7 @@ def check(
     while True:
         saved = signature(notebook)
         result = checked(notebook, found, settings, book, None if as_json else audience)
-        _write_exports(result, audience, junit, gradescope)
+        _write_exports(result, audience, junit, gradescope, classroom50)
         if as_json:
             from autograder.report.audience import result_for
 
@@ -125,9 +128,12 @@ def checked(
     return result
 
 
-def _write_exports(result: SubmissionResult, audience: Audience, junit: Path | None, gradescope: Path | None) -> None:
+def _write_exports(
+    result: SubmissionResult, audience: Audience, junit: Path | None, gradescope: Path | None, classroom50: Path | None
+) -> None:
     """Write the files that were asked for."""
     from autograder.core.files import write_beside
+    from autograder.report.export.classroom50 import result_json
     from autograder.report.export.gradescope import results_json
     from autograder.report.export.junit import junit_xml
 
@@ -135,6 +141,8 @@ def _write_exports(result: SubmissionResult, audience: Audience, junit: Path | N
         write_beside(junit, junit_xml([result], audience))
     if gradescope is not None:
         write_beside(gradescope, results_json(result))
+    if classroom50 is not None:
+        write_beside(classroom50, result_json(result, os.environ))
 
 
 def _tell_github(result: SubmissionResult, audience: Audience, notebook: Path, log: TextIO) -> None:

@@ -1,4 +1,4 @@
-"""Commands for the authors of a course: `new`, `trust`, `lint`, `release`, `kit`, `hub` and `gradescope`."""
+"""Commands for authors: `new`, `trust`, `lint`, `release`, `kit`, `hub`, `gradescope` and `classroom50`."""
 
 from __future__ import annotations
 
@@ -187,3 +187,19 @@ def gradescope(
     from autograder.course.paths import course_root
 
     print(write_gradescope(course_root(course), lab, file))
+
+
+@app.command()
+def classroom50(
+    lab: Annotated[str, typer.Argument(help="The lab, such as lab2_executors.")],
+    folder: Annotated[
+        Path, typer.Argument(metavar="DIR", help="CLASSROOM/autograders/ASSIGNMENT in the classroom's repository.")
+    ],
+    course: CourseOption = None,
+) -> None:
+    """Write a lab's autograder for Classroom 50, which checks each submission when it is pushed."""
+    from autograder.authoring.classroom50 import write_classroom50
+    from autograder.course.paths import course_root
+
+    for path in write_classroom50(course_root(course), lab, folder):
+        print(path)

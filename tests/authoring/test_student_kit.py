@@ -25,6 +25,7 @@ from linked import link_tree
 from places import ROOT
 from served import address_of
 
+from autograder.authoring.classroom50 import write_classroom50
 from autograder.authoring.student_kit import NAME, write_kit
 from autograder.core.errors import KitError
 from autograder.course.lab import lab_names
@@ -320,3 +321,59 @@ def test_submit_says_what_is_unsaved_outdated_ignored_or_empty_and_intake_takes_
 
     taken = collect(tmp_path, "toy", tmp_path / "course")
     assert taken.notebooks["ann"].read_bytes() == notebook.read_bytes()
+
+
+RUNNER = {
+    "CLASSROOM": "robotics",
+    "ASSIGNMENT": "toy",
+    "SUBMISSION_TAG": "submit/2026-11-20T18-30-00Z-a1b2c3d",
+    "COMMIT_URL": "https://git.example/robotics-toy-ann/commit/a1b2c3d",
+    "RELEASE_URL": "https://git.example/robotics-toy-ann/releases/tag/submit",
+}
+"""What Classroom 50's runner says to an autograder."""
+
+
+def test_classroom50_checks_what_is_pushed_with_the_students_kit(course: Path, tmp_path: Path) -> None:
+    made = write_classroom50(course, "toy", tmp_path / "robotics" / "autograders" / "toy")
+    assert [path.name for path in made] == ["autograder.py", "kit.zip"]
+    with zipfile.ZipFile(made[1]) as archive:
+        archive.extractall(tmp_path / "temp" / "students-kit")
+    kit = tmp_path / "temp" / "students-kit" / NAME
+    write_lock(kit, "requirements.lock", "uv")
+    assert make(kit, "setup").returncode == 0
+    for name in ("lib", "share"):
+        link_tree(Path(sys.prefix, name), kit / ".venv" / name)
+
+    checkout = tmp_path / "robotics-toy-ann"
+    shutil.copytree(kit / "labs" / "toy", checkout / "labs" / "toy")
+    shutil.copytree(kit / "kit" / "labs", checkout / "kit" / "labs")  # as in a template that holds the whole kit
+    notebook = checkout / "labs" / "toy" / "toy.ipynb"
+    notebook.write_text(notebook.read_text("utf-8").replace("# YOUR CODE HERE", "print('hello')", 1), "utf-8")
+    forged = checkout / "result.json"
+    forged.write_text('{"score": 1000}')
+
+    def pushed(**environ: str) -> subprocess.CompletedProcess[str]:
+        return subprocess.run(
+            [sys.executable, made[0]], cwd=checkout, env=ENVIRON | {"RUNNER_TEMP": str(tmp_path / "temp")} | environ,
+            capture_output=True, text=True, timeout=300, check=False,
+        )  # fmt: skip
+
+    done = pushed(**RUNNER)
+    assert done.returncode == 0, done.stderr
+    result = json.loads(forged.read_text("utf-8"))
+    assert (result["schema"], result["classroom"], result["review"]) == (
+        "classroom50/result/v1", "robotics", RUNNER["COMMIT_URL"],
+    )  # fmt: skip
+    assert (result["score"], result["max-score"]) == (300, 500)
+    assert [(test["score"], test["max-score"], test["passed"]) for test in result["tests"]] == [
+        (300, 300, True), (0, 200, False),
+    ]  # fmt: skip
+    assert result["tests"][0]["output"] == "up to 3 points, decided when the lab is graded"
+    assert "| The table | 0 of 2 points |" in (checkout / "release-body.md").read_text("utf-8")
+
+    done = pushed()
+    assert done.returncode == 1 and "its runner did not set CLASSROOM" in done.stderr and not forged.exists()
+    notebook.rename(notebook.with_name("a.ipynb"))
+    shutil.copy(notebook.with_name("a.ipynb"), notebook.with_name("b.ipynb"))
+    done = pushed(**RUNNER)
+    assert done.returncode == 1 and "labs/toy/a.ipynb, labs/toy/b.ipynb" in done.stderr and not forged.exists()
