@@ -11,10 +11,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
+from pydantic import BaseModel, ConfigDict
 
-from autograder.core.errors import KitError
-from autograder.core.files import write_beside
+from autograder.core.record import Record
 from autograder.course.cells import cell_digest, grade_id_of, source_of
 from autograder.course.paths import CoursePaths
 
@@ -30,7 +29,12 @@ class Version(BaseModel):
     """A digest of each cell that has a grade_id, as students receive it."""
 
 
-_VERSIONS = TypeAdapter(list[Version])
+_VERSIONS = Record(
+    list[Version],
+    list,
+    "which records the versions of the lab that students have received",
+    "students with an earlier version of the lab are then told that they changed its cells",
+)
 
 
 def versions(root: Path, lab: str) -> list[Version]:
@@ -39,18 +43,7 @@ def versions(root: Path, lab: str) -> list[Version]:
     Raises:
         KitError: the record cannot be read.
     """
-    path = CoursePaths(root).versions(lab)
-    try:
-        return _VERSIONS.validate_json(path.read_bytes())
-    except FileNotFoundError:
-        return []
-    except (OSError, ValidationError) as error:
-        why = error.strerror if isinstance(error, OSError) else "it is damaged"
-        raise KitError(
-            f"{path}, which records the versions of the lab that students have received, cannot be read: {why}.",
-            "Replace it with an earlier copy. If you have none, move it away; students with an earlier version of the"
-            " lab are then told that they changed its cells.",
-        ) from error
+    return _VERSIONS.read(CoursePaths(root).versions(lab))
 
 
 def remember(root: Path, lab: str, released: Sequence[Mapping[str, Any]]) -> None:
@@ -69,8 +62,7 @@ def remember(root: Path, lab: str, released: Sequence[Mapping[str, Any]]) -> Non
     cells.pop("", None)
     if not known or known[-1].cells != cells:
         now = datetime.datetime.now(datetime.UTC).replace(microsecond=0)
-        content = _VERSIONS.dump_json([*known, Version(since=now, cells=cells)], indent=1) + b"\n"
-        write_beside(CoursePaths(root).versions(lab), content)
+        _VERSIONS.write(CoursePaths(root).versions(lab), [*known, Version(since=now, cells=cells)])
 
 
 def digests_by_cell(known: Sequence[Version]) -> dict[str, frozenset[str]]:

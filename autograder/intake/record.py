@@ -8,10 +8,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
+from pydantic import BaseModel, ConfigDict
 
-from autograder.core.errors import KitError
-from autograder.core.files import write_beside
+from autograder.core.record import Record
 from autograder.course.paths import CoursePaths
 
 _OF_PLATFORMS = ("canvas_id", "moodle_id", "repository", "email")
@@ -41,7 +40,12 @@ class Taken(BaseModel):
     """The student's new name; empty if the student has none."""
 
 
-_CLASS = TypeAdapter(dict[str, Taken])
+_CLASS = Record(
+    dict[str, Taken],
+    dict,
+    "which records who was in the class in the last run",
+    "the next run then cannot tell who is missing or was replaced",
+)
 
 
 def read_class(root: Path, lab: str) -> dict[str, Taken]:
@@ -50,18 +54,7 @@ def read_class(root: Path, lab: str) -> dict[str, Taken]:
     Raises:
         KitError: the record cannot be read, so that it is unknown who is missing.
     """
-    path = CoursePaths(root).taken(lab)
-    try:
-        return _CLASS.validate_json(path.read_bytes())
-    except FileNotFoundError:
-        return {}
-    except (OSError, ValidationError) as error:
-        why = error.strerror if isinstance(error, OSError) else "this version of the kit uses another form"
-        raise KitError(
-            f"{path}, which records who was in the class in the last run, cannot be read: {why}.",
-            "Replace it with an earlier copy. If you have none, move the file away; the next run then cannot tell who"
-            " is missing or was replaced.",
-        ) from error
+    return _CLASS.read(CoursePaths(root).taken(lab))
 
 
 def left_class(root: Path, lab: str) -> set[str]:
@@ -76,7 +69,8 @@ def person(owner: Mapping[str, str]) -> tuple[str, str] | None:
 
 def known_persons(root: Path, lab: str) -> dict[tuple[str, str], str]:
     """Return the names in the gradebook of all persons who were taken in before, for this lab or for another."""
-    known = {(one.kind, one.value): one.name for one in _remembered(root) if one.lab in ("", lab)}
+    persons = _PERSONS.read(CoursePaths(root).persons)
+    known = {(one.kind, one.value): one.name for one in persons if one.lab in ("", lab)}
     folder = CoursePaths(root).taken(lab).parent
     others = [path.stem for path in sorted(folder.glob("*.json")) if path.stem != lab]
     for name in (*others, lab):  # this lab's record comes last, so it takes precedence
@@ -99,7 +93,7 @@ def rename_in_class(root: Path, lab: str, old: str, new: str) -> None:
     if old in known and not known[old].left:
         known.setdefault(new, known[old])
         known[old] = known[old].model_copy(update={"left": True, "now": new})
-        write_beside(CoursePaths(root).taken(lab), _CLASS.dump_json(dict(sorted(known.items())), indent=1) + b"\n")
+        _CLASS.write(CoursePaths(root).taken(lab), dict(sorted(known.items())))
 
 
 class _Person(BaseModel):
@@ -114,26 +108,16 @@ class _Person(BaseModel):
     name: str
 
 
-_PERSONS = TypeAdapter(list[_Person])
-
-
-def _remembered(root: Path) -> list[_Person]:
-    path = CoursePaths(root).persons
-    try:
-        return _PERSONS.validate_json(path.read_bytes())
-    except FileNotFoundError:
-        return []
-    except (OSError, ValidationError) as error:
-        why = error.strerror if isinstance(error, OSError) else "it is damaged"
-        raise KitError(
-            f"{path}, which remembers the names of the students, cannot be read: {why}.",
-            "Replace it with an earlier copy, or move it away; two students with the same name may then be called"
-            " differently than before.",
-        ) from error
+_PERSONS = Record(
+    list[_Person],
+    list,
+    "which remembers the names of the students",
+    "two students with the same name may then be called differently than before",
+)
 
 
 def _remember_persons(root: Path, lab: str, taken: Mapping[str, Taken]) -> None:
-    known = {(one.lab, one.kind, one.value): one for one in _remembered(root)}
+    known = {(one.lab, one.kind, one.value): one for one in _PERSONS.read(CoursePaths(root).persons)}
     before = dict(known)
     for name, one in taken.items():
         who = person(one.owner)
@@ -141,8 +125,7 @@ def _remember_persons(root: Path, lab: str, taken: Mapping[str, Taken]) -> None:
             where = lab if who[0] in _IN_EACH_LAB else ""
             known[where, *who] = _Person(lab=where, kind=who[0], value=who[1], name=name)
     if known != before:
-        content = _PERSONS.dump_json([known[key] for key in sorted(known)], indent=1) + b"\n"
-        write_beside(CoursePaths(root).persons, content)
+        _PERSONS.write(CoursePaths(root).persons, [known[key] for key in sorted(known)])
 
 
 def keep_class(
@@ -166,7 +149,4 @@ def keep_class(
         left = gone.get(student) or known[student]
         known[student] = left.model_copy(update={"left": True, "now": renamed.get(student, "")})
     known.update(taken)
-    content = _CLASS.dump_json(dict(sorted(known.items())), indent=1) + b"\n"
-    path = CoursePaths(root).taken(lab)
-    if not path.is_file() or path.read_bytes() != content:
-        write_beside(path, content)
+    _CLASS.write(CoursePaths(root).taken(lab), dict(sorted(known.items())))
