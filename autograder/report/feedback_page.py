@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import groupby
@@ -48,6 +49,11 @@ class Heading:
     name: str = ""
     handed_in: str = ""
     """The date and time of the submission; empty if they are not known."""
+
+    @property
+    def quoted(self) -> str:
+        """The student's id as a word of a shell command."""
+        return shlex.quote(self.student)
 
 
 @dataclass
@@ -126,6 +132,9 @@ def feedback_html(
                 "points": _points(of_task),
                 "verdict": _verdict(of_task, [checks[name] for name in task.graded if name in checks], task),
                 "graded": graded,
+                "lost": [
+                    name for name in task.graded if name not in decided and _lost(cells.get(name), checks.get(name))
+                ],
                 "programs": [(name, text) for name, text in task.answers.items() if name not in task.graded],
             }
         )
@@ -140,6 +149,7 @@ def feedback_html(
         parts=_parts(tasks, cells, sections),
         repairs=repairs,
         history=history,
+        lab=result.lab if result is not None else "",
         written=f"{written.day} {written:%B %Y}",
         version=result.kit_version if result is not None else VERSION,
         digest=result.digest[:12] if result is not None else "",
@@ -210,6 +220,13 @@ def _graded(cell: CellGrade, check: CheckResult | None, task: Task, decided: Dec
         decided=decided,
         answer=task.answers.get(cell.grade_id, ""),
     )
+
+
+def _lost(cell: CellGrade | None, check: CheckResult | None) -> bool:
+    """Return whether an attempted check lost points."""
+    if cell is None or check is None or cell.points is None or cell.points >= cell.max_points:
+        return False
+    return words.verdict(check) is not Verdict.NOT_ATTEMPTED
 
 
 def _repairs(tasks: Sequence[Task], cells: Mapping[str, CellGrade], checks: Mapping[str, CheckResult]) -> list[_Repair]:

@@ -226,6 +226,8 @@ def test_the_feedback_page_says_first_what_it_came_to_and_what_to_repair(graded:
     assert "2.5 of 9 points<" in bob and "after 1 point off for handing in late" in bob
     assert bob.index("What to repair first") < bob.index("3 points lost") < bob.index('id="task-1"')
     assert "What to repair first" not in ann
+    assert f"autograder appeal labs/{toy.LAB}/{toy.LAB}.ipynb" in bob and "--name bob" in bob
+    assert "autograder appeal" not in ann
     assert "2 of 9 points so far" in cem and "2 answers are not graded yet" in cem and "up to 7 points" in cem
     for page in graded.pages.values():
         assert "secret" not in page and "http" not in page.replace("http-equiv", "")
