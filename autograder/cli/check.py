@@ -118,12 +118,12 @@ def checked(
         book: the course's lectures, to which the report refers.
         audience: the reader for whom the report is printed while the checks run; None prints no report.
     """
-    from autograder.grading.runner import WORKERS_FOR_ONE, run_submission
+    from autograder.grading.runner import run_submission, workers_for_one
     from autograder.report.terminal import LiveReport
 
     student = notebook.parent.resolve().name
     with LiveReport([check.grade_id for check in lab.checks], audience, book) as report:
-        result = run_submission(notebook, student, lab, settings, workers=WORKERS_FOR_ONE, follower=report)
+        result = run_submission(notebook, student, lab, settings, workers=workers_for_one(), follower=report)
         report.finish(result)
     return result
 

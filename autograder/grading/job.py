@@ -64,6 +64,11 @@ class Job(BaseModel):
                 found.setdefault(folder, {})[path] = text
         return {package: files for package, files in found.items() if any(package in c.source for c in self.cells)}
 
+    def uses_interfaces(self, cell: Cell) -> bool:
+        """Whether a check, or a cell that runs before all checks, mentions a package of interfaces."""
+        seen = [cell, *(one for one in self.cells if one.points is None)]
+        return any(package in one.source for package in self.interfaces for one in seen)
+
     @property
     def checks(self) -> list[Cell]:
         """The cells that give points."""

@@ -16,7 +16,7 @@ from typing import Any
 from autograder.core.errors import KitError
 from autograder.core.results import Isolation, Outcome, Status
 from autograder.course.paths import is_students_kit, trusted_course
-from autograder.grading.runner import WORKERS_FOR_ONE, Settings, run_submission
+from autograder.grading.runner import Settings, run_submission, workers_for_one
 from autograder.report import words
 from autograder.report.audience import result_for
 from autograder.report.terminal import plain
@@ -77,7 +77,7 @@ def verdicts(root: Path, notebook: Path, invert: bool) -> Verdicts:
         lab = lab_of(notebook, None, root)
         isolation = most()[0] if is_students_kit() else choose(Isolation.FULL)
         student = notebook.resolve().parent.name
-        result = run_submission(notebook, student, lab, Settings(isolation=isolation), workers=WORKERS_FOR_ONE)
+        result = run_submission(notebook, student, lab, Settings(isolation=isolation), workers=workers_for_one())
     except (KitError, SetUpError) as error:
         return not_checked(notebook, error.what, error.do)
     result = result_for(result, "student")

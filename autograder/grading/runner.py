@@ -20,8 +20,10 @@ from autograder.grading.trusted_result import all_for_one_reason, lacks_a_result
 from autograder.submission.answers import Submission
 from autograder.submission.reader import read_submission
 
-WORKERS_FOR_ONE = 3
-"""The number of workers that share the checks of a single submission while somebody waits. Two cores are enough."""
+
+def workers_for_one() -> int:
+    """Return how many checks of a single submission run at the same time while somebody waits."""
+    return max(3, min(12, round(3 * cpus())))
 
 
 @dataclass(frozen=True)

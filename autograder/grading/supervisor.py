@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import threading
 import time
 from collections.abc import Callable, Sequence
@@ -62,6 +63,10 @@ class ResultListener:
         self._left, self._line = list(cells), bytearray()
         self._now()
 
+    def wait(self, what: str) -> None:
+        """Note that the worker cannot start yet, and what it waits for."""
+        self._tell((self._worker, what))
+
     def hear(self, data: bytes) -> None:
         """Take further output of the worker."""
         *ends, rest = data.split(b"\n")
@@ -90,6 +95,9 @@ class ResultListener:
         self._tell((self._worker, self._left[0].title or self._left[0].grade_id if self._left else ""))
 
 
+_STARTS = re.compile(r"\b(launch|launch_file|build)\(")
+"""The calls with which a check starts or builds something."""
+
 SECONDS_PER_CHECK = 120.0
 """Seconds that each check may take on average, in addition to the time for one check that gets stuck. On a quiet
 machine a check takes 10 s."""
@@ -116,28 +124,28 @@ def run_in_worker(job: Job, stop: threading.Event | None = None) -> SubmissionRe
 
 
 def run_in_workers(job: Job, workers: int, follower: Follower | None = None) -> SubmissionResult:
-    """Run a job's checks like `run_in_worker`, but with several workers that share the checks and run at the same time.
+    """Run a job's checks like `run_in_worker`, but several at the same time, each in a worker and a network of its own.
 
-    This is possible because checks do not depend on each other. With several workers, a person waits less for a single
-    submission. In a class, many submissions run at the same time anyway, so one worker for each is cheaper.
+    This is possible because checks do not depend on each other. A person waits less for a single submission, because a
+    check mostly waits for messages. In a class, many submissions run at the same time anyway, so one worker for each is
+    cheaper. Checks that use no package of interfaces do not wait until these are built.
 
     Args:
         job: the submission and its checks.
-        workers: the number of workers.
+        workers: the number of workers that run at the same time.
         follower: is told the result of each check while others still run.
     """
     began = time.monotonic()
-    if follower is not None and job.interfaces:
-        follower.at(0, "building the packages")
-    job = with_interfaces(job, workers)
-    shares = [share for share in (job.checks[number::workers] for number in range(workers)) if share]
     given_up = threading.Event()
     told: SimpleQueue[Told | Future[list[CheckResult]]] = SimpleQueue()
-    with ThreadPoolExecutor(max(1, len(shares)), thread_name_prefix="share") as pool:
+    shares = _shares(job) if workers > 1 else [job.checks]
+    with ThreadPoolExecutor(workers, thread_name_prefix="share") as pool, ThreadPoolExecutor(1, "build") as builder:
         try:  # the first share is already inside, because Ctrl-C may come before the last share has started
+            built = builder.submit(with_interfaces, job, workers, given_up) if job.interfaces else None
             for number, share in enumerate(shares):
+                waits_for = built if any(map(job.uses_interfaces, share)) else None
                 listener = ResultListener(number, told.put) if follower is not None else None
-                pool.submit(_run_share, job, share, given_up, listener).add_done_callback(told.put)
+                pool.submit(_run_when_built, job, waits_for, share, given_up, listener).add_done_callback(told.put)
             checks = _follow(told, len(shares), follower)
         except BaseException:  # the results of the shares are no longer needed
             given_up.set()
@@ -145,6 +153,34 @@ def run_in_workers(job: Job, workers: int, follower: Follower | None = None) -> 
     result = _result(job, checks, began)
     again = trusted_result.open_checks(job, result)
     return result if again is None else _again(again, result, follower)
+
+
+def _shares(job: Job) -> list[list[Cell]]:
+    """Return the checks as shares that begin in this order: one for each check that starts programs, the longest first.
+
+    How long a check takes is not known, but more happens in a long cell than in a short one. Checks that use packages
+    of interfaces come last, because these are built meanwhile. All checks that start nothing are one share, because
+    beginning a worker takes longer than they do.
+    """
+    starts = [cell for cell in job.checks if _STARTS.search(cell.source)]
+    starts.sort(key=lambda cell: (job.uses_interfaces(cell), -len(cell.source)))
+    others = [cell for cell in job.checks if cell not in starts]
+    return [share for share in (others, *([cell] for cell in starts)) if share]
+
+
+def _run_when_built(
+    job: Job,
+    built: Future[Job] | None,
+    share: Sequence[Cell],
+    stop: threading.Event | None,
+    listener: ResultListener | None,
+) -> list[CheckResult]:
+    """Run some of a job's checks, after the packages that they use have been built."""
+    if built is not None:
+        if listener is not None:
+            listener.wait("building the packages")
+        job = built.result()
+    return _run_share(job, share, stop, listener)
 
 
 def _again(job: Job, first: SubmissionResult, follower: Follower | None) -> SubmissionResult:
