@@ -29,6 +29,8 @@ for name in ("ARGS", "LAB", "NB", "MAKEFLAGS", "MFLAGS", "MAKEOVERRIDES"):
 
 # Courses of tests are nobody's, and stand in nobody's list.
 os.environ["XDG_CONFIG_HOME"] = NOBODYS = tempfile.mkdtemp(prefix="autograder-tests-")
+# What an earlier version of the kit has built says nothing about this one.
+os.environ["XDG_CACHE_HOME"] = NOBODYS
 
 BROWSER_SECONDS = 180
 """Far beyond what a step of a browser takes on a busy machine."""

@@ -2,7 +2,8 @@
 
 A build takes ten seconds of CPU time, and many students hand in the same interfaces. The result of a build depends only
 on the files, because it runs in a sandbox that contains nothing else, and no student's program runs in that sandbox
-before or during the build. A result is stored under a digest of the files and is used again only for the same files.
+before or during the build. A result is kept under a digest of the files and is used again only for the same files;
+`kept_builds` keeps it for later runs, too.
 """
 
 from __future__ import annotations
@@ -14,13 +15,12 @@ from concurrent.futures import ThreadPoolExecutor
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from autograder.core.results import Isolation
+from autograder.grading import kept_builds
 from autograder.grading.job import Job
 from autograder.packages.workspace import digest_of, missing_tools
 from autograder.sandbox.build import BUILD_SECONDS, BuildRun
 from autograder.sandbox.grading_sandbox import run_in_sandbox
 
-KEPT = 32
-"""The number of builds that are kept. A build of four interfaces has about 2 MiB."""
 _BUILDS = 3
 """The number of attempts if a build fails for an unknown reason; see `autograder.packages.fair_build`."""
 _STARTING = 30.0
@@ -79,15 +79,24 @@ def _build(sources: Sources, stop: threading.Event | None) -> BuildRun | None:
         known = _kept.get(key)
         if known is not None:
             return known
-        command, limit = ["autograder.grading.builder"], _BUILDS * BUILD_SECONDS + _STARTING
-        run = run_in_sandbox(command, sources.model_dump_json().encode(), sources.isolation, limit, stop)
-        try:
-            found = BuildRun.model_validate_json(run.stdout)
-        except ValidationError:
-            return None
-        with _lock:
-            if found.status >= 0 and not found.over:  # a build that was killed or stopped might succeed later
+        found = kept_builds.stored(sources.digest) if sources.isolation is Isolation.FULL else None
+        if found is None:
+            found = _run(sources, stop)
+            if found is not None and sources.isolation is Isolation.FULL:
+                kept_builds.store(sources.digest, found)
+        # A build that was killed or stopped might succeed later.
+        if found is not None and found.status >= 0 and not found.over:
+            with _lock:
                 _kept[key] = found
-                while len(_kept) > KEPT:
+                while len(_kept) > kept_builds.KEPT:
                     _building.pop(_kept.popitem(last=False)[0], None)
         return found
+
+
+def _run(sources: Sources, stop: threading.Event | None) -> BuildRun | None:
+    command, limit = ["autograder.grading.builder"], _BUILDS * BUILD_SECONDS + _STARTING
+    run = run_in_sandbox(command, sources.model_dump_json().encode(), sources.isolation, limit, stop)
+    try:
+        return BuildRun.model_validate_json(run.stdout)
+    except ValidationError:
+        return None

@@ -1,0 +1,100 @@
+"""Builds that are kept for later runs: used for the same files only, and out of reach of what is built."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from ros_packages import package
+
+from autograder.core.results import Isolation
+from autograder.course.lab import Cell
+from autograder.grading import builds
+from autograder.grading.job import Job
+from autograder.sandbox.build import BuildRun
+from autograder.sandbox.isolation import preflight
+
+pytestmark = pytest.mark.skipif(not preflight().full, reason="without full isolation no build is kept")
+
+PACKAGE_XML = """<?xml version="1.0"?>
+<package format="3">
+  <name>things</name>
+  <version>0.1.0</version>
+  <description>A package that installs one file.</description>
+  <maintainer email="nobody@example.org">nobody</maintainer>
+  <license>Apache-2.0</license>
+  <buildtool_depend>cmake</buildtool_depend>
+  <export><build_type>cmake</build_type></export>
+</package>
+"""
+CMAKE = """cmake_minimum_required(VERSION 3.8)
+project(things NONE)
+add_custom_target(nothing ALL)
+install(FILES package.xml DESTINATION share/things)
+"""
+
+
+@pytest.fixture
+def store(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    monkeypatch.setattr(builds, "_kept", type(builds._kept)())
+    return tmp_path / "autograder" / "builds"
+
+
+def built(cmake: str = CMAKE) -> BuildRun:
+    """Build the package as a new process does, which remembers nothing."""
+    builds._kept.clear()
+    files = package("things", {"package.xml": PACKAGE_XML, "CMakeLists.txt": cmake})
+    cells = [Cell(grade_id="check", points=1, source='with build("things") as package: pass')]
+    job = Job(student="ann", lab="lab", digest="0", isolation=Isolation.FULL, seed=1, files=files, cells=cells)
+    (run,) = builds.with_interfaces(job, 1).built.values()
+    return run
+
+
+def mark(store: Path) -> None:
+    """Write into each stored build that it was stored, to tell it from one that is made anew."""
+    for path in store.iterdir():
+        path.write_text(json.dumps({**json.loads(path.read_text()), "log": "stored"}))
+
+
+def test_a_stored_build_is_used_again_for_the_same_files_and_for_no_others(store: Path) -> None:
+    first = built()
+    assert first.status == 0 and "things/share/things/package.xml" in first.installed
+    mark(store)
+    again, other = built(), built(CMAKE + "# one more line\n")
+    assert (again.log, again.installed) == ("stored", first.installed)
+    assert other.status == 0 and other.log != "stored"
+
+
+def test_a_build_that_failed_is_not_stored(store: Path) -> None:
+    assert built("message(FATAL_ERROR no)\n").status != 0
+    assert list(store.iterdir()) == []
+
+
+@pytest.mark.parametrize("damage", ["others may write", "half a file"])
+def test_a_store_that_cannot_be_relied_on_is_not_used(store: Path, damage: str) -> None:
+    built()
+    mark(store)
+    if damage == "half a file":
+        for path in store.iterdir():
+            path.write_text(path.read_text()[:-10])
+    else:
+        store.chmod(0o777)
+    assert built().log != "stored"
+
+
+def test_what_is_built_can_neither_read_nor_write_the_store(store: Path) -> None:
+    built()
+    mark(store)
+    kept = {path.name: path.read_text() for path in store.iterdir()}
+    tries = f"""
+file(GLOB seen "{store}/*")
+message(STATUS "it sees: [${{seen}}]")
+execute_process(COMMAND sh -c "mkdir -p {store}; for f in {" ".join(kept)} new.json; do echo forged > {store}/$f; done")
+"""
+    run = built(CMAKE + tries)
+    assert run.status == 0 and "it sees: []" in run.log
+    now = {path.name: path.read_text() for path in store.iterdir()}
+    assert now.keys() >= kept.keys() and {name: now[name] for name in kept} == kept
+    assert len(now) == len(kept) + 1 and "new.json" not in now
