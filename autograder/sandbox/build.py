@@ -31,7 +31,7 @@ from autograder.sandbox.scratch import Scratch
 from autograder.sandbox.walls import bubblewrap, seccomp
 
 BUILD_SECONDS = 800.0
-"""The seconds that a build may take. Interfaces take 10 s on an idle machine, and many times as long on a busy one.
+"""The seconds that a build may take. Interfaces take 6 s on an idle machine, and many times as long on a busy one.
 
 A build that takes longer fails, unless other processes withheld the CPUs from it for the share `_WITHHELD` of that
 time.
@@ -46,7 +46,7 @@ _MEMORY = 1536 * MIB
 _PROCESSES = 64
 """The number of processes of a build at the same time; about 15 are usual."""
 _CPU = 300.0
-"""The seconds of CPU time of all processes of a build together. Interfaces take 13, or 50 on a machine that is four
+"""The seconds of CPU time of all processes of a build together. Interfaces take 10, or 40 on a machine that is four
 times slower."""
 _IDLE = 60.0
 """The total seconds in which no process of a build wants to compute. A build that is idle for longer waits for

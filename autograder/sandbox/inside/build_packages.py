@@ -48,10 +48,9 @@ function(_finish_targets)
       set_target_properties(${target} PROPERTIES INTERFACE_INCLUDE_DIRECTORIES "${folders}")
     endif()
   endforeach()
-  # Nearly all of the time goes into reading Fast CDR's headers, once for each file, so all files are compiled as one.
+  # Nearly all of the time goes into reading Fast CDR's headers, so up to eight files are compiled as one.
   if(TARGET ${PROJECT_NAME}__rosidl_typesupport_fastrtps_c)
-    set_target_properties(${PROJECT_NAME}__rosidl_typesupport_fastrtps_c PROPERTIES
-      UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 0)
+    set_target_properties(${PROJECT_NAME}__rosidl_typesupport_fastrtps_c PROPERTIES UNITY_BUILD ON)
   endif()
 endfunction()
 cmake_language(DEFER CALL _finish_targets)
