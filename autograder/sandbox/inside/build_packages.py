@@ -57,14 +57,14 @@ cmake_language(DEFER CALL _finish_targets)
 set_property(GLOBAL PROPERTY RULE_MESSAGES OFF)  # each takes a process
 set_property(GLOBAL PROPERTY TARGET_MESSAGES OFF)
 
-# rclpy on Fast DDS uses neither C++ nor introspection, and these take a third of a build's time. The generators are
-# called one after the other from a list, in which those of C++ and of introspection are not left. Of the modules that
-# connect Python with each type support, rclpy only imports the one that finds the right type support.
+# Nothing here uses C++, which takes a third of a build's time. The generators are called one after the other from a
+# list, in which those of C++ are not left. The type support for introspection has to stay, because Fast DDS's RMW
+# registers types with it. Of the modules that connect Python with each type support, rclpy imports only the one that
+# finds the right type support.
 macro(_leave_out_unused variable access)
   if("${access}" STREQUAL "MODIFIED_ACCESS" AND NOT _leaving_out)
     set(_leaving_out ON)
     list(FILTER ${variable} EXCLUDE REGEX "^rosidl_(generator|typesupport|typesupport_[a-z]+)_cpp:")
-    list(FILTER ${variable} EXCLUDE REGEX "^rosidl_typesupport_introspection_c:")
     macro(rosidl_generator_py_get_typesupports found)
       set(${found} rosidl_typesupport_c)
     endmacro()
