@@ -68,9 +68,9 @@ def _built_with() -> str:
 
 def _folder() -> Path | None:
     """Return the folder of the stored builds, in the user's cache; None if it is not this user's alone."""
-    home = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-    folder = Path(home) / "autograder" / "builds"
     try:
+        home = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+        folder = Path(home) / "autograder" / "builds"
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         found = folder.lstat()
     except (OSError, RuntimeError):
