@@ -1,0 +1,50 @@
+%%node square
+import math
+
+import rclpy
+from geometry_msgs.msg import Twist
+from nav_msgs.msg import Odometry
+from rclpy.executors import ExternalShutdownException
+from rclpy.node import Node
+
+HOME, SHOP, SCHOOL, PARK = (1.1, 1.1), (2.5, 1.1), (2.5, 2.5), (1.1, 2.5)  # the middles of the places: x and y in metres
+
+
+def way_to(place, odometry):
+    """Return the metres to a place, and the radians by which the car has to turn to look at it (to the left if positive)."""
+    pose = odometry.pose.pose
+    x, y = place[0] - pose.position.x, place[1] - pose.position.y
+    heading = 2 * math.atan2(pose.orientation.z, pose.orientation.w)
+    return math.hypot(x, y), math.remainder(math.atan2(y, x) - heading, math.tau)
+
+
+class Square(Node):
+    def __init__(self):
+        super().__init__("square")
+        self.wheels = self.create_publisher(Twist, "cmd_vel", 10)
+        self.create_timer(0.1, self.drive)
+        self.ticks = 0
+
+    def drive(self):
+        command = Twist()
+        side, step = divmod(self.ticks, 46)
+        if side < 4:
+            if step < 30:
+                command.linear.x = 0.5
+            else:
+                command.angular.z = math.pi / 2 / 1.6
+            self.ticks += 1
+            self.wheels.publish(command)
+
+
+def main():
+    rclpy.init()
+    try:
+        rclpy.spin(Square())
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    finally:
+        rclpy.try_shutdown()
+
+
+main()
