@@ -21,20 +21,19 @@ def way_to(place, odometry):
 class Square(Node):
     def __init__(self):
         super().__init__("square")
+        self.places = [SHOP, SCHOOL, PARK, HOME]
         self.wheels = self.create_publisher(Twist, "cmd_vel", 10)
-        self.create_timer(0.1, self.drive)
-        self.ticks = 0
+        self.create_subscription(Odometry, "odom", self.drive, 10)
 
-    def drive(self):
+    def drive(self, odometry):
         command = Twist()
-        side, step = divmod(self.ticks, 46)
-        if side < 4:
-            if step < 30:
-                command.linear.x = 0.5
-            else:
-                command.angular.z = math.pi / 2 / 1.6
-            self.ticks += 1
-            self.wheels.publish(command)
+        if self.places:
+            metres, turn = way_to(self.places[0], odometry)
+            command.linear.x = 0.6 if abs(turn) < 0.3 else 0.0
+            command.angular.z = 2.0 * math.radians(turn)
+            if metres < 0.15:
+                self.places.pop(0)
+        self.wheels.publish(command)
 
 
 def main():

@@ -22,14 +22,15 @@ class Square(Node):
     def __init__(self):
         super().__init__("square")
         self.places = [SHOP, SCHOOL, PARK, HOME]
+        self.count = 0
         self.wheels = self.create_publisher(Twist, "cmd_vel", 10)
         self.create_subscription(Odometry, "odom", self.drive, 10)
 
     def drive(self, odometry):
         command = Twist()
-        self.count = getattr(self, 'count', 0) + 1
-        if self.count < 50:
-            command.linear.x = -1.0
+        if len(self.places) == 3 and self.count < 60:  # at the shop it looks for the wall, and comes back
+            self.count += 1
+            command.linear.x = 1.0 if self.count < 36 else -0.6
         elif self.places:
             metres, turn = way_to(self.places[0], odometry)
             command.linear.x = 0.6 if abs(turn) < 0.3 else 0.0
