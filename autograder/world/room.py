@@ -179,6 +179,10 @@ def _drawn(name: str, cell: float, lines: list[str], letters: dict[str, str]) ->
             elif letter not in " .":
                 raise _refused(name, f"{letter!r} in line {number + 1} of the map, letter {column + 1}, has no meaning",
                                _FORM)  # fmt: skip
+            if letter in HEADINGS:  # a car that is drawn within a place stands on it
+                beside = {line[column - 1] if column else "", line[column + 1 : column + 2]}
+                if len(beside) == 1 and beside <= letters.keys():
+                    floor[row, column] = names.index(letters[beside.pop()])
     missing = [one for one in letters if all(one not in line for line in lines)]
     if missing:
         raise _refused(name, f"the map has no {missing[0]!r}, which `places` names", _FORM)

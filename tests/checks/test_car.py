@@ -57,7 +57,8 @@ def graded(check: str, program: str, **files: str) -> CheckResult:
 
 
 def test_a_car_that_gets_there_passes_and_the_report_has_its_trail() -> None:
-    check = 'with launch("p", world="street") as ros:\n    ros.car().expect_reached("end", within=20)\nros.score(1)'
+    check = 'with launch("p", world="street") as ros:\n    time = ros.car().expect_reached("end", within=20)\n'
+    check += '    ros.require(4 < time < 20, "It says when")\nros.score(1)'
     found = graded(check, DRIVES.format(speed=1.0, more=""))
     assert found.points == 1 and not found.flags, found
     picture = found.outcomes[0].picture
@@ -92,6 +93,13 @@ def test_a_program_that_sends_no_command_reads_why() -> None:
     found = graded(check, DRIVES.format(speed=1.0, more="").replace('"cmd_vel"', '"cmd_vell"'))
     failed = found.first_failure
     assert failed is not None and failed.code == "topic-name" and "/cmd_vell" in failed.because, failed
+
+
+def test_a_topic_of_the_world_is_not_taken_for_a_misspelt_one_of_the_students() -> None:
+    check = 'with launch("p", world="street") as ros:\n    ros.car().expect_driven(1.0, within=1)\nros.score(1)'
+    idle = "import rclpy\n\nrclpy.init()\nrclpy.spin(rclpy.create_node('idle'))\n"
+    failed = graded(check, idle).first_failure
+    assert failed is not None and "`/cmd_vel` has a subscription, but no publisher" in failed.because, failed
 
 
 @pytest.mark.parametrize(

@@ -54,6 +54,13 @@ def test_a_map_has_its_origin_below_on_the_left_and_a_car_looks_where_its_arrow_
     assert headings == pytest.approx([math.pi / 2, math.pi, -math.pi / 2])
 
 
+def test_a_car_that_is_drawn_within_a_place_stands_on_it() -> None:
+    room = hall(HALL.replace("# >      PP#", "# >     PvP#"))
+    assert [room.place_at(x, 1.25) for x in (1.25, 4.75)] == ["", "parking"]
+    beside = hall(HALL.replace("# >      PP#", "# >    v PP#"))
+    assert beside.place_at(3.75, 1.25) == ""
+
+
 @pytest.mark.parametrize("name", sorted(path.stem for path in MAPS.glob("*.yaml")))
 def test_each_room_of_the_kit_can_be_driven_in(name: str) -> None:
     world = Simulation(read_room(name))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NoReturn
 
 from geometry_msgs.msg import Twist
 from rclpy.qos import QoSProfile
@@ -102,13 +102,16 @@ class Car(Expectations):
             raise Misuse(f"place: the car cannot be at ({x}, {y}): {refused}.")
 
     @waits_for("the car to come to its place")
-    def expect_reached(self, place: str, *, within: float = 60.0, hint: str = "") -> None:
+    def expect_reached(self, place: str, *, within: float = 60.0, hint: str = "") -> float:
         """Its middle comes onto a place of the map, or was there before.
 
         Args:
             place: a name from `places:` of the map.
             within: seconds of the world, from now on.
             hint: a pointer for the student.
+
+        Returns:
+            when it came there for the first time, in seconds of the world.
 
         Example:
             `ros.car().expect_reached("parking", within=30)`
@@ -120,8 +123,9 @@ class Car(Expectations):
         came = self._wait_in_world(lambda: place in self._record.places, within)
         title = f"`{self.name}` reaches {place}"
         if came:
-            outcomes.passed(title, observed=f"after {self._record.places[place]:.1f} s", picture=self._picture())
-            return
+            time = self._record.places[place]
+            outcomes.passed(title, observed=f"after {time:.1f} s", picture=self._picture())
+            return time
         trail = self.trail()
         nearest = min(self._away(place, one) for one in trail)
         sample = next(one for one in trail if self._away(place, one) < nearest + NEARLY)
@@ -257,7 +261,7 @@ class Car(Expectations):
             return f"At {last.time:.1f} s its motors brake, because nothing came on {needs} for 0.3 s."
         return ""
 
-    def _fail_with(self, title: str, kind: Kind, text: str, sample: Sample, hint: str) -> None:
+    def _fail_with(self, title: str, kind: Kind, text: str, sample: Sample, hint: str) -> NoReturn:
         """Fail with the place at which it went wrong; if no command came at all, with why none came."""
         reason: Reason | None = kind(text.strip())
         if not self._record.commands:

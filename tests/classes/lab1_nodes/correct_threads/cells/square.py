@@ -1,0 +1,60 @@
+%%node square
+import math
+
+import rclpy
+from geometry_msgs.msg import Twist
+from nav_msgs.msg import Odometry
+from rclpy.executors import ExternalShutdownException
+from rclpy.node import Node
+
+HOME, SHOP, SCHOOL, PARK = (1.1, 1.1), (2.5, 1.1), (2.5, 2.5), (1.1, 2.5)  # the middles of the places: x and y in metres
+
+
+def way_to(place, odometry):
+    """Return the metres to a place, and the radians by which the car has to turn to look at it (to the left if positive)."""
+    pose = odometry.pose.pose
+    x, y = place[0] - pose.position.x, place[1] - pose.position.y
+    heading = 2 * math.atan2(pose.orientation.z, pose.orientation.w)
+    return math.hypot(x, y), math.remainder(math.atan2(y, x) - heading, math.tau)
+
+
+class Square(Node):
+    def __init__(self):
+        super().__init__("square")
+        from rclpy.callback_groups import ReentrantCallbackGroup
+        import threading
+        self.wheels = self.create_publisher(Twist, "cmd_vel", 10)
+        self.where = None
+        self.create_subscription(Odometry, "odom", lambda m: setattr(self, "where", m), 10)
+        threading.Thread(target=self.tour, daemon=True).start()
+
+    def tour(self):
+        import time
+        for goal in (SHOP, SCHOOL, PARK, HOME):
+            while rclpy.ok():
+                time.sleep(0.05)
+                if self.where is None:
+                    continue
+                metres, turn = way_to(goal, self.where)
+                if metres < 0.15:
+                    break
+                command = Twist()
+                command.linear.x = min(0.6, metres) if abs(turn) < 0.5 else 0.0
+                command.angular.z = 2 * turn
+                try:
+                    self.wheels.publish(command)
+                except Exception:
+                    return
+
+
+def main():
+    rclpy.init()
+    try:
+        rclpy.spin(Square())
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    finally:
+        rclpy.try_shutdown()
+
+
+main()
