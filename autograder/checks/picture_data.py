@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass
 
 from autograder import pictures
 from autograder.diagnosis.inside import Inside
-from autograder.graph.names import node_of
+from autograder.graph.names import UNKNOWN_NODE, node_of
 from autograder.graph.observer import Observer
 from autograder.graph.qos import describe, mismatch_between
 from autograder.pictures import Endpoint, Picture, Run, Runs, Traffic
 from autograder.reasons import Reason
 from autograder.sandbox.inside.probe.events import Ran, Thing
 
+_GET_STATE = "/get_state"
+"""The end of the name of the service that only a lifecycle node has."""
 _OF_EVERY_NODE = ("/rosout", "/parameter_events")
 _MOST = 60
 """Nodes, and ends of topics, of one picture."""
@@ -27,10 +29,16 @@ class Graph:
 
     nodes: Sequence[str]
     endpoints: Sequence[Endpoint]
+    lifecycle: Set[str]
+    """Those nodes that are lifecycle nodes."""
 
 
 def graph(observer: Observer) -> Graph:
-    """Look at the graph; what every node has by itself is left out."""
+    """Look at the graph.
+
+    What every node has by itself is left out, and so are hidden nodes: a command of `ros2` that looked at the graph is
+    one, and stays on it for a while after its end. The topics of an action are one thing.
+    """
     ends = []
     for topic in sorted(observer.topics()):
         if topic in _OF_EVERY_NODE or topic.endswith("/transition_event"):
@@ -38,8 +46,25 @@ def graph(observer: Observer) -> Graph:
         for publishes, found in ((True, observer.publishers(topic)), (False, observer.subscriptions(topic))):
             for end in found:
                 node = node_of(end)
-                ends.append(Endpoint(node, topic, publishes, describe(end.qos_profile)))
-    return Graph(observer.nodes()[:_MOST], ends[:_MOST])
+                if not _hidden(node):
+                    ends.append(_endpoint(node, topic, publishes, describe(end.qos_profile)))
+    # An action has two topics, each of which has these ends. Several ends of one node on a topic are kept.
+    actions = {(end.node, end.topic, end.publishes): end for end in ends if end.action}
+    ends = [*(end for end in ends if not end.action), *actions.values()]
+    nodes = [node for node in observer.nodes() if not _hidden(node)]
+    states = {name.removesuffix(_GET_STATE) for name in observer.services() if name.endswith(_GET_STATE)}
+    return Graph(nodes[:_MOST], ends[:_MOST], states)
+
+
+def _hidden(node: str) -> bool:
+    """Whether a name is hidden: the tools of ROS 2 list a node whose name begins with an underscore only with `-a`."""
+    return node.rpartition("/")[2].startswith("_") and not node.endswith(UNKNOWN_NODE)
+
+
+def _endpoint(node: str, topic: str, publishes: bool, policies: Mapping[str, str | float | None]) -> Endpoint:
+    action, inner, _ = topic.partition("/_action/")
+    # A server publishes the feedback and the status of its goals, and a client subscribes to them.
+    return Endpoint(node, action, publishes, action=True) if inner else Endpoint(node, topic, publishes, policies)
 
 
 def mismatch(offer: Endpoint, request: Endpoint) -> str | None:
@@ -71,27 +96,35 @@ def _runs_of(inside: Inside) -> list[Run]:
         on = numbers.setdefault(thread, len(numbers) + 1)
         over = (number, began, ended, thread) not in going_on
         # rclpy runs the execute callback of an action as a task of the executor, whatever the server's group is.
-        group = "outside of all groups" if thing.kind == "execute" else groups.get(thing.group_id, "")
-        found.append(Run(names[number], began, ended, on, group, thing.node, over))
+        group = "outside of all groups" if thing.kind in _NO_GROUP else groups.get(thing.group_id, "")
+        found.append(Run(names[number], began, ended, on, group, thing.node, over, inside.name))
     return found
 
 
 def _names(inside: Inside) -> dict[int, str]:
-    """A name for each callback: its function's, or what it belongs to; those of one name are numbered."""
-    plain = {thing.id: _name(thing) for thing in inside.things.values()}
-    total, so_far = Counter(plain.values()), Counter[str]()
+    """A name for each callback: its function's, or what it belongs to; those of one name in one node are numbered."""
+    plain = {thing.id: (thing.node, _name(thing)) for thing in inside.things.values()}
+    total, so_far = Counter(plain.values()), Counter[tuple[str, str]]()
     names = {}
     for number, name in plain.items():
         so_far[name] += 1
-        names[number] = f"{name} ({so_far[name]})" if total[name] > 1 else name
+        names[number] = f"{name[1]} ({so_far[name]})" if total[name] > 1 else name[1]
     return names
+
+
+_NO_GROUP = ("execute", "task", "")
+"""The kinds of callbacks that the probe knows without a group."""
 
 
 def _name(thing: Thing) -> str:
     function = re.match(r"(?:async )?def (\w+)", thing.code)
     if function:
         return function[1]
-    return f"timer {thing.period:g} s" if thing.kind == "timer" else f"{thing.kind} {thing.name}".strip()
+    if thing.kind == "timer":
+        return f"timer {thing.period:g} s"
+    if thing.kind == "action_server":  # each of its runs is one feedback message
+        return f"feedback of {thing.name}"
+    return f"{thing.kind} {thing.name}".strip() or (f"callback in {thing.line}" if thing.line else "rclpy itself")
 
 
 def _groups(inside: Inside) -> dict[int, str]:
@@ -124,7 +157,7 @@ def traffic(insides: Sequence[Inside], topic: str) -> list[Traffic]:
                 verb = "publishes" if thing.kind == "publisher" else "takes"
                 node = inside.nodes.get(thing.node)
                 since = node.made if node and node.made else None
-                rows[thing.kind].append(Traffic(f"{thing.node} {verb}", sorted(began[thing.id]), since))
+                rows[thing.kind].append(Traffic(f"{thing.node} {verb}", sorted(began[thing.id]), since, thing.runs))
     return rows["publisher"] + rows["subscription"]
 
 
