@@ -87,6 +87,7 @@ def _runs_of(inside: Inside) -> list[Run]:
         for began, thread in thing.running
     ]
     going_on = set(under_way)
+    only = next(iter(inside.nodes)) if len(inside.nodes) == 1 else ""
     numbers: dict[int, int] = {}
     found = []
     for number, began, ended, thread in [*told, *under_way]:
@@ -95,9 +96,8 @@ def _runs_of(inside: Inside) -> list[Run]:
             continue
         on = numbers.setdefault(thread, len(numbers) + 1)
         over = (number, began, ended, thread) not in going_on
-        # rclpy runs the execute callback of an action as a task of the executor, whatever the server's group is.
-        group = "outside of all groups" if thing.kind in _NO_GROUP else groups.get(thing.group_id, "")
-        found.append(Run(names[number], began, ended, on, group, thing.node, over, inside.name))
+        group = _OF_KIND.get(thing.kind) or groups.get(thing.group_id, "")
+        found.append(Run(names[number], began, ended, on, group, thing.node or only, over, inside.name))
     return found
 
 
@@ -112,8 +112,9 @@ def _names(inside: Inside) -> dict[int, str]:
     return names
 
 
-_NO_GROUP = ("execute", "task", "")
-"""The kinds of callbacks that the probe knows without a group."""
+_OF_KIND = {"execute": "outside of all groups", "task": "outside of all groups", "": "callback group not known"}
+"""What stands for the group of a callback whose kind says it. rclpy runs the execute callback of an action as a task of
+the executor, whatever the server's group is. The probe sees no group of a callback such as that for feedback."""
 
 
 def _name(thing: Thing) -> str:

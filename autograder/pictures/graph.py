@@ -79,7 +79,8 @@ def graph(
     for thing, layer in layers.items():
         columns.setdefault(layer, []).append(thing)
     rows = max((len(column) for column in columns.values()), default=1)
-    height = max(rows, 1) * (_ROW if rows <= _FEW else _LOW_ROW) + 30
+    words = max((len(_pieces(end, 1)) + 2 * bool(_refused(end, everyone, mismatch)) for end in everyone), default=0)
+    height = max(rows, 1) * max(_ROW if rows <= _FEW else _LOW_ROW, 20 + words * (SMALL + 4)) + 30
     canvas = Canvas(height, WIDTH)
     places = _places(columns, height)
     for (kind, name), (x, y, width) in places.items():
@@ -160,9 +161,7 @@ def _arrow(
     canvas.line([begin, goal], arrow=True, dashed=end.policies.get("reliability") == "best_effort")
     near, far = (begin, goal) if leaves_node else (goal, begin)  # at the topic, several arrows meet
     x, y = near[0] + _AWAY * (far[0] - near[0]), near[1] + _AWAY * (far[1] - near[1])
-    pieces = [*(["best effort"] if end.policies.get("reliability") == "best_effort" else []), *end.unusual()]
-    pieces = ["server" if end.publishes else "client"] if end.action else pieces
-    pieces += [f"{len(own)} times"] if len(own) > 1 else []
+    pieces = _pieces(end, len(own))
     for number, piece in enumerate(pieces):
         canvas.words(x, y - 10 - SMALL * (len(pieces) - 1 - number), piece, size=SMALL, anchor="middle", halo=True)
     if broken:
@@ -170,7 +169,16 @@ def _arrow(
         canvas.words(x, y + 28, broken, size=SMALL, anchor="middle", halo=True)
 
 
-_AWAY = 0.42
+def _pieces(end: Endpoint, times: int) -> list[str]:
+    """Return what an arrow says."""
+    if end.action:
+        pieces = ["server" if end.publishes else "client"]
+    else:
+        pieces = [*(["best effort"] if end.policies.get("reliability") == "best_effort" else []), *end.unusual()]
+    return [*pieces, *([f"{times} times"] if times > 1 else [])]
+
+
+_AWAY = 0.36
 """How far from its node the words of an arrow stand, as a part of the arrow."""
 
 
@@ -283,7 +291,7 @@ def _match(
     said = [policy] if narrow else [f"offers {offer.value(policy)}", f"asks {request.value(policy)}"]
     for number, words in enumerate(said):
         canvas.words(
-            centre, y + 45 + number * 19, shortened(words, column - 4, SMALL - 2), size=SMALL - 2, anchor="middle"
+            centre, y + 45 + number * 19, shortened(words, column - 4, SMALL - 3), size=SMALL - 3, anchor="middle"
         )
 
 

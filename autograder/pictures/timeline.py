@@ -215,8 +215,8 @@ def _sections(runs: Sequence[Run], by: str) -> list[_Section]:
         return _threads(runs)
     nodes = dict.fromkeys(run.node for run in runs)
     sections = []
-    for node in sorted(nodes, key=lambda node: not node):  # what belongs to no node comes last
-        owner = (f"node {node}" if node else "of no node") if len(nodes) > 1 else ""
+    for node in sorted(nodes, key=lambda node: not node):  # what is of no known node comes last
+        owner = (f"node {node}" if node else "node not known") if len(nodes) > 1 else ""
         for group in dict.fromkeys(run.group for run in runs if run.node == node):
             members = [run for run in runs if (run.node, run.group) == (node, group)]
             rows = []
