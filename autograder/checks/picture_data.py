@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence, Set
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from autograder import pictures
 from autograder.diagnosis.inside import Inside
@@ -145,7 +145,10 @@ def _groups(inside: Inside) -> dict[int, str]:
 
 
 def traffic(insides: Sequence[Inside], topic: str) -> list[Traffic]:
-    """When messages of a topic were published, and when subscriptions' callbacks got them, publishers first."""
+    """When messages of a topic were published, and when subscriptions' callbacks got them, publishers first.
+
+    Several ends of one node are numbered, in the order in which they were made.
+    """
     rows: dict[str, list[Traffic]] = {"publisher": [], "subscription": []}
     for inside in insides:
         began: dict[int, list[float]] = {number: [] for number in inside.things}
@@ -159,7 +162,13 @@ def traffic(insides: Sequence[Inside], topic: str) -> list[Traffic]:
                 node = inside.nodes.get(thing.node)
                 since = node.made if node and node.made else None
                 rows[thing.kind].append(Traffic(f"{thing.node} {verb}", sorted(began[thing.id]), since, thing.runs))
-    return rows["publisher"] + rows["subscription"]
+    found = rows["publisher"] + rows["subscription"]
+    total, so_far = Counter(row.who for row in found), Counter[str]()
+    for number, row in enumerate(found):
+        so_far[row.who] += 1
+        if total[row.who] > 1:
+            found[number] = replace(row, who=f"{row.who} ({so_far[row.who]})")
+    return found
 
 
 def explaining(reason: Reason, title: str, observer: Observer, insides: Sequence[Inside]) -> Picture | None:

@@ -49,7 +49,9 @@ class Endpoint:
 _HALF = 23.0
 """Half the height of a node and of a topic."""
 _TWO = 14.0
-"""The size of a name that takes two lines."""
+"""The size of a name that takes several lines."""
+_MANY = 4
+"""The number of columns from which they are narrow."""
 _ROW, _LOW_ROW, _FEW = 84.0, 66.0, 4
 """The height of a row, its height if there are many rows, and the number from which they count as many."""
 Mismatch = Callable[[Endpoint, Endpoint], str | None]
@@ -80,18 +82,20 @@ def graph(
         columns.setdefault(layer, []).append(thing)
     rows = max((len(column) for column in columns.values()), default=1)
     words = max((len(_pieces(end, 1)) + 2 * bool(_refused(end, everyone, mismatch)) for end in everyone), default=0)
+    many = max(columns, default=0) >= _MANY
+    half = _HALF + 7 * many  # a name takes up to three lines where there are many columns
     height = max(rows, 1) * max(_ROW if rows <= _FEW else _LOW_ROW, 20 + words * (SMALL + 4)) + 30
     canvas = Canvas(height, WIDTH)
     places = _places(columns, height)
     for (kind, name), (x, y, width) in places.items():
         if kind == "node":
-            canvas.oval(x - width / 2, y - _HALF, width, 2 * _HALF)
+            canvas.oval(x - width / 2, y - half, width, 2 * half)
         elif name in actions:
-            canvas.box(x - width / 2, y - _HALF, width, 2 * _HALF, round=_HALF / 2, line=2.6)
-            canvas.words(x, y - _HALF - 7, "action", size=SMALL, anchor="middle", italic=True)
+            canvas.box(x - width / 2, y - half, width, 2 * half, round=half / 2, line=2.6)
+            canvas.words(x, y - half - 7, "action", size=SMALL, anchor="middle", italic=True)
         else:
-            canvas.box(x - width / 2, y - _HALF, width, 2 * _HALF)
-        _label(canvas, x, y, name, width - (26 if kind == "node" else 14))
+            canvas.box(x - width / 2, y - half, width, 2 * half)
+        _label(canvas, x, y, name, width - (26 if kind == "node" and not many else 10), 3 if many else 2)
     for one in ends:
         own = [end for end in everyone if (end.node, end.topic, end.publishes != end.action) == one]
         _arrow(canvas, places, own, everyone, mismatch)
@@ -100,12 +104,12 @@ def graph(
     return canvas.picture(_alt(names, everyone, mismatch))
 
 
-def _label(canvas: Canvas, x: float, y: float, name: str, room: float) -> None:
-    """Write a name around a point, in two smaller lines if it is long."""
+def _label(canvas: Canvas, x: float, y: float, name: str, room: float, most: int) -> None:
+    """Write a name around a point, in at most so many smaller lines if it is long."""
     if width_of(name) <= room:
         canvas.words(x, y + 6, name, anchor="middle")
         return
-    lines = in_lines(name, room, _TWO)
+    lines = in_lines(name, room, _TWO, most)
     for number, line in enumerate(lines):
         canvas.words(x, y + 5 + (number - (len(lines) - 1) / 2) * (_TWO + 2), line, size=_TWO, anchor="middle")
 
@@ -133,7 +137,9 @@ def _places(
     room = WIDTH / count
     for layer, things in columns.items():
         for number, thing in enumerate(things):
-            width = min(max(width_of(thing[1]) + 34, 90), room * (0.78 if count < 4 else 0.62))
+            width = min(
+                max(width_of(thing[1]) + 34, 90), room * (0.78 if count < _MANY else 0.74 if count > _MANY else 0.66)
+            )
             y = height * (number + 0.5) / len(things)
             left, right = width / 2 + 6, WIDTH - width / 2 - 6
             x = left if layer == 0 else right if layer == count - 1 else room * (layer + 0.5)
@@ -156,7 +162,7 @@ def _arrow(
     begin = (x1 + (w1 / 2 if forth else -w1 / 2), y1)
     goal = (x2 + (-w2 / 2 if forth else w2 / 2), y2)
     if x1 == x2:
-        begin, goal = (x1, y1 + _HALF), (x2, y2 - _HALF)
+        begin, goal = (x1, y1 + _HALF * (1 if y2 > y1 else -1)), (x2, y2 - _HALF * (1 if y2 > y1 else -1))
     broken = _refused(end, everyone, mismatch)
     canvas.line([begin, goal], arrow=True, dashed=end.policies.get("reliability") == "best_effort")
     near, far = (begin, goal) if leaves_node else (goal, begin)  # at the topic, several arrows meet
