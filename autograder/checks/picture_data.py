@@ -18,6 +18,8 @@ from autograder.sandbox.inside.probe.events import Ran, Thing
 
 _GET_STATE = "/get_state"
 """The end of the name of the service that only a lifecycle node has."""
+_UNKNOWN = "(node not known yet)"
+"""The name of a node whose ends have already been discovered, but not the node itself."""
 _OF_EVERY_NODE = ("/rosout", "/parameter_events")
 _MOST = 60
 """Nodes, and ends of topics, of one picture."""
@@ -45,7 +47,7 @@ def graph(observer: Observer) -> Graph:
             continue
         for publishes, found in ((True, observer.publishers(topic)), (False, observer.subscriptions(topic))):
             for end in found:
-                node = node_of(end)
+                node = node_of(end) if end.node_name != UNKNOWN_NODE else _UNKNOWN
                 if not _hidden(node):
                     ends.append(_endpoint(node, topic, publishes, describe(end.qos_profile)))
     # An action has two topics, each of which has these ends. Several ends of one node on a topic are kept.
@@ -58,7 +60,7 @@ def graph(observer: Observer) -> Graph:
 
 def _hidden(node: str) -> bool:
     """Whether a name is hidden: the tools of ROS 2 list a node whose name begins with an underscore only with `-a`."""
-    return node.rpartition("/")[2].startswith("_") and not node.endswith(UNKNOWN_NODE)
+    return node.rpartition("/")[2].startswith("_")
 
 
 def _endpoint(node: str, topic: str, publishes: bool, policies: Mapping[str, str | float | None]) -> Endpoint:

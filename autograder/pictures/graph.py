@@ -109,9 +109,10 @@ def _label(canvas: Canvas, x: float, y: float, name: str, room: float, most: int
     if width_of(name) <= room:
         canvas.words(x, y + 6, name, anchor="middle")
         return
-    lines = in_lines(name, room, _TWO, most)
+    size = _TWO if most == 2 else _TWO - 1
+    lines = in_lines(name, room, size, most)
     for number, line in enumerate(lines):
-        canvas.words(x, y + 5 + (number - (len(lines) - 1) / 2) * (_TWO + 2), line, size=_TWO, anchor="middle")
+        canvas.words(x, y + 5 + (number - (len(lines) - 1) / 2) * (size + 2), line, size=size, anchor="middle")
 
 
 def _layers(nodes: Sequence[str], ends: Sequence[tuple[str, str, bool]]) -> dict[tuple[str, str], int]:
@@ -137,9 +138,7 @@ def _places(
     room = WIDTH / count
     for layer, things in columns.items():
         for number, thing in enumerate(things):
-            width = min(
-                max(width_of(thing[1]) + 34, 90), room * (0.78 if count < _MANY else 0.74 if count > _MANY else 0.66)
-            )
+            width = min(max(width_of(thing[1]) + 34, 90), room * (0.66 if count == _MANY else 0.78))
             y = height * (number + 0.5) / len(things)
             left, right = width / 2 + 6, WIDTH - width / 2 - 6
             x = left if layer == 0 else right if layer == count - 1 else room * (layer + 0.5)
@@ -295,10 +294,9 @@ def _match(
     narrow = column < _LEAST_COLUMN
     canvas.words(centre, y + 24, "✗" if narrow else f"✗ {policy}", size=SMALL + 1, anchor="middle", bold=True)
     said = [policy] if narrow else [f"offers {offer.value(policy)}", f"asks {request.value(policy)}"]
+    size = SMALL - 4 if narrow else SMALL - 3
     for number, words in enumerate(said):
-        canvas.words(
-            centre, y + 45 + number * 19, shortened(words, column - 4, SMALL - 3), size=SMALL - 3, anchor="middle"
-        )
+        canvas.words(centre, y + 45 + number * 19, shortened(words, column - 4, size), size=size, anchor="middle")
 
 
 def _matches_in_words(topic: str, offers: Sequence[Endpoint], requests: Sequence[Endpoint], mismatch: Mismatch) -> str:

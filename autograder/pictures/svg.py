@@ -37,6 +37,9 @@ _DARK = {
     "#f2b091": "#8f3d12",
 }
 """The colours of all drawings, and what they become on a page that declares a dark colour scheme."""
+_NARROW = 0.53
+"""The ratio of a letter's width to its height in the names of nodes and topics, which have few capitals."""
+
 FILLS = ("#9bd3f5", "#f7c873", "#8fd6bf", "#e6bfd5", "#f4ee9c", "#d9d9d9", "#f2b091")
 """The colours of Okabe and Ito, lightened so that black text on them is readable."""
 
@@ -78,7 +81,7 @@ def in_lines(text: str, room: float, size: float = TEXT, lines: int = 2) -> list
 
     A name that is too long for all lines together is shortened in its middle.
     """
-    most = max(3, int(room / (size * LETTER)))
+    most = max(3, int(room / (size * _NARROW)))
     found = [""]
     for piece in re.findall(r"/?[^/_ ]*[_ ]?", text):
         if len(found[-1]) + len(piece) <= most or not found[-1]:
@@ -86,7 +89,7 @@ def in_lines(text: str, room: float, size: float = TEXT, lines: int = 2) -> list
         else:
             found.append(piece)
     if len(found) > lines or any(len(line) > most for line in found):
-        short = shortened(text, most * lines * size * LETTER, size)
+        short = shortened(text, most * lines * size * LETTER, size)  # which takes every letter for a wide one
         found = [short[first : first + most] for first in range(0, len(short), most)]
     return [line.strip() for line in found]
 
