@@ -34,6 +34,9 @@ from autograder.reasons import Reason, Refused
 from autograder.sandbox.environment import profile_environment, remove_logs
 from autograder.sandbox.running_programs import RunningPrograms
 
+_PROBE_WRITES = 0.3
+"""Seconds after which the probe of a program has written what it saw last, so that a picture has the end of a run."""
+
 
 class Launch(Ros):
     """A running launch: `ros` in a check cell. What can be asked of it stands in `autograder/checks/ros.py`."""
@@ -302,6 +305,8 @@ class Launch(Ros):
         if current.check.front_end is not None:
             with contextlib.suppress(ForgedGraph):
                 self._running.graph = picture_data.graph(self._observer)
+            if any(program.running() for _, program in self._running.programs):
+                self._observer.pause(_PROBE_WRITES)
             return
         varied = [node.may_vary_names() for node, _ in self._running.programs]
         if self._running.world is not None:

@@ -120,8 +120,10 @@ function steering(pad, send) {
 }
 
 function render({ model, el }) {
-  const { room, cars, programs } = model.get("scene");
+  const { room, cars, programs, still } = model.get("scene");
   el.classList.add("aw-view");
+  // The picture below, which stands for this view where it cannot be shown, is not needed while this view is shown.
+  const hidden = element(el, "style", {}, `.${still} { display: none; }`);
   const shadow = element(el, "div", { class: "aw-columns" });
   const left = element(shadow, "div", { class: "aw-left" });
   const move = drawRoom(left, room, cars);
@@ -166,6 +168,7 @@ function render({ model, el }) {
       clearInterval(here);
       stop();
       el.innerHTML = message.gone; // the picture, as an `<img>` of Python's own making
+      el.append(hidden);
       return;
     }
     move(message);

@@ -3,6 +3,9 @@
 The widget is made with anywidget, which brings its part of JupyterLab along and loads nothing from a network. As long
 as no page looks, nothing is sent. When the launch ends, the picture of the world with its trails takes the widget's
 place, so that the saved notebook shows it wherever it is opened.
+
+A notebook that is saved before that holds a widget which no other kernel knows, and for which JupyterLab shows only an
+error. Therefore the picture is also a second output, below the widget, which hides it as long as it is alive.
 """
 
 from __future__ import annotations
@@ -11,6 +14,7 @@ import contextlib
 import math
 import threading
 import time
+import uuid
 from collections.abc import Callable
 from itertools import islice
 from pathlib import Path
@@ -39,6 +43,12 @@ _EVERY_RAY = 6
 """Of the lidar's rays, one in so many is shown."""
 _TRAIL, _APART = 3000, 0.03
 """The points of a trail that are sent to a page that begins to look, and the metres between two of them."""
+_PICTURE_EVERY = 10.0
+"""The seconds after which the picture for a saved notebook is drawn again while a page looks."""
+_SEE_IT_LIVE = (
+    "This is a picture of the world, drawn shortly before the notebook was saved. The live view belongs to the kernel "
+    "in which the programs ran: to see it again, run the notebook's cells up to this one."
+)
 _RATES_OVER = 2.0
 """The seconds over which the rates of topics are counted."""
 
@@ -69,8 +79,11 @@ class WorldView:
         """The publishers through which a page drives, by the car's namespace."""
         self._keys: tuple[str, float, float, float] | None = None
         """The car that is driven by keys, its speeds, and until when."""
+        self._still_class = f"aw-still-{uuid.uuid4().hex[:12]}"
+        self._drawn_at = time.monotonic()
         self._widget = self._make_widget()
         self._display: Any = None
+        self._picture: Any = None
         self._over = threading.Event()
         self._thread = threading.Thread(target=self._feed, name="world view", daemon=True)
         self._show()
@@ -88,6 +101,7 @@ class WorldView:
             # A page that was loaded again does not know the output any more that is updated here: it gets the picture.
             self._widget.send({"gone": left["text/html"]})
             self._display.update(left, raw=True)
+            self._picture.update({"text/plain": ""}, raw=True)
 
     def _make_widget(self) -> Any:
         import anywidget
@@ -107,7 +121,14 @@ class WorldView:
 
         made = self._widget._repr_mimebundle_()
         live = made[0] if isinstance(made, tuple) else made
-        self._display = display({**live, **self._still()}, raw=True, display_id=True)
+        self._display = display({**live, "text/plain": "The live view of the world"}, raw=True, display_id=True)
+        self._picture = display(self._instead(), raw=True, display_id=True)
+
+    def _instead(self) -> dict[str, str]:
+        """Return what a page shows if it does not show the widget."""
+        still = self._still()
+        html = f'<div class="{self._still_class}">{still["text/html"]}<p>{_SEE_IT_LIVE}</p></div>'
+        return {"text/html": html, "text/plain": f"{still['text/plain']} {_SEE_IT_LIVE}"}
 
     def _still(self) -> dict[str, str]:
         picture = still(drawn(self._world.simulation))
@@ -122,6 +143,7 @@ class WorldView:
         ]
         return {
             "cars": self._names,
+            "still": self._still_class,
             "programs": list(dict.fromkeys(program.name for _, program in self._running.programs)),
             "room": {
                 "width": room.width,
@@ -203,6 +225,9 @@ class WorldView:
             with contextlib.suppress(Exception):  # a view that breaks must not end the kernel's other threads
                 self._widget.send(self._message())
                 self._answer_meanwhile()
+                if time.monotonic() - self._drawn_at > _PICTURE_EVERY:
+                    self._drawn_at = time.monotonic()
+                    self._picture.update(self._instead(), raw=True)
 
     def _answer_meanwhile(self) -> None:
         """Let the page's messages be dealt with while a cell runs.

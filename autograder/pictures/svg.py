@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from html import escape
 
@@ -15,6 +16,29 @@ WIDTH = 900.0
 LETTER = 0.58
 """The approximate ratio of a letter's width to its height. It is not exact because an `<img>` cannot choose its
 font."""
+
+_DARK = {
+    "#ffffff": "#1c1c1c",
+    "#fff": "#1c1c1c",
+    "#000000": "#f0f0f0",
+    "#000": "#f0f0f0",
+    "#444444": "#c4c4c4",
+    "#555555": "#a8a8a8",
+    "#bbbbbb": "#6a6a6a",
+    "#e4e4e4": "#454545",
+    "#f1f1f1": "#333333",
+    "#f6f6f6": "#2a2a2a",
+    "#9bd3f5": "#1f5f8b",
+    "#f7c873": "#855600",
+    "#8fd6bf": "#0b6b50",
+    "#e6bfd5": "#7d4665",
+    "#f4ee9c": "#645e00",
+    "#d9d9d9": "#595959",
+    "#f2b091": "#8f3d12",
+}
+"""The colours of all drawings, and what they become on a page that declares a dark colour scheme."""
+_NARROW = 0.53
+"""The ratio of a letter's width to its height in the names of nodes and topics, which have few capitals."""
 
 FILLS = ("#9bd3f5", "#f7c873", "#8fd6bf", "#e6bfd5", "#f4ee9c", "#d9d9d9", "#f2b091")
 """The colours of Okabe and Ito, lightened so that black text on them is readable."""
@@ -52,6 +76,24 @@ def shortened(text: str, room: float, size: float = TEXT) -> str:
     return f"{text[:head]}…{text[len(text) - (most - 1 - head) :]}"
 
 
+def in_lines(text: str, room: float, size: float = TEXT, lines: int = 2) -> list[str]:
+    """Return a name in lines that fit into `room`, broken before a slash or after an underscore where this is possible.
+
+    A name that is too long for all lines together is shortened in its middle.
+    """
+    most = max(3, int(room / (size * _NARROW)))
+    found = [""]
+    for piece in re.findall(r"/?[^/_ ]*[_ ]?", text):
+        if len(found[-1]) + len(piece) <= most or not found[-1]:
+            found[-1] += piece
+        else:
+            found.append(piece)
+    if len(found) > lines or any(len(line) > most for line in found):
+        short = shortened(text, most * lines * size * LETTER, size)  # which takes every letter for a wide one
+        found = [short[first : first + most] for first in range(0, len(short), most)]
+    return [line.strip() for line in found]
+
+
 class Canvas:
     """A sheet on which shapes are drawn in order, the later ones above the earlier ones."""
 
@@ -86,10 +128,11 @@ class Canvas:
         """Draw a rectangle without a border."""
         self._parts.append(f'<rect x="{x:.1f}" y="{y:.1f}" width="{width:.1f}" height="{height:.1f}" fill="{fill}"/>')
 
-    def oval(self, x: float, y: float, width: float, height: float, line: float = 1.6) -> None:
+    def oval(self, x: float, y: float, width: float, height: float, line: float = 1.6, *, dashed: bool = False) -> None:
         """Draw an ellipse in a rectangle."""
+        dashes = ' stroke-dasharray="6 4"' if dashed else ""
         shape = f'cx="{x + width / 2:.1f}" cy="{y + height / 2:.1f}" rx="{width / 2:.1f}" ry="{height / 2:.1f}"'
-        self._parts.append(f'<ellipse {shape} fill="#fff" stroke="#000" stroke-width="{line:g}"/>')
+        self._parts.append(f'<ellipse {shape} fill="#fff" stroke="#000" stroke-width="{line:g}"{dashes}/>')
 
     def words(
         self,
@@ -157,7 +200,7 @@ class Canvas:
         )
         arrow = (
             '<marker id="arrow" viewBox="0 0 10 10" refX="9" refY="5" markerWidth="9" markerHeight="9" '
-            'orient="auto-start-reverse" markerUnits="userSpaceOnUse"><path d="M0 0L10 5L0 10z"/></marker>'
+            'orient="auto-start-reverse" markerUnits="userSpaceOnUse"><path d="M0 0L10 5L0 10z" fill="#000"/></marker>'
             if "#arrow" in body
             else ""
         )
@@ -165,10 +208,21 @@ class Canvas:
             f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {self.width:g} {self.height:g}" '
             f'width="{self.width:g}" height="{self.height:g}" '
             'font-family="system-ui, Segoe UI, Roboto, Noto Sans, Liberation Sans, DejaVu Sans, sans-serif">'
-            f"<defs>{hatches}{arrow}</defs>"
+            f"<style>{_dark_scheme()}</style><defs>{hatches}{arrow}</defs>"
             f'<rect width="{self.width:g}" height="{self.height:g}" fill="#fff"/>{body}</svg>'
         )
         return Picture(svg=svg, alt=_printable(alt))
+
+
+def _dark_scheme() -> str:
+    """Return the style that swaps paper and ink on a page that declares a dark colour scheme.
+
+    The browser tells a picture in an `<img>` element which scheme the page around it declares.
+    """
+    rules = "".join(
+        f'[fill="{light}"]{{fill:{dark}}}[stroke="{light}"]{{stroke:{dark}}}' for light, dark in _DARK.items()
+    )
+    return f"@media (prefers-color-scheme:dark){{{rules}}}"
 
 
 def seconds_axis(canvas: Canvas, left: float, top: float, bottom: float, seconds: float) -> float:

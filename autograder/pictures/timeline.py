@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import itertools
 import statistics
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from autograder.core.results import Picture
 from autograder.pictures.svg import SMALL, TEXT, WIDTH, Canvas, seconds_axis, shortened, width_of
@@ -25,6 +26,8 @@ class Run:
     node: str = ""
     ended: bool = True
     """Whether it had ended; False if it was still running when it was last seen."""
+    program: str = ""
+    """The program in which it ran. Each program numbers its own threads."""
 
 
 class Runs(Sequence[Run]):
@@ -100,11 +103,17 @@ _LANE = 30.0
 """The height of one row of bars."""
 _HEAD = 26.0
 """The height of a heading above rows."""
+_GAP = 6.0
+"""The space above the heading of a node."""
 _MOST_LABEL = 270.0
 _MOST_LANES = 16
 """The number of rows of bars for one callback. If more runs overlap, the bars of the others cover each other."""
 _MOST_RUNS = 600
 """The largest number of bars in one panel of a picture."""
+
+
+_Callback = tuple[str, str]
+"""A node and the name of one of its callbacks."""
 
 
 @dataclass(frozen=True)
@@ -116,6 +125,26 @@ class _Row:
     lanes: Sequence[Sequence[Run]]
 
 
+@dataclass(frozen=True)
+class _Section:
+    """Rows below a heading: a node or program, which is said once, and a callback group of it."""
+
+    owner: str
+    group: str
+    rows: Sequence[_Row]
+
+
+@dataclass(frozen=True)
+class _Scale:
+    """How the bars are drawn."""
+
+    left: float
+    per_second: float
+    length: float
+    looks: Mapping[_Callback, int]
+    by: str
+
+
 def timeline(
     runs: Runs | Mapping[str, Runs], *, seconds: float | None = None, by: str = "callback", start: float | None = None
 ) -> Picture:
@@ -125,7 +154,7 @@ def timeline(
         runs: the runs of one launch, or those of several launches by their titles. The launches get panels below each
             other with a common time axis.
         seconds: the time to draw; by default, all of it, but not more than 4 s.
-        by: `callback` for a row for each callback below its group, or `thread` for a row for each thread.
+        by: `callback` for a row for each callback below its node and group, or `thread` for a row for each thread.
         start: the time at which to begin, in the time of the runs; by default, each panel begins with its first run.
 
     Raises:
@@ -143,58 +172,80 @@ def timeline(
         for title, own in panels.items()
     }
     looks = {
-        name: number for number, name in enumerate(dict.fromkeys(r.callback for own in shown.values() for r in own))
+        one: number for number, one in enumerate(dict.fromkeys(_callback(r) for own in shown.values() for r in own))
     }
-    groups = {title: _sections(own, by) for title, own in shown.items()}
-    labels = [row for sections in groups.values() for _, rows in sections for row in rows]
+    sections = {title: _sections(own, by) for title, own in shown.items()}
+    labels = [row for own in sections.values() for section in own for row in section.rows]
     left = 20 + min(
         _MOST_LABEL, max((max(width_of(r.label), width_of(r.below, SMALL)) for r in labels), default=60) + 10
     )
-    height = 12 + 2 * TEXT + 14 + sum(_height(title, sections) for title, sections in groups.items())
-    canvas = Canvas(height + (_LANE if by == "thread" else 0), WIDTH)
+    height = 12 + 2 * TEXT + 14 + sum(_height(title, own) for title, own in sections.items())
+    keys = _keys(shown, looks if by == "thread" else {}, _least(left, length))
+    lines = _key_lines(keys)
+    canvas = Canvas(height + len(lines) * _KEY_LINE, WIDTH)
     y = 8.0
-    for title, sections in groups.items():
+    for title, own in sections.items():
         if title:
             canvas.words(8, y + TEXT, title, bold=True)
             y += _HEAD
-        top = y
-        bottom = top + sum(_section_height(heading, rows) for heading, rows in sections)
-        last = title == list(groups)[-1]
-        per_second = (
-            seconds_axis(canvas, left, top, bottom, length) if last else _grid(canvas, left, top, bottom, length)
-        )
-        for heading, rows in sections:
-            y = _draw_section(canvas, y, heading, rows, left, per_second, length, looks, by)
-        if not sections:
+        bottom = y + sum(map(_section_height, own))
+        draw_grid = seconds_axis if title == list(sections)[-1] else _grid
+        scale = _Scale(left, draw_grid(canvas, left, y, bottom, length), length, looks, by)
+        for section in own:
+            y = _draw_section(canvas, y, section, scale)
+        if not own:
             canvas.words(left + 8, y + TEXT, "no callback ran", italic=True)
             y += _LANE
         y += 8
-    if by == "thread":
-        _legend(canvas, height, looks)
+    _draw_key(canvas, height, lines)
     return canvas.picture(_alt(shown, length))
 
 
+def _callback(run: Run) -> _Callback:
+    return (run.node, run.callback)
+
+
 def _moved(run: Run, zero: float) -> Run:
-    return Run(run.callback, run.begin - zero, run.end - zero, run.thread, run.group, run.node, run.ended)
+    return replace(run, begin=run.begin - zero, end=run.end - zero)
 
 
-def _sections(runs: Sequence[Run], by: str) -> list[tuple[str, list[_Row]]]:
-    """Return the headings, each with the rows below it."""
+def _sections(runs: Sequence[Run], by: str) -> list[_Section]:
+    """Return the headings, each with the rows below it. What belongs to one node stands together."""
     if by == "thread":
-        threads = sorted({run.thread for run in runs})
-        rows = [_Row(f"thread {number}", "", [[run for run in runs if run.thread == number]]) for number in threads]
-        return [("", rows)] if rows else []
-    nodes = {run.node for run in runs}
-    sections: dict[str, list[_Row]] = {}
-    for group in dict.fromkeys((run.node, run.group) for run in runs):
-        heading = ": ".join(filter(None, (group[0] if len(nodes) > 1 else "", group[1])))
-        members = [run for run in runs if (run.node, run.group) == group]
-        for name in dict.fromkeys(run.callback for run in members):
-            own = [run for run in members if run.callback == name]
-            threads_used = sorted({run.thread for run in own})
-            word = "thread" if len(threads_used) == 1 else "threads"
-            sections.setdefault(heading, []).append(_Row(name, f"{word} {_listed(threads_used)}", _lanes(own)))
-    return list(sections.items())
+        return _threads(runs)
+    nodes = dict.fromkeys(run.node for run in runs)
+    sections = []
+    for node in sorted(nodes, key=lambda node: not node):  # what is of no known node comes last
+        owner = (f"node {node}" if node else "node not known") if len(nodes) > 1 else ""
+        for group in dict.fromkeys(run.group for run in runs if run.node == node):
+            members = [run for run in runs if (run.node, run.group) == (node, group)]
+            rows = []
+            for name in dict.fromkeys(run.callback for run in members):
+                own = [run for run in members if run.callback == name]
+                rows.append(_Row(name, _on_threads(own), _lanes(own)))
+            sections.append(_Section(owner, group, rows))
+            owner = ""
+    return sections
+
+
+def _threads(runs: Sequence[Run]) -> list[_Section]:
+    """Return a row for each thread, below the program that it belongs to."""
+    programs = dict.fromkeys(run.program for run in runs)
+    sections = []
+    for program in programs:
+        own = [run for run in runs if run.program == program]
+        rows = [
+            _Row(f"thread {number}", "", [[run for run in own if run.thread == number]])
+            for number in sorted({run.thread for run in own})
+        ]
+        sections.append(_Section(f"program {program}" if len(programs) > 1 else "", "", rows))
+    return sections
+
+
+def _on_threads(runs: Sequence[Run]) -> str:
+    """Return in words on which threads these runs were."""
+    threads = sorted({run.thread for run in runs})
+    return f"{'thread' if len(threads) == 1 else 'threads'} {_listed(threads)}"
 
 
 def _listed(numbers: Sequence[int]) -> str:
@@ -221,12 +272,13 @@ def _row_height(row: _Row) -> float:
     return max(len(row.lanes) * _LANE, 44.0 if row.below else 36.0) + 4
 
 
-def _section_height(heading: str, rows: Sequence[_Row]) -> float:
-    return (_HEAD if heading else 0) + sum(_row_height(row) for row in rows)
+def _section_height(section: _Section) -> float:
+    headings = _HEAD * bool(section.group) + (_HEAD + _GAP) * bool(section.owner)
+    return headings + sum(map(_row_height, section.rows))
 
 
-def _height(title: str, sections: Sequence[tuple[str, Sequence[_Row]]]) -> float:
-    own = sum(_section_height(heading, rows) for heading, rows in sections) or _LANE
+def _height(title: str, sections: Sequence[_Section]) -> float:
+    own = sum(map(_section_height, sections)) or _LANE
     return own + (_HEAD if title else 0) + 8
 
 
@@ -237,23 +289,20 @@ def _grid(canvas: Canvas, left: float, top: float, bottom: float, seconds: float
     return per_second
 
 
-def _draw_section(
-    canvas: Canvas,
-    y: float,
-    heading: str,
-    rows: Sequence[_Row],
-    left: float,
-    per_second: float,
-    length: float,
-    looks: Mapping[str, int],
-    by: str,
-) -> float:
+def _draw_section(canvas: Canvas, y: float, section: _Section, scale: _Scale) -> float:
     """Draw a heading and its rows from `y` downwards, and return where the next heading begins."""
-    if heading:
-        canvas.band(8, y + 2, canvas.width - 16, _HEAD - 4)
-        canvas.words(14, y + TEXT, heading, size=SMALL, italic=True)
+    if section.owner:
+        y += _GAP
+        canvas.band(8, y + 1, canvas.width - 16, _HEAD - 2, "#e4e4e4")
+        canvas.line([(8, y + 1), (canvas.width - 8, y + 1)], line=1.6)
+        canvas.words(14, y + TEXT, section.owner, size=TEXT - 1, bold=True)
         y += _HEAD
-    for row in rows:
+    if section.group:
+        canvas.band(8, y + 2, canvas.width - 16, _HEAD - 4)
+        canvas.words(14, y + TEXT, section.group, size=SMALL, italic=True)
+        y += _HEAD
+    left = scale.left
+    for row in section.rows:
         height = _row_height(row)
         middle = y + height / 2
         canvas.words(
@@ -264,43 +313,94 @@ def _draw_section(
         top = middle - len(row.lanes) * _LANE / 2
         for lane in row.lanes:
             for run in lane:
-                _draw_run(canvas, run, left, top, per_second, length, looks[run.callback], by)
+                _draw_run(canvas, run, top, scale)
             top += _LANE
         y += height
     return y
 
 
-def _draw_run(
-    canvas: Canvas, run: Run, left: float, top: float, per_second: float, length: float, look: int, by: str
-) -> None:
-    begin, end = max(run.begin, 0.0), min(run.end, length)
-    x, width = left + begin * per_second, max((end - begin) * per_second, 4.0)
-    canvas.box(x, top + 3, width, _LANE - 6, look=look, dashed=not run.ended)
-    if by == "callback" and width > 34:
+_BADGE = 34.0
+"""The width from which a bar has the number of its thread."""
+
+
+def _draw_run(canvas: Canvas, run: Run, top: float, scale: _Scale) -> None:
+    begin, end = max(run.begin, 0.0), min(run.end, scale.length)
+    x, width = scale.left + begin * scale.per_second, max((end - begin) * scale.per_second, 4.0)
+    canvas.box(x, top + 3, width, _LANE - 6, look=scale.looks[_callback(run)], dashed=not run.ended)
+    if scale.by == "callback" and width > _BADGE:
         canvas.badge(x + width / 2, top + _LANE / 2, str(run.thread), SMALL - 1)
 
 
-def _legend(canvas: Canvas, y: float, looks: Mapping[str, int]) -> None:
-    x = 14.0
-    for name, look in looks.items():
-        canvas.box(x, y - 4, 26, 20, look=look)
-        canvas.words(x + 32, y + 12, name, size=SMALL)
-        x += 50 + width_of(name, SMALL)
+def _least(left: float, length: float) -> float:
+    """Return the seconds from which a bar has the number of its thread."""
+    return _BADGE / ((WIDTH - 24 - left) / length)
+
+
+@dataclass(frozen=True)
+class _Key:
+    """A mark, and what it means."""
+
+    words: str
+    look: int | None = None
+    dashed: bool = False
+    badge: bool = False
+
+
+_KEY_LINE = 28.0
+
+
+def _keys(shown: Mapping[str, Sequence[Run]], looks: Mapping[_Callback, int], badge_from: float) -> list[_Key]:
+    """Return what the marks in a picture mean; `looks` are those of callbacks that no row names."""
+    runs = [run for own in shown.values() for run in own]
+    names = Counter(name for _, name in looks)
+    keys = [
+        _Key(f"{name} of {node}" if names[name] > 1 and node else name, look) for (node, name), look in looks.items()
+    ]
+    if runs and not looks:
+        keys.append(_Key("one run of a callback"))
+        if any(run.end - run.begin > badge_from for run in runs):
+            keys.append(_Key("the thread on which it ran", badge=True))
+    if any(not run.ended for run in runs):
+        keys.append(_Key("still running when the picture was made", dashed=True))
+    return keys
+
+
+def _key_lines(keys: Sequence[_Key]) -> list[list[tuple[float, _Key]]]:
+    """Distribute the keys to lines; each is returned with where it begins."""
+    lines: list[list[tuple[float, _Key]]] = []
+    x = WIDTH
+    for key in keys:
+        width = 54 + width_of(key.words, SMALL)
+        if x + width > WIDTH:
+            lines.append([])
+            x = 14.0
+        lines[-1].append((x, key))
+        x += width
+    return lines
+
+
+def _draw_key(canvas: Canvas, y: float, lines: Sequence[Sequence[tuple[float, _Key]]]) -> None:
+    for line in lines:
+        for x, key in line:
+            if key.badge:
+                canvas.badge(x + 13, y + 6, "1", SMALL - 1)
+            else:
+                canvas.box(x, y - 4, 26, 20, look=key.look, dashed=key.dashed)
+            canvas.words(x + 34, y + 12, key.words, size=SMALL)
+        y += _KEY_LINE
 
 
 def _alt(shown: Mapping[str, Sequence[Run]], length: float) -> str:
     told = []
     for title, runs in shown.items():
-        own = Runs(runs)
+        several = len({run.node for run in runs}) > 1
         rows = []
-        for name in own.callbacks():
-            threads = sorted(own.threads(name))
-            times = "once" if own.count(name) == 1 else f"{own.count(name)} times, each"
-            rows.append(
-                f"{name} ran {times} for at most {own.longest(name):.2f} seconds, on "
-                f"{'thread' if len(threads) == 1 else 'threads'} {_listed(threads)}"
-            )
-        most = own.overlap()
+        for node, name in dict.fromkeys(map(_callback, runs)):
+            own = Runs(run for run in runs if _callback(run) == (node, name))
+            times = "once" if len(own) == 1 else f"{len(own)} times, each"
+            of = f" of {node}" if several and node else ""
+            rows.append(f"{name}{of} ran {times} for at most {own.longest(name):.2f} seconds, on {_on_threads(own)}")
+        most = Runs(runs).overlap()
         told.append(
             f"{title + ': ' if title else ''}{'; '.join(rows) or 'no callback ran'}"
             + (f"; at most {most} at once." if rows else ".")
@@ -309,6 +409,8 @@ def _alt(shown: Mapping[str, Sequence[Run]], length: float) -> str:
 
 
 _TOPIC_ROW = 58.0
+_APART = 6.0
+"""The least distance of two strokes, which are 2.6 wide."""
 
 
 @dataclass(frozen=True)
@@ -320,10 +422,14 @@ class Traffic:
     times: Sequence[float]
     since: float | None = None
     """When its node was created; None if that is not known."""
+    total: int | None = None
+    """How many messages there were, if `times` are only those of the first ones; None if they are all."""
 
 
 def arrivals(topic: str, traffic: Sequence[Traffic], *, seconds: float | None = None) -> Picture:
     """Draw a row for each end of a topic, and a stroke for each message.
+
+    Of strokes that would touch each other, only the first is drawn; the picture says how many are left out.
 
     Args:
         topic: the full name of the topic.
@@ -333,9 +439,12 @@ def arrivals(topic: str, traffic: Sequence[Traffic], *, seconds: float | None = 
     every = [time for row in traffic for time in (*row.times, *([row.since] if row.since is not None else []))]
     zero = min(every, default=0.0)
     length = seconds or max(max(every, default=0.0) - zero, 0.1) * 1.02
-    left = 24 + min(280.0, max((width_of(row.who) for row in traffic), default=80.0) + 8)
+    left = 24 + min(
+        280.0, max((max(width_of(row.who), width_of(_said(row), SMALL)) for row in traffic), default=80.0) + 8
+    )
     bottom = 42 + _TOPIC_ROW * max(1, len(traffic))
-    canvas = Canvas(bottom + 2 * TEXT + 14, WIDTH)
+    thinned = _thinned(traffic, zero, length, _APART * length / (WIDTH - 24 - left))
+    canvas = Canvas(bottom + 2 * TEXT + (14 if not thinned else 20 + 1.5 * SMALL), WIDTH)
     canvas.words(8, 26, topic, bold=True)
     per_second = seconds_axis(canvas, left, 40, bottom, length)
     for number, row in enumerate(traffic):
@@ -347,19 +456,41 @@ def arrivals(topic: str, traffic: Sequence[Traffic], *, seconds: float | None = 
             x = left + (row.since - zero) * per_second
             canvas.line([(x, y + 6), (x, y + 52)], dashed=True)
             canvas.words(x + 5, y + 18, "starts", size=SMALL - 1)
-        for time in row.times:
-            if 0 <= time - zero <= length:
-                x = left + (time - zero) * per_second
-                canvas.line([(x, y + 22), (x, y + 48)], line=2.6)
-    return canvas.picture(_arrivals_in_words(topic, traffic))
+        for time in _apart(row.times, zero, length, _APART / per_second):
+            x = left + (time - zero) * per_second
+            canvas.line([(x, y + 22), (x, y + 48)], line=2.6)
+    if thinned:
+        canvas.words(14, bottom + 2 * TEXT + 16 + SMALL, thinned, size=SMALL, italic=True)
+    return canvas.picture(_arrivals_in_words(topic, traffic, thinned))
+
+
+def _apart(times: Sequence[float], zero: float, length: float, least: float) -> list[float]:
+    """Return the times that are drawn: those in the picture, at least `least` seconds after the one before."""
+    found: list[float] = []
+    for time in times:
+        if 0 <= time - zero <= length and (not found or time - found[-1] >= least):
+            found.append(time)
+    return found
+
+
+def _thinned(traffic: Sequence[Traffic], zero: float, length: float, least: float) -> str:
+    """Return a sentence about the strokes that are left out; empty if none is."""
+    there = sum(len(_apart(row.times, zero, length, 0.0)) for row in traffic)
+    drawn = sum(len(_apart(row.times, zero, length, least)) for row in traffic)
+    if drawn == there:
+        return ""
+    return f"{drawn} of {there} messages are drawn: none that came within {least:.2g} s of the stroke before."
 
 
 def _said(row: Traffic) -> str:
-    return f"{len(row.times)} message{'s' * (len(row.times) != 1)}"
+    number = len(row.times)
+    if row.total is not None and row.total > number:
+        return f"the first {number} of {row.total} messages"
+    return f"{number} message{'s' * (number != 1)}"
 
 
-def _arrivals_in_words(topic: str, traffic: Sequence[Traffic]) -> str:
-    told = [f"Messages of {topic}, a stroke for each."]
+def _arrivals_in_words(topic: str, traffic: Sequence[Traffic], thinned: str) -> str:
+    told = [f"Messages of {topic}, a stroke for each.{f' {thinned}' if thinned else ''}"]
     for row in traffic:
         gaps = [later - earlier for earlier, later in zip(row.times, row.times[1:], strict=False)]
         rhythm = f", usually every {statistics.median(gaps):.2f} s, at most {max(gaps):.2f} s apart" if gaps else ""

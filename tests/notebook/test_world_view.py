@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import threading
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -46,6 +47,7 @@ def test_the_view_does_not_block_and_leaves_a_picture_with_the_trail(notebook: N
     assert driven.result == "True"
     ended = notebook.run("robot.stop()")
     assert "update_display_data" in ended.types and "The car drove" in ended.text, ended
+    assert "to see it again, run" in shown.html and "to see it again" not in ended.html
     assert "The car drove" in notebook.run("robot.draw.world()").result
     assert "moments from" in notebook.run("robot.draw.film()").result
 
@@ -124,4 +126,45 @@ def test_in_jupyterlab_it_is_driven_with_the_keyboard_and_tells_what_happens(bro
         for kernel in kernels(page, address, "world"):
             page.request.delete(f"{address}api/kernels/{kernel['id']}?token=lab")
         page.close()
+    window.close()
+
+
+SAVED_LIVE = """() => {
+  const picture = document.querySelector('[class^="aw-still-"] img');
+  return picture && picture.offsetHeight > 0 ? picture.alt + ' ' + picture.closest('div').innerText : '';
+}"""
+
+
+def test_a_notebook_saved_while_a_robot_runs_shows_its_picture_in_another_kernel(browser: Any, tmp_path: Path) -> None:
+    cells = [SET_UP, DRIVER, SHOWN]
+    made = [
+        {"cell_type": "code", "id": f"c{n}", "metadata": {}, "outputs": [], "execution_count": None, "source": source}
+        for n, source in enumerate(cells)
+    ]
+    about = {"kernelspec": {"name": "python3", "display_name": "Python 3", "language": "python"}}
+    saved = {"cells": made, "metadata": about, "nbformat": 4, "nbformat_minor": 5}
+    window = browser.new_context(viewport={"width": 1400, "height": 1000})
+    window.set_default_timeout(START_SECONDS * 1000)
+    with jupyter_lab(tmp_path) as (work, address):
+        path = work / "world.ipynb"
+        path.write_text(json.dumps(saved))
+        page, ran = run_all(window, address, "world")
+        assert not any(cell["error"] for cell in ran)
+        page.wait_for_selector(".aw-view")
+        assert page.locator("[class^='aw-still-'] img").count() == 1 and page.evaluate(SAVED_LIVE) == ""
+        page.keyboard.press("Control+s")
+        _until(page, "() => !document.querySelector('.jp-mod-dirty')")
+        deadline = time.monotonic() + START_SECONDS
+        while "aw-still-" not in path.read_text():
+            assert time.monotonic() < deadline, "the notebook was not saved with its output"
+            page.wait_for_timeout(200)
+        for kernel in kernels(page, address, "world"):
+            page.request.delete(f"{address}api/kernels/{kernel['id']}?token=lab")
+        page.close()
+
+        again = window.new_page()
+        again.goto(f"{address}lab/workspaces/again/tree/world.ipynb?token=lab&reset")
+        _until(again, f"() => ({SAVED_LIVE})().includes('A room of 6 m by 4 m')")
+        assert "to see it again, run the notebook's cells up to this one" in again.evaluate(SAVED_LIVE)
+        again.close()
     window.close()

@@ -53,7 +53,9 @@ def words(picture: Picture) -> str:
     """The texts of a drawing, which must be well-formed and hold nothing but shapes and words."""
     tree = ET.fromstring(picture.svg)
     tags = {element.tag.partition("}")[2] for element in tree.iter()}
-    assert tags <= {"svg", "defs", "pattern", "marker", "path", "rect", "ellipse", "circle", "text"}
+    assert tags <= {"svg", "style", "defs", "pattern", "marker", "path", "rect", "ellipse", "circle", "text"}
+    (style,) = (element.text or "" for element in tree.iter() if element.tag.endswith("style"))
+    assert style.startswith("@media (prefers-color-scheme:dark){") and "url" not in style
     assert "href" not in picture.svg
     return " | ".join(element.text or "" for element in tree.iter() if element.tag.endswith("text"))
 
@@ -84,6 +86,65 @@ def test_a_timeline_by_thread_has_a_row_for_each_thread() -> None:
     assert "thread 1 | thread 2 | thread 3" in words(timeline(Runs(BEATS + SLOW), by="thread"))
     with pytest.raises(ValueError, match="by='group'"):
         timeline(Runs(BEATS), by="group")
+
+
+def test_every_row_of_a_timeline_has_a_name_and_its_node() -> None:
+    runs = Runs([
+        Run("beat", 0, 0.1, 1, "reentrant group", "/robot", program="both"),
+        Run("show", 0.1, 0.9, 2, "default group (exclusive)", "/viewer", program="both"),
+        Run("camera", 0.2, 0.3, 1, "default group (exclusive)", "/robot", program="both"),
+        Run("beat", 0.4, 0.5, 1, "default group (exclusive)", "/viewer", False, program="both"),
+    ])  # fmt: skip
+    shown = words(timeline(runs)).split(" | ")
+    rows = [text for text in shown if text in ("node /robot", "node /viewer", "beat", "camera", "show")]
+    assert rows == ["node /robot", "beat", "camera", "node /viewer", "show", "beat"]
+    assert {"one run of a callback", "the thread on which it ran", "still running when the picture was made"} <= set(
+        shown
+    )
+    assert "beat of /robot ran once" in timeline(runs).alt and "beat of /viewer ran once" in timeline(runs).alt
+    assert {"beat of /robot", "beat of /viewer", "camera", "show"} <= set(
+        words(timeline(runs, by="thread")).split(" | ")
+    )
+
+
+def test_threads_of_two_programs_are_not_mixed() -> None:
+    runs = Runs([Run("a", 0, 1, 1, node="/a", program="one"), Run("b", 0, 1, 1, node="/b", program="two")])
+    shown = words(timeline(runs, by="thread")).split(" | ")
+    assert [text for text in shown if text.startswith(("program", "thread"))] == [
+        "program one", "thread 1", "program two", "thread 1",
+    ]  # fmt: skip
+
+
+def test_a_key_that_is_too_long_takes_several_lines() -> None:
+    runs = Runs(Run(f"callback_number_{n}_of_the_robot", n, n + 1, 1) for n in range(6))
+    picture = timeline(runs, seconds=8, by="thread")
+    for text in re.findall(r'<text x="([\d.]+)"[^>]*text-anchor="start"', picture.svg):
+        assert float(text) < 880
+
+
+def test_an_action_is_one_thing_between_its_client_and_its_server() -> None:
+    ends = [Endpoint("/dock", "/count", True, action=True), Endpoint("/planner", "/count", False, action=True)]
+    drawn = graph(["/dock", "/planner"], ends, mismatch)
+    assert {"action", "/count", "client", "server"} <= set(words(drawn).split(" | "))
+    assert drawn.alt.endswith("/dock is the server of the action /count. /planner is a client of the action /count.")
+
+
+def test_long_names_stay_apart() -> None:
+    names = ["/front_left_camera_publisher_of_the_robot", "/front_right_camera_publisher_of_the_robot"]
+    ends = [Endpoint(name, "/frames", False, BEST_EFFORT) for name in names]
+    for picture in (graph(names, ends), qos("/frames", [ENDS[0], *ends], mismatch)):
+        shown = words(picture)
+        assert "left_" in shown and "right_" in shown
+    many = qos(
+        "/frames", [ENDS[0], *(Endpoint(f"/viewer_{n}", "/frames", False, RELIABLE) for n in range(9))], mismatch
+    )
+    assert "S9" in words(many) and "/viewer_8: reliable" in words(many)
+
+
+def test_a_pair_that_does_not_match_shows_both_values_of_the_policy() -> None:
+    shown = words(qos("/frames", ENDS, mismatch)).split(" | ")
+    assert {"✗ reliability", "offers best effort", "asks reliable"} <= set(shown)
+    assert "(it offers best effort, and reliable is requested)" in qos("/frames", ENDS, mismatch).alt
 
 
 def test_a_graph_and_a_table_of_pairs_cross_out_what_does_not_match() -> None:
@@ -124,6 +185,15 @@ def test_arrivals_count_each_row() -> None:
     assert "usually every 0.10 s" in picture.alt
 
 
+def test_very_many_arrivals_are_thinned_out_and_the_picture_says_so() -> None:
+    times = [0.001 * n for n in range(5000) if not 2000 <= n < 2500]
+    picture = arrivals("/scan", [Traffic("/lidar publishes", times, 0.0, 9000)])
+    strokes = picture.svg.count('stroke-width="2.6"')
+    assert 50 < strokes < 150 and f"{strokes} of 4500 messages are drawn" in words(picture)
+    assert "the first 4500 of 9000 messages" in words(picture) and f"{strokes} of 4500 messages" in picture.alt
+    assert "are drawn" not in words(arrivals("/scan", [Traffic("/lidar publishes", times[:3000:300])]))
+
+
 @pytest.mark.parametrize("seconds", [0.02, 3.0, 7200.0, 1e6])
 def test_an_axis_of_seconds_fits_what_took_moments_and_what_took_days(seconds: float) -> None:
     shown = words(arrivals("/frames", [Traffic("/camera publishes", [0.0, seconds])])).split(" | ")
@@ -139,7 +209,9 @@ def test_a_forged_name_does_nothing() -> None:
         arrivals(NASTY, [Traffic(NASTY, [1.0])]),
         lifecycle(NASTY, []),
     ]
-    inert = re.compile(r'<img alt="[^"<>]*" src="data:image/svg\+xml;base64,[\w+/=]*" style="[^"<>]*">')
+    inert = re.compile(
+        r'<span style="[^"<>]*"><img alt="[^"<>]*" src="data:image/svg\+xml;base64,[\w+/=]*" style="[^"<>]*"></span>'
+    )
     for picture in drawn:
         words(picture)
         assert inert.fullmatch(picture.html())

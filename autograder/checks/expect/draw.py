@@ -66,10 +66,26 @@ class Draw(Expectations):
             `ros.draw.lifecycle("/camera")`
         """
         client = self._running.lifecycle_clients.get(node)
-        if client is None and self._running.graph is None and f"{node}/get_state" not in self._observer.services():
-            raise Misuse(f"lifecycle: `{node}` is no lifecycle node; it offers no service `{node}/get_state`.")
         changes = [change.step for change in client.changes] if client else []
+        if not changes and (client is None or self._running.graph is not None):
+            self._refuse_ordinary(node)
         return pictures.lifecycle(node, pictures.steps(changes))
+
+    def _refuse_ordinary(self, node: str) -> None:
+        """Refuse to draw a state machine that a node does not have.
+
+        Raises:
+            Misuse: it is no lifecycle node.
+        """
+        found = self._running.graph or picture_data.graph(self._observer)
+        if node in found.lifecycle:
+            return
+        if node not in found.nodes:
+            raise Misuse(f"lifecycle: there is no node `{node}`; there are {', '.join(found.nodes) or 'none'}.")
+        raise Misuse(
+            f"lifecycle: `{node}` is no lifecycle node but an ordinary one, which has no states to draw: it offers no "
+            f"service `{node}/get_state`."
+        )
 
     def arrivals(self, topic: str = "", *, seconds: float | None = None) -> Picture:
         """A picture of when each message of a topic was published, and when each subscription's callback got one.

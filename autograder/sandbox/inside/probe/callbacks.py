@@ -123,13 +123,24 @@ async def await_or_execute(callback: Any, *args: Any) -> Any:
 def _of_an_action(callback: Any) -> tuple[Thing, Executor | None]:
     """Return the thing and the executor of an action server's callback.
 
-    For a callback of something that cannot be watched, return a new thing that is not written, but only used on this
-    thread.
+    For a callback of something that is not watched, such as the feedback callback of an action client, return the thing
+    of the line in which the callback begins, or one thing for all callbacks that begin in none of the student's lines.
     """
     with quiet():
         known = action_callbacks[callback]
         return known.thing, ledger.known.get(getattr(known.node(), "executor", None))
+    with quiet():
+        return _at_line("", callback_line(callback), ""), None
     return Thing(events.ThingMade(kind="")), None
+
+
+def _at_line(kind: str, where: events.Where, node: str) -> Thing:
+    """Return the thing of a callback that is known only by its line."""
+    key = (kind, node, where.line)
+    if key not in _by_line:
+        _by_line[key] = Thing(events.ThingMade(kind=kind, node=node, **vars(where)))
+        ledger.add(_by_line[key])
+    return _by_line[key]
 
 
 def _check_return(callback: Any, kind: str, args: tuple[Any, ...], result: Any) -> None:
@@ -154,12 +165,7 @@ def _bad_return(kind: str, callback: Any, result: Any, expected: type) -> None:
 
 def noted(kind: str, callback: Callable[..., Any], node: str, expected: type | None) -> Callable[..., Any]:
     """Return a wrapper that notes the runs of a callback; `expected` is the type that the callback must return."""
-    where = callback_line(callback)
-    key = (kind, node, where.line)
-    if key not in _by_line:
-        _by_line[key] = Thing(events.ThingMade(kind=kind, node=node, **vars(where)))
-        ledger.add(_by_line[key])
-    thing = _by_line[key]
+    thing = _at_line(kind, callback_line(callback), node)
 
     @functools.wraps(callback)
     def call(*args: Any, **kwargs: Any) -> Any:
