@@ -72,7 +72,7 @@ def _runs_of(inside: Inside) -> list[Run]:
         over = (number, began, ended, thread) not in going_on
         # rclpy runs the execute callback of an action as a task of the executor, whatever the server's group is.
         group = "outside of all groups" if thing.kind == "execute" else groups.get(thing.group_id, "")
-        found.append(Run(names[number], began, ended, on, group, thing.node, over))
+        found.append(Run(names[number], began, ended, on, group, thing.node, over, thing.period))
     return found
 
 

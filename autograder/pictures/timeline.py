@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import statistics
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from autograder.core.results import Picture
 from autograder.pictures.svg import SMALL, TEXT, WIDTH, Canvas, seconds_axis, shortened, width_of
@@ -25,6 +25,8 @@ class Run:
     node: str = ""
     ended: bool = True
     """Whether it had ended; False if it was still running when it was last seen."""
+    period: float = 0.0
+    """The period of the timer that it belongs to, in seconds; 0 if it does not belong to a timer."""
 
 
 class Runs(Sequence[Run]):
@@ -175,7 +177,7 @@ def timeline(
 
 
 def _moved(run: Run, zero: float) -> Run:
-    return Run(run.callback, run.begin - zero, run.end - zero, run.thread, run.group, run.node, run.ended)
+    return replace(run, begin=run.begin - zero, end=run.end - zero)
 
 
 def _sections(runs: Sequence[Run], by: str) -> list[tuple[str, list[_Row]]]:

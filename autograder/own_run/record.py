@@ -1,0 +1,47 @@
+"""What one launch of a student's programs did, as plain data: callbacks, messages, state changes and the graph."""
+
+from __future__ import annotations
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from autograder.pictures import Endpoint, Run, Runs, Traffic
+
+SECONDS = 3.0
+"""The length of a record, from the first thing that happened. Questions are about this time only."""
+
+
+class StateChange(BaseModel):
+    """A step of a lifecycle node's state machine."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    node: str
+    start: str
+    goal: str
+    time: float
+    """Seconds from the beginning of the record."""
+
+
+class Record(BaseModel):
+    """One launch. All times are in seconds from the first thing that happened in it."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    recorded_by: str = ""
+    """The grade_id of the check that launched the programs."""
+    programs: tuple[str, ...] = ()
+    runs: tuple[Run, ...] = Field(default=(), max_length=2000)
+    traffic: dict[str, tuple[Traffic, ...]] = Field(default_factory=dict, max_length=60)
+    """The messages of each topic, by its full name."""
+    changes: tuple[StateChange, ...] = Field(default=(), max_length=200)
+    nodes: tuple[str, ...] = Field(default=(), max_length=60)
+    ends: tuple[Endpoint, ...] = Field(default=(), max_length=60)
+
+    def by(self, grade_id: str) -> Record:
+        """Return this record as that of a check."""
+        return self.model_copy(update={"recorded_by": grade_id})
+
+    @property
+    def callbacks(self) -> dict[str, Runs]:
+        """The runs of each node that has run a callback, by the node's full name."""
+        return {node: Runs(run for run in self.runs if run.node == node) for node in sorted({r.node for r in self.runs})}
