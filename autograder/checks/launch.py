@@ -19,9 +19,9 @@ from autograder.checks.command_line import CommandLine
 from autograder.checks.launch_file import LaunchFile
 from autograder.checks.misuse import Misuse, refuse_other_class, refuse_text
 from autograder.checks.program import Program, file_of, refuse_to_start, why_missing, words_of
+from autograder.checks.recording import record
 from autograder.checks.robot import Log, Robot, end_robot, log_of, try_out
 from autograder.checks.ros import Ros
-from autograder.checks.recording import record
 from autograder.checks.running_launch import RunningLaunch
 from autograder.checks.scoring import Score, part, score
 from autograder.checks.waiting import NotLaunchedError

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import time
 from collections.abc import Sequence
 from dataclasses import replace
@@ -16,6 +17,7 @@ from autograder.pictures import Run, Traffic
 if TYPE_CHECKING:
     from autograder.checks.running_launch import RunningLaunch
 
+_NUMBER = re.compile(r" \(\d+\)$")
 _DIGITS = 4
 """Decimal places of a second that are kept."""
 
@@ -27,7 +29,7 @@ def record(running: RunningLaunch, insides: Sequence[Inside]) -> Record:
         running: the launch, whose programs still run.
         insides: its programs as their probes show them.
     """
-    runs = [run for run in picture_data.runs(insides) if run.node]
+    runs = _named_in_their_node([run for run in picture_data.runs(insides) if run.node])
     things = [thing for inside in insides for thing in inside.things.values()]
     topics = sorted({thing.name for thing in things if thing.kind in ("publisher", "subscription") and thing.node})
     traffic = {topic: picture_data.traffic(insides, topic) for topic in topics if not topic.startswith("/rosout")}
@@ -50,6 +52,17 @@ def record(running: RunningLaunch, insides: Sequence[Inside]) -> Record:
         nodes=tuple(graph.nodes),
         ends=tuple(graph.endpoints),
     )
+
+
+def _named_in_their_node(runs: Sequence[Run]) -> list[Run]:
+    """Return the runs without the number of a callback whose name no other callback of its node has."""
+    names = {(run.node, run.callback) for run in runs}
+    plain = {name: _NUMBER.sub("", name[1]) for name in names}
+    alone = {name for name in names if sum(n[0] == name[0] and plain[n] == plain[name] for n in names) == 1}
+    return [
+        replace(run, callback=plain[run.node, run.callback]) if (run.node, run.callback) in alone else run
+        for run in runs
+    ]
 
 
 def _moved(run: Run, zero: float) -> Run:

@@ -44,4 +44,18 @@ class Record(BaseModel):
     @property
     def callbacks(self) -> dict[str, Runs]:
         """The runs of each node that has run a callback, by the node's full name."""
-        return {node: Runs(run for run in self.runs if run.node == node) for node in sorted({r.node for r in self.runs})}
+        nodes = sorted({run.node for run in self.runs})
+        return {node: Runs(run for run in self.runs if run.node == node) for node in nodes}
+
+    def steps(self, node: str) -> list[tuple[str, str]]:
+        """Return the states that a lifecycle node left and entered, one pair for each change, in their order."""
+        return [(change.start, change.goal) for change in self.changes if change.node == node]
+
+    def active(self, node: str) -> list[tuple[float, float]]:
+        """Return when a lifecycle node became active, and when it was no longer active, once for each time.
+
+        A node that was still active at the end of the record was active up to this end.
+        """
+        came = [change.time for change in self.changes if change.node == node and change.goal == "active"]
+        left = [change.time for change in self.changes if change.node == node and change.start == "active"]
+        return [(time, min((other for other in left if other > time), default=SECONDS)) for time in came]

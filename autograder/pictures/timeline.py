@@ -324,16 +324,19 @@ class Traffic:
     """When its node was created; None if that is not known."""
 
 
-def arrivals(topic: str, traffic: Sequence[Traffic], *, seconds: float | None = None) -> Picture:
+def arrivals(
+    topic: str, traffic: Sequence[Traffic], *, seconds: float | None = None, start: float | None = None
+) -> Picture:
     """Draw a row for each end of a topic, and a stroke for each message.
 
     Args:
         topic: the full name of the topic.
         traffic: the messages of the publishers first, then those of the subscriptions.
-        seconds: the time to draw from the first event on; by default, all of it.
+        seconds: the time to draw; by default, all of it.
+        start: the time at which to begin, in the time of the messages; by default, the first event.
     """
     every = [time for row in traffic for time in (*row.times, *([row.since] if row.since is not None else []))]
-    zero = min(every, default=0.0)
+    zero = min(every, default=0.0) if start is None else start
     length = seconds or max(max(every, default=0.0) - zero, 0.1) * 1.02
     left = 24 + min(280.0, max((width_of(row.who) for row in traffic), default=80.0) + 8)
     bottom = 42 + _TOPIC_ROW * max(1, len(traffic))

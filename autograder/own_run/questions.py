@@ -1,0 +1,287 @@
+"""Finds questions about a record. Each function looks for moments of one kind that the picture shows beyond doubt.
+
+A source text says what can happen; which of it happened, when and how often, only the record says. Therefore the
+questions are about moments, numbers and orders of one run.
+"""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable, Iterator, Sequence
+from itertools import pairwise
+
+from autograder import pictures
+from autograder.own_run.question import Question
+from autograder.own_run.record import SECONDS, Record
+from autograder.pictures import Run, Runs
+
+EDGE = 0.015
+"""Seconds by which things must be apart if a question is about which of them came first."""
+_LONG = 0.03
+"""Seconds from which on a run of a callback is a bar in the picture and no stroke."""
+NONE = "none of them"
+_COUNTABLE = 25
+"""The number of strokes or bars that somebody can count in a picture."""
+
+
+def _whole(runs: Runs) -> Runs:
+    """Return the runs that the record has from their beginning to their end."""
+    return Runs(run for run in runs if run.ended and run.end < SECONDS)
+
+
+def _long_callbacks(runs: Runs) -> list[str]:
+    return [name for name in runs.callbacks() if runs.longest(name) >= _LONG]
+
+
+def _place(run: Run) -> str:
+    return f"from {run.begin:.2f} s to {run.end:.2f} s"
+
+
+def under_way(record: Record) -> Iterator[Question]:
+    """Ask which callback ran at a moment at which at most one of those that take time did."""
+    for node, runs in record.callbacks.items():
+        names = _long_callbacks(runs)
+        last = max((run.end for run in _whole(runs)), default=0.0)
+        for hundredth in range(5, int(100 * last), 7) if len(names) > 1 else ():
+            time = hundredth / 100
+            near = [run for run in runs.of(*names) if run.begin - EDGE < time < run.end + EDGE]
+            if not near and hundredth % 3:
+                continue  # otherwise nearly every answer would be that none was
+            if len(near) > 1 or any(abs(edge - time) < EDGE for run in near for edge in (run.begin, run.end)):
+                continue
+            yield Question(
+                kind="under_way",
+                about={"node": node, "time": time},
+                text=f"Which of the callbacks of `{node}` was under way at {time:.2f} s?",
+                choices=(*sorted(names), NONE),
+                view="timeline",
+                subject=node,
+            )
+
+
+def waited_for(record: Record) -> Iterator[Question]:
+    """Ask for which other callback a timer's callback had to wait that began late."""
+    for node, runs in record.callbacks.items():
+        others = len(runs.callbacks()) - 1
+        for name in runs.callbacks() if others > 1 else ():
+            for one, two in pairwise(runs.of(name)):
+                late = two.begin - one.begin - one.period
+                held = [run for run in _whole(runs) if run.callback != name and run.end - run.begin >= _LONG]
+                held = [run for run in held if abs(two.begin - run.end) < EDGE and run.begin < two.begin - late / 2]
+                same = [run for run in held if (run.group == two.group and "exclusive" in run.group)]
+                if one.period == 0 or late < max(0.4 * one.period, _LONG) or len(held) != 1 or len(same) != 1:
+                    continue
+                yield Question(
+                    kind="waited_for",
+                    about={"node": node, "callback": name, "time": two.begin},
+                    text=f"`{name}` of `{node}` began late at {two.begin:.2f} s."
+                    " The end of which callback did it wait for?",
+                    choices=tuple(sorted(set(runs.callbacks()) - {name})),
+                    view="timeline",
+                    subject=node,
+                )
+
+
+def began_during(record: Record) -> Iterator[Question]:
+    """Ask how often a callback began during one run of another one."""
+    for node, runs in record.callbacks.items():
+        for during in _whole(runs):
+            if during.end - during.begin < 2 * _LONG:
+                continue
+            for name in runs.callbacks():
+                begins = [run.begin for run in runs.of(name)]
+                edges = (during.begin, during.end)
+                if name == during.callback or any(abs(begin - edge) < EDGE for begin in begins for edge in edges):
+                    continue
+                yield Question(
+                    kind="began_during",
+                    about={"node": node, "callback": name, "begin": during.begin, "end": during.end},
+                    text=f"`{during.callback}` of `{node}` ran {_place(during)}."
+                    f" How many runs of `{name}` began in this time?",
+                    view="timeline",
+                    subject=node,
+                )
+
+
+def first_to_begin(record: Record) -> Iterator[Question]:
+    """Ask which other callback was the first to begin after one run had begun."""
+    for node, runs in record.callbacks.items():
+        names = runs.callbacks()
+        for run in _whole(runs) if len(names) > 2 else ():
+            after = [other for other in runs if other.callback != run.callback and other.begin >= run.begin - EDGE]
+            times = [other.begin for other in after[:2]]
+            if (
+                run.end - run.begin < _LONG
+                or len(times) < 2
+                or times[0] - run.begin < EDGE
+                or times[1] - times[0] < EDGE
+            ):
+                continue
+            yield Question(
+                kind="first_to_begin",
+                about={"node": node, "callback": run.callback, "begin": run.begin},
+                text=f"A run of `{run.callback}` of `{node}` began at {run.begin:.2f} s."
+                " Which other callback began next?",
+                choices=tuple(sorted(set(names) - {run.callback})),
+                view="timeline",
+                subject=node,
+            )
+
+
+def longest_pause(record: Record) -> Iterator[Question]:
+    """Ask after which run of a callback the longest pause came."""
+    for node, runs in record.callbacks.items():
+        for name in runs.callbacks():
+            begins = [run.begin for run in runs.of(name)]
+            pauses = sorted(((two - one), one) for one, two in pairwise(begins))
+            if not 4 <= len(begins) <= _COUNTABLE or pauses[-1][0] < max(1.15 * pauses[-2][0], pauses[-2][0] + EDGE):
+                continue
+            # The others are spread over the record, so that the place of the right one says nothing.
+            step = max(1, (len(begins) - 1) // 4)
+            shown = sorted({pauses[-1][1], *begins[:-1:step][:4]})
+            yield Question(
+                kind="longest_pause",
+                about={"node": node, "callback": name},
+                text=f"After which run of `{name}` of `{node}` was the time until its next run the longest?"
+                " Give the time at which that run began.",
+                choices=tuple(f"{begin:.2f} s" for begin in shown),
+                view="timeline",
+                subject=node,
+            )
+
+
+def threads_used(record: Record) -> Iterator[Question]:
+    """Ask on how many threads a callback ran."""
+    for node, runs in record.callbacks.items():
+        most = len(runs.threads())
+        for name in runs.callbacks() if most > 1 else ():
+            if runs.count(name) >= 3:
+                yield Question(
+                    kind="threads_used",
+                    about={"node": node, "callback": name},
+                    text=f"On how many different threads did the executor run `{name}` of `{node}`?",
+                    choices=tuple(map(str, range(1, most + 1))),
+                    view="timeline",
+                    subject=node,
+                )
+
+
+def longest_transition(record: Record) -> Iterator[Question]:
+    """Ask which callback of a transition took the longest."""
+    runs = Runs(run for run in _whole(Runs(record.runs)) if run.callback.startswith("on_") and run.period == 0)
+    runs = Runs(run for run in runs if run.group == "")
+    names = sorted({f"{run.callback} of {run.node}" for run in runs})
+    long = sorted(run.end - run.begin for run in runs)
+    if len(names) > 2 and long[-1] > 1.5 * long[-2] and long[-1] - long[-2] > EDGE:
+        yield Question(
+            kind="longest_transition",
+            about={},
+            text="Which callback of a lifecycle transition took the longest?",
+            choices=tuple(names),
+            view="timeline",
+            subject="",
+        )
+
+
+def nth_transition(record: Record) -> Iterator[Question]:
+    """Ask which transition a lifecycle node went through at one place of its way."""
+    for node in sorted({change.node for change in record.changes}):
+        labels = [step.label for step in pictures.steps(record.steps(node))]
+        for number in range(2, len(labels) + 1) if len(set(labels)) > 2 else ():
+            yield Question(
+                kind="nth_transition",
+                about={"node": node, "number": number},
+                text=f"Which transition was number {number} on the way of `{node}` in this run?",
+                choices=("activate", "cleanup", "configure", "deactivate", "shutdown"),
+                view="lifecycle",
+                subject=node,
+            )
+
+
+def sent_while_active(record: Record) -> Iterator[Question]:
+    """Ask how many messages a lifecycle node published on a topic while it was active."""
+    for topic, times, who in _sent(record):
+        for begin, end in record.active(who):
+            inside = sum(begin < time < end for time in times)
+            if (
+                end >= SECONDS
+                or inside > _COUNTABLE
+                or any(abs(time - edge) < EDGE for time in times for edge in (begin, end))
+            ):
+                continue
+            yield Question(
+                kind="sent_between",
+                about={"topic": topic, "begin": begin, "end": end},
+                text=f"`{who}` was active from {begin:.2f} s to {end:.2f} s. How many messages did it publish on"
+                f" `{topic}` in this time?",
+                view="arrivals",
+                subject=topic,
+            )
+
+
+def sent_between(record: Record) -> Iterator[Question]:
+    """Ask how many messages of a topic were published in a short time."""
+    for topic, times, _ in _sent(record):
+        for tenth in range(1, int(10 * max(times))) if len(times) > 3 else ():
+            begin, end = tenth / 10, tenth / 10 + 0.4
+            inside = sum(begin < time < end for time in times)
+            if inside > _COUNTABLE or any(abs(time - edge) < EDGE for time in times for edge in (begin, end)):
+                continue
+            yield Question(
+                kind="sent_between",
+                about={"topic": topic, "begin": begin, "end": end},
+                text=f"How many messages were published on `{topic}` from {begin:.1f} s to {end:.1f} s?",
+                view="arrivals",
+                subject=topic,
+            )
+
+
+def longest_silence(record: Record) -> Iterator[Question]:
+    """Ask after which message of a topic the longest silence came."""
+    for topic, times, _ in _sent(record):
+        gaps = sorted((two - one for one, two in pairwise(times)), reverse=True)
+        if 4 <= len(times) <= _COUNTABLE and gaps[0] > max(1.15 * gaps[1], gaps[1] + EDGE):
+            yield Question(
+                kind="longest_silence",
+                about={"topic": topic},
+                text=f"After which message on `{topic}` was the time until the next one the longest?"
+                " The first message is number 1.",
+                view="arrivals",
+                subject=topic,
+            )
+
+
+def _sent(record: Record) -> Iterator[tuple[str, list[float], str]]:
+    """Yield each topic that one node of the programs published, with the times of the messages and the node."""
+    for topic, rows in sorted(record.traffic.items()):
+        publishers = [row for row in rows if row.who.endswith(" publishes") and row.times]
+        nodes = {row.who.removesuffix(" publishes") for row in publishers}
+        if len(nodes) == 1:
+            yield topic, sorted(time for row in publishers for time in row.times), nodes.pop()
+
+
+KINDS: tuple[Callable[[Record], Iterator[Question]], ...] = (
+    under_way, waited_for, began_during, first_to_begin, longest_pause, threads_used, longest_transition,
+    nth_transition, sent_while_active, sent_between, longest_silence,
+)  # fmt: skip
+
+
+def chosen(records: Sequence[Record], seed: str, number: int) -> list[tuple[Record, Question]]:
+    """Choose questions at random, as far as possible each of another kind and about another launch.
+
+    Args:
+        records: of one submission.
+        seed: with the same seed and records, the questions are the same.
+        number: how many questions are wanted. There are fewer if the records do not have enough moments to ask about.
+    """
+    draw = random.Random(seed)
+    kinds = draw.sample(KINDS, len(KINDS))
+    found: list[tuple[Record, Question]] = []
+    for kind in (*kinds, *kinds):  # a second one of a kind only if there are not enough kinds
+        possible = [(record, question) for record in records for question in kind(record)]
+        fresh = [pair for pair in possible if pair[0] not in [record for record, _ in found]]
+        texts = [question.text for _, question in found]
+        possible = [pair for pair in fresh or possible if pair[1].text not in texts]
+        if possible and len(found) < number:
+            found.append(draw.choice(possible))
+    return found
