@@ -301,7 +301,7 @@ class Launch(Ros):
     def _look_back(self) -> None:
         """Keep what only the running programs show: in a notebook for a picture, else what contradicts itself."""
         if current.check.records is not None and self._running.programs:
-            with contextlib.suppress(ForgedGraph):
+            with contextlib.suppress(ForgedGraph, ValueError):  # a program may have told nonsense of itself
                 current.check.records.append(record(self._running, self._insides()))
         if current.check.front_end is not None:
             with contextlib.suppress(ForgedGraph):

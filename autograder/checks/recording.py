@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from autograder.checks import picture_data
 from autograder.diagnosis.inside import Inside
 from autograder.graph.lifecycle import in_order
-from autograder.own_run.record import SECONDS, Record, StateChange
+from autograder.own_run.record import LONGEST, MOST_RUNS, SECONDS, Record, StateChange
 from autograder.pictures import Run, Traffic
 
 if TYPE_CHECKING:
@@ -44,10 +44,12 @@ def record(running: RunningLaunch, insides: Sequence[Inside]) -> Record:
     graph = picture_data.graph(running.observer)
     return Record(
         programs=tuple(dict.fromkeys(described.program for described, _ in running.programs)),
-        runs=tuple(_moved(run, zero) for run in runs if run.begin - zero < SECONDS),
+        runs=tuple(_moved(run, zero) for run in runs[:MOST_RUNS] if run.begin - zero < SECONDS),
         traffic={topic: tuple(_within(row, zero) for row in rows) for topic, rows in traffic.items()},
         changes=tuple(
-            change.model_copy(update={"time": round(change.time - zero, _DIGITS)}) for change in changes[:200]
+            change.model_copy(update={"time": round(change.time - zero, _DIGITS)})
+            for change in changes[:200]
+            if change.time - zero < LONGEST
         ),
         nodes=tuple(graph.nodes),
         ends=tuple(graph.endpoints),
@@ -66,7 +68,7 @@ def _named_in_their_node(runs: Sequence[Run]) -> list[Run]:
 
 
 def _moved(run: Run, zero: float) -> Run:
-    return replace(run, begin=round(run.begin - zero, _DIGITS), end=round(run.end - zero, _DIGITS))
+    return replace(run, begin=round(run.begin - zero, _DIGITS), end=min(round(run.end - zero, _DIGITS), LONGEST))
 
 
 def _within(row: Traffic, zero: float) -> Traffic:

@@ -46,7 +46,7 @@ def _threads_used(record: Record, node: str, callback: str) -> int:
 
 
 def _longest_transition(record: Record) -> str:
-    runs = [run for run in record.runs if run.callback.startswith("on_") and run.group == "" and run.ended]
+    runs = [run for run in record.runs if run.callback.startswith("on_") and run.group == ""]
     longest = max(runs, key=lambda run: run.end - run.begin)
     return f"{longest.callback} of {longest.node}"
 
