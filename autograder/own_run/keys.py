@@ -45,6 +45,10 @@ def _threads_used(record: Record, node: str, callback: str) -> int:
     return len(record.callbacks[node].threads(callback))
 
 
+def _thread_of(record: Record, node: str, callback: str, begin: float) -> int:
+    return next(run.thread for run in record.callbacks[node].of(callback) if run.begin == begin)
+
+
 def _longest_transition(record: Record) -> str:
     runs = [run for run in record.runs if run.callback.startswith("on_") and run.group == ""]
     longest = max(runs, key=lambda run: run.end - run.begin)
@@ -77,6 +81,7 @@ _KEYS: dict[str, Any] = {
     "first_to_begin": _first_to_begin,
     "longest_pause": _longest_pause,
     "threads_used": _threads_used,
+    "thread_of": _thread_of,
     "longest_transition": _longest_transition,
     "nth_transition": _nth_transition,
     "sent_between": _sent_between,

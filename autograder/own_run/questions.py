@@ -19,6 +19,8 @@ EDGE = 0.015
 """Seconds by which things must be apart if a question is about which of them came first."""
 _LONG = 0.03
 """Seconds from which on a run of a callback is a bar in the picture and no stroke."""
+_WITH_NUMBER = 0.17
+"""Seconds from which on a bar has room for the number of its thread, in a picture of 3 s."""
 NONE = "none of them"
 _COUNTABLE = 25
 """The number of strokes or bars that somebody can count in a picture."""
@@ -95,12 +97,9 @@ def began_during(record: Record) -> Iterator[Question]:
                 continue
             for name in runs.callbacks():
                 begins = [run.begin for run in runs.of(name)]
-                edges = (during.begin, during.end)
-                if (
-                    name == during.callback
-                    or not _countable(begins)
-                    or any(abs(begin - edge) < EDGE for begin in begins for edge in edges)
-                ):
+                inside = [begin for begin in begins if during.begin < begin < during.end]
+                near = any(abs(begin - edge) < EDGE for begin in begins for edge in (during.begin, during.end))
+                if name == during.callback or near or not inside or not _countable(inside):
                     continue
                 yield Question(
                     kind="began_during",
@@ -179,6 +178,22 @@ def threads_used(record: Record) -> Iterator[Question]:
                 )
 
 
+def thread_of(record: Record) -> Iterator[Question]:
+    """Ask on which thread one run was, if its bar is long enough for the thread's number."""
+    for node, runs in record.callbacks.items():
+        threads = sorted(runs.threads())
+        for run in _whole(runs) if len(threads) > 2 else ():
+            if run.end - run.begin >= _WITH_NUMBER:
+                yield Question(
+                    kind="thread_of",
+                    about={"node": node, "callback": run.callback, "begin": run.begin},
+                    text=f"On which thread was the run of `{run.callback}` of `{node}` {_place(run)}?",
+                    choices=tuple(map(str, threads)),
+                    view="timeline",
+                    subject=node,
+                )
+
+
 def longest_transition(record: Record) -> Iterator[Question]:
     """Ask which callback of a transition took the longest."""
     runs = [run for run in record.runs if run.callback.startswith("on_") and run.group == ""]
@@ -235,15 +250,15 @@ def sent_while_active(record: Record) -> Iterator[Question]:
 def sent_between(record: Record) -> Iterator[Question]:
     """Ask how many messages of a topic were published in a short time."""
     for topic, times, _ in _sent(record):
-        for tenth in range(1, int(10 * max(times))) if len(times) > 3 else ():
-            begin, end = tenth / 10, tenth / 10 + 0.4
+        for twentieth in range(2, int(20 * max(times)) - 8) if len(times) > 3 else ():
+            begin, end = twentieth / 20, (twentieth + 8) / 20
             inside = [time for time in times if begin < time < end]
             if not _countable(inside) or any(abs(time - edge) < EDGE for time in times for edge in (begin, end)):
                 continue
             yield Question(
                 kind="sent_between",
                 about={"topic": topic, "begin": begin, "end": end},
-                text=f"How many messages were published on `{topic}` from {begin:.1f} s to {end:.1f} s?",
+                text=f"How many messages were published on `{topic}` from {begin:.2f} s to {end:.2f} s?",
                 view="arrivals",
                 subject=topic,
             )
@@ -274,13 +289,13 @@ def _sent(record: Record) -> Iterator[tuple[str, list[float], str]]:
 
 
 KINDS: tuple[Callable[[Record], Iterator[Question]], ...] = (
-    under_way, waited_for, began_during, first_to_begin, longest_pause, threads_used, longest_transition,
+    under_way, waited_for, began_during, first_to_begin, longest_pause, threads_used, thread_of, longest_transition,
     nth_transition, sent_while_active, sent_between, longest_silence,
 )  # fmt: skip
 
 
 def chosen(records: Sequence[Record], seed: str, number: int) -> list[tuple[Record, Question]]:
-    """Choose questions at random, as far as possible each of another kind and about another launch.
+    """Choose questions at random, as far as possible each of another kind and about another node or topic.
 
     Args:
         records: of one submission.
@@ -292,7 +307,8 @@ def chosen(records: Sequence[Record], seed: str, number: int) -> list[tuple[Reco
     found: list[tuple[Record, Question]] = []
     for kind in (*kinds, *kinds):  # a second one of a kind only if there are not enough kinds
         possible = [(record, question) for record in records for question in kind(record)]
-        fresh = [pair for pair in possible if pair[0] not in [record for record, _ in found]]
+        so_far = [(record, question.subject) for record, question in found]
+        fresh = [(record, question) for record, question in possible if (record, question.subject) not in so_far]
         texts = [question.text for _, question in found]
         possible = [pair for pair in fresh or possible if pair[1].text not in texts]
         if possible and len(found) < number:

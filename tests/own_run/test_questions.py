@@ -103,6 +103,8 @@ def answer(record: Record, question: Question) -> str:
         return f"{times[best]:.2f} s" if node else str(best + 1)
     if question.kind == "threads_used":
         return str(len(Counter(m.run.thread for m in begins if m.run.callback == callback)))
+    if question.kind == "thread_of":
+        return str(next(m.run.thread for m in begins if m.run.callback == callback and m.time >= about["begin"]))
     if question.kind == "longest_transition":
         taken = {}
         for moment in moments:
