@@ -285,7 +285,8 @@ class Answers:
                     outcomes.passed(f"`{name}`", observed=_spelt(answer))
                     continue
                 because = f"`{_spelt(answer)}` is not what the picture of your run shows. {one.question.text}"
-                hint = "Look at the picture below, find the time or the row of the question, and read it again."
+                # Of a hidden test, a student only sees the hint.
+                hint = f"Your answer to `{name}` is not what your run shows; look at its picture again"
                 picture = one.question.picture(one.record)
                 outcomes.failed(f"`{name}`", WRONG_ANSWER(because, hint), observed=_spelt(answer), picture=picture)
 
