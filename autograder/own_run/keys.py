@@ -16,9 +16,13 @@ def key(record: Record, question: Question) -> str:
     return str(_KEYS[question.kind](record, **question.about))
 
 
-def _under_way(record: Record, node: str, time: float) -> str:
-    running = [run for run in record.callbacks[node] if run.begin <= time <= run.end and run.end - run.begin > 0.01]
-    return running[0].callback if running else NONE
+def _under_way(record: Record, node: str, time: float) -> int:
+    return sum(run.begin <= time <= run.end for run in record.callbacks[node])
+
+
+def _transition_under_way(record: Record, time: float) -> str:
+    running = [run for run in record.runs if run.callback.startswith("on_") and run.begin <= time <= run.end]
+    return f"{running[0].callback} of {running[0].node}" if running else NONE
 
 
 def _waited_for(record: Record, node: str, callback: str, time: float) -> str:
@@ -32,17 +36,9 @@ def _began_during(record: Record, node: str, callback: str, begin: float, end: f
     return sum(begin < run.begin < end for run in record.callbacks[node].of(callback))
 
 
-def _first_to_begin(record: Record, node: str, callback: str, begin: float) -> str:
-    return next(run.callback for run in record.callbacks[node] if run.begin > begin and run.callback != callback)
-
-
 def _longest_pause(record: Record, node: str, callback: str) -> str:
     begins = [run.begin for run in record.callbacks[node].of(callback)]
     return f"{max(pairwise(begins), key=lambda pair: pair[1] - pair[0])[0]:.2f} s"
-
-
-def _threads_used(record: Record, node: str, callback: str) -> int:
-    return len(record.callbacks[node].threads(callback))
 
 
 def _thread_of(record: Record, node: str, callback: str, begin: float) -> int:
@@ -55,8 +51,8 @@ def _longest_transition(record: Record) -> str:
     return f"{longest.callback} of {longest.node}"
 
 
-def _nth_transition(record: Record, node: str, number: int) -> str:
-    return pictures.steps(record.steps(node))[number - 1].label
+def _transitions(record: Record, node: str) -> int:
+    return len(pictures.steps(record.steps(node)))
 
 
 def _sent_between(record: Record, topic: str, begin: float, end: float) -> int:
@@ -78,12 +74,11 @@ _KEYS: dict[str, Any] = {
     "under_way": _under_way,
     "waited_for": _waited_for,
     "began_during": _began_during,
-    "first_to_begin": _first_to_begin,
     "longest_pause": _longest_pause,
-    "threads_used": _threads_used,
     "thread_of": _thread_of,
     "longest_transition": _longest_transition,
-    "nth_transition": _nth_transition,
+    "transitions": _transitions,
+    "transition_under_way": _transition_under_way,
     "sent_between": _sent_between,
     "longest_silence": _longest_silence,
 }

@@ -22,6 +22,8 @@ _LONG = 0.03
 _WITH_NUMBER = 0.17
 """Seconds from which on a bar has room for the number of its thread, in a picture of 3 s."""
 NONE = "none of them"
+_SOME = 2
+"""A number of strokes or bars that somebody can guess; questions are about as many or more."""
 _COUNTABLE = 25
 """The number of strokes or bars that somebody can count in a picture."""
 
@@ -45,25 +47,54 @@ def _countable(times: Sequence[float]) -> bool:
 
 
 def under_way(record: Record) -> Iterator[Question]:
-    """Ask which callback ran at a moment at which at most one of those that take time did."""
+    """Ask how many callbacks ran at a moment."""
     for node, runs in record.callbacks.items():
-        names = _long_callbacks(runs)
         last = max((run.end for run in _whole(runs)), default=0.0)
-        for hundredth in range(5, int(100 * last), 7) if len(names) > 1 else ():
+        for hundredth in range(5, int(100 * last), 7) if len(_long_callbacks(runs)) > 2 else ():
             time = hundredth / 100
-            near = [run for run in runs.of(*names) if run.begin - EDGE < time < run.end + EDGE]
-            if not near and hundredth % 5:
-                continue  # otherwise most answers would be that none was
-            if len(near) > 1 or any(abs(edge - time) < EDGE for run in near for edge in (run.begin, run.end)):
-                continue
-            yield Question(
-                kind="under_way",
-                about={"node": node, "time": time},
-                text=f"Which of the callbacks of `{node}` was under way at {time:.2f} s?",
-                choices=(*sorted(names), NONE),
-                view="timeline",
-                subject=node,
-            )
+            near = [run for run in runs if run.begin - EDGE < time < run.end + EDGE]
+            if len(near) == 1 and hundredth % 4:
+                continue  # otherwise most answers would be that one was
+            if near and all(abs(edge - time) >= EDGE for run in near for edge in (run.begin, run.end)):
+                yield Question(
+                    kind="under_way",
+                    about={"node": node, "time": time},
+                    text=f"How many runs of callbacks of `{node}` were under way at {time:.2f} s?",
+                    view="timeline",
+                    subject=node,
+                )
+
+
+def transition_under_way(record: Record) -> Iterator[Question]:
+    """Ask which callback of a transition of several nodes ran at a moment."""
+    runs = _transitions(record)
+    long = Runs(run for run in runs if run.end - run.begin >= _LONG)
+    names = sorted({f"{run.callback} of {run.node}" for run in long})
+    for time in _moments(long) if len(names) > 3 else ():
+        yield Question(
+            kind="transition_under_way",
+            about={"time": time},
+            text=f"Which callback of a lifecycle transition was under way at {time:.2f} s?",
+            choices=(*names, NONE),
+            view="timeline",
+            subject="",
+        )
+
+
+def _transitions(record: Record) -> Runs:
+    return Runs(run for run in record.runs if run.callback.startswith("on_") and run.group == "")
+
+
+def _moments(runs: Runs) -> Iterator[float]:
+    """Yield moments at which it is beyond doubt which of these runs was under way, and that it was at most one."""
+    last = max((run.end for run in _whole(runs)), default=0.0)
+    for hundredth in range(5, int(100 * last), 7):
+        time = hundredth / 100
+        near = [run for run in runs if run.begin - EDGE < time < run.end + EDGE]
+        if not near and hundredth % 5:
+            continue  # otherwise most answers would be that none was
+        if len(near) < 2 and all(abs(edge - time) >= EDGE for run in near for edge in (run.begin, run.end)):
+            yield time
 
 
 def waited_for(record: Record) -> Iterator[Question]:
@@ -99,7 +130,7 @@ def began_during(record: Record) -> Iterator[Question]:
                 begins = [run.begin for run in runs.of(name)]
                 inside = [begin for begin in begins if during.begin < begin < during.end]
                 near = any(abs(begin - edge) < EDGE for begin in begins for edge in (during.begin, during.end))
-                if name == during.callback or near or not inside or not _countable(inside):
+                if name == during.callback or near or len(inside) < _SOME or not _countable(inside):
                     continue
                 yield Question(
                     kind="began_during",
@@ -109,31 +140,6 @@ def began_during(record: Record) -> Iterator[Question]:
                     view="timeline",
                     subject=node,
                 )
-
-
-def first_to_begin(record: Record) -> Iterator[Question]:
-    """Ask which other callback was the first to begin after one run had begun."""
-    for node, runs in record.callbacks.items():
-        names = runs.callbacks()
-        for run in _whole(runs) if len(names) > 2 else ():
-            after = [other for other in runs if other.callback != run.callback and other.begin >= run.begin - EDGE]
-            times = [other.begin for other in after[:2]]
-            if (
-                run.end - run.begin < _LONG
-                or len(times) < 2
-                or times[0] - run.begin < EDGE
-                or times[1] - times[0] < EDGE
-            ):
-                continue
-            yield Question(
-                kind="first_to_begin",
-                about={"node": node, "callback": run.callback, "begin": run.begin},
-                text=f"A run of `{run.callback}` of `{node}` began at {run.begin:.2f} s."
-                " Which other callback began next?",
-                choices=tuple(sorted(set(names) - {run.callback})),
-                view="timeline",
-                subject=node,
-            )
 
 
 def longest_pause(record: Record) -> Iterator[Question]:
@@ -162,28 +168,16 @@ def longest_pause(record: Record) -> Iterator[Question]:
             )
 
 
-def threads_used(record: Record) -> Iterator[Question]:
-    """Ask on how many threads a callback ran."""
-    for node, runs in record.callbacks.items():
-        most = len(runs.threads())
-        for name in runs.callbacks() if most > 1 else ():
-            if runs.count(name) >= 3:
-                yield Question(
-                    kind="threads_used",
-                    about={"node": node, "callback": name},
-                    text=f"On how many different threads did the executor run `{name}` of `{node}`?",
-                    choices=tuple(map(str, range(1, most + 1))),
-                    view="timeline",
-                    subject=node,
-                )
-
-
 def thread_of(record: Record) -> Iterator[Question]:
-    """Ask on which thread one run was, if its bar is long enough for the thread's number."""
+    """Ask on which thread one run was, if its bar is long enough for the thread's number.
+
+    Threads have their numbers from their first runs, so that the thread of such a run can be known without the picture.
+    """
     for node, runs in record.callbacks.items():
         threads = sorted(runs.threads())
+        first = {thread: next(run for run in runs if run.thread == thread) for thread in threads}
         for run in _whole(runs) if len(threads) > 2 else ():
-            if run.end - run.begin >= _WITH_NUMBER:
+            if run.end - run.begin >= _WITH_NUMBER and run != first[run.thread]:
                 yield Question(
                     kind="thread_of",
                     about={"node": node, "callback": run.callback, "begin": run.begin},
@@ -196,11 +190,11 @@ def thread_of(record: Record) -> Iterator[Question]:
 
 def longest_transition(record: Record) -> Iterator[Question]:
     """Ask which callback of a transition took the longest."""
-    runs = [run for run in record.runs if run.callback.startswith("on_") and run.group == ""]
+    runs = _transitions(record)
     names = sorted({f"{run.callback} of {run.node}" for run in runs})
     long = sorted(run.end - run.begin for run in runs)
-    cut = len(_whole(Runs(runs))) < len(runs)  # the picture does not show how long the last one took
-    if len(names) > 2 and not cut and long[-1] > max(1.5 * long[-2], long[-2] + EDGE):
+    cut = len(_whole(runs)) < len(runs)  # the picture does not show how long the last one took
+    if len(names) > 3 and not cut and long[-1] > max(1.5 * long[-2], long[-2] + EDGE):
         yield Question(
             kind="longest_transition",
             about={},
@@ -211,16 +205,14 @@ def longest_transition(record: Record) -> Iterator[Question]:
         )
 
 
-def nth_transition(record: Record) -> Iterator[Question]:
-    """Ask which transition a lifecycle node went through at one place of its way."""
+def transitions(record: Record) -> Iterator[Question]:
+    """Ask through how many transitions a lifecycle node went."""
     for node in sorted({change.node for change in record.changes}):
-        labels = [step.label for step in pictures.steps(record.steps(node))]
-        for number in range(2, len(labels) + 1) if len(set(labels)) > 2 else ():
+        if len(pictures.steps(record.steps(node))) > _SOME:
             yield Question(
-                kind="nth_transition",
-                about={"node": node, "number": number},
-                text=f"Which transition was number {number} on the way of `{node}` in this run?",
-                choices=("activate", "cleanup", "configure", "deactivate", "shutdown"),
+                kind="transitions",
+                about={"node": node},
+                text=f"Through how many transitions did `{node}` go in this run, with those that failed?",
                 view="lifecycle",
                 subject=node,
             )
@@ -251,9 +243,13 @@ def sent_between(record: Record) -> Iterator[Question]:
     """Ask how many messages of a topic were published in a short time."""
     for topic, times, _ in _sent(record):
         for twentieth in range(2, int(20 * max(times)) - 8) if len(times) > 3 else ():
-            begin, end = twentieth / 20, (twentieth + 8) / 20
+            begin, end = twentieth / 20, min(twentieth + 6 + 5 * (twentieth % 3), int(20 * max(times))) / 20
             inside = [time for time in times if begin < time < end]
-            if not _countable(inside) or any(abs(time - edge) < EDGE for time in times for edge in (begin, end)):
+            if (
+                not inside
+                or not _countable(inside)
+                or any(abs(time - edge) < EDGE for time in times for edge in (begin, end))
+            ):
                 continue
             yield Question(
                 kind="sent_between",
@@ -289,8 +285,8 @@ def _sent(record: Record) -> Iterator[tuple[str, list[float], str]]:
 
 
 KINDS: tuple[Callable[[Record], Iterator[Question]], ...] = (
-    under_way, waited_for, began_during, first_to_begin, longest_pause, threads_used, thread_of, longest_transition,
-    nth_transition, sent_while_active, sent_between, longest_silence,
+    under_way, transition_under_way, waited_for, began_during, longest_pause, thread_of, longest_transition,
+    transitions, sent_while_active, sent_between, longest_silence,
 )  # fmt: skip
 
 
@@ -305,7 +301,7 @@ def chosen(records: Sequence[Record], seed: str, number: int) -> list[tuple[Reco
     draw = random.Random(seed)
     kinds = draw.sample(KINDS, len(KINDS))
     found: list[tuple[Record, Question]] = []
-    for kind in (*kinds, *kinds):  # a second one of a kind only if there are not enough kinds
+    for kind in kinds * number:  # another one of a kind only if there are not enough kinds
         possible = [(record, question) for record in records for question in kind(record)]
         so_far = [(record, question.subject) for record, question in found]
         fresh = [(record, question) for record, question in possible if (record, question.subject) not in so_far]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
@@ -81,15 +80,12 @@ def answer(record: Record, question: Question) -> str:
     begins = [m for m in of_node if m.what == "begin"]
     if question.kind == "under_way":
         before = [m for m in moments if m.time <= about["time"]]
-        names = [run.callback for run in before[-1].running if run.node == node and run.callback in question.choices]
-        return names[0] if names else "none of them"
+        return str(len([run for run in before[-1].running if run.node == node]))
     if question.kind == "waited_for":
         ended = [m for m in of_node if m.what == "end" and m.run.end - m.run.begin > 0.02]
         return min(ended, key=lambda m: abs(m.time - about["time"])).run.callback
     if question.kind == "began_during":
         return str(len([m for m in begins if m.run.callback == callback and about["begin"] < m.time < about["end"]]))
-    if question.kind == "first_to_begin":
-        return next(m.run.callback for m in begins if m.time > about["begin"] and m.run.callback != callback)
     if question.kind in ("longest_pause", "longest_silence"):
         times = [
             m.time
@@ -101,8 +97,6 @@ def answer(record: Record, question: Question) -> str:
             if times[number + 1] - times[number] > times[best + 1] - times[best]:
                 best = number
         return f"{times[best]:.2f} s" if node else str(best + 1)
-    if question.kind == "threads_used":
-        return str(len(Counter(m.run.thread for m in begins if m.run.callback == callback)))
     if question.kind == "thread_of":
         return str(next(m.run.thread for m in begins if m.run.callback == callback and m.time >= about["begin"]))
     if question.kind == "longest_transition":
@@ -111,15 +105,13 @@ def answer(record: Record, question: Question) -> str:
             if moment.what == "end" and moment.run.callback.startswith("on_") and not moment.run.group:
                 taken[moment.run.end - moment.run.begin] = f"{moment.run.callback} of {moment.run.node}"
         return taken[max(taken)]
-    if question.kind == "nth_transition":
-        labels = {
-            "configuring": "configure",
-            "activating": "activate",
-            "deactivating": "deactivate",
-            "cleaningup": "cleanup",
-            "shuttingdown": "shutdown",
-        }
-        return [labels[c.goal] for c in record.changes if c.node == node and c.goal in labels][about["number"] - 1]
+    if question.kind == "transitions":
+        began = ("configuring", "activating", "deactivating", "cleaningup", "shuttingdown")
+        return str(len([change for change in record.changes if change.node == node and change.goal in began]))
+    if question.kind == "transition_under_way":
+        running = [m.running for m in moments if m.time <= about["time"]][-1]
+        names = [f"{run.callback} of {run.node}" for run in running]
+        return next((name for name in names if name in question.choices), "none of them")
     assert question.kind == "sent_between"
     return str(len([m for m in moments if m.topic == about["topic"] and about["begin"] < m.time < about["end"]]))
 
@@ -128,7 +120,7 @@ def answer(record: Record, question: Question) -> str:
 def test_of_real_runs_every_key_is_what_a_replay_of_the_run_shows(lab_name: str) -> None:
     records = recorded(lab_name)
     asked = [(record, question) for record in records for kind in questions.KINDS for question in kind(record)]
-    assert len({question.kind for _, question in asked}) >= 4
+    assert len({question.kind for _, question in asked}) >= 3
     for record, question in asked:
         assert key(record, question) == answer(record, question), question
         assert not question.choices or key(record, question) in question.choices, question
