@@ -116,12 +116,15 @@ NAME = "ros2-labs"
 INSTRUCTORS = (
     "authoring",
     "gradebook",
+    "own_run/keys.py",
     "report/class_page.py",
     "report/answers_page.py",
     "report/term_page.py",
+    "report/viva_page.py",
     "report/templates/answers.html",
     "report/templates/class.html",
     "report/templates/term.html",
+    "report/templates/viva.html",
 )
 """The parts of the package `autograder` that students do not get."""
 STUDENTS = {

@@ -21,6 +21,7 @@ from autograder.core import student_yaml
 from autograder.core.results import Status
 from autograder.core.student_yaml import FILE_MISSING, NOT_YAML, YAML_REFUSED
 from autograder.graph.names import nearest
+from autograder.own_run.sheet import OwnRun
 from autograder.reasons import Group, Kind, Refused
 
 NAME_OR_NONE = ("a full name, such as `/front/points`", "none")
@@ -129,6 +130,11 @@ def is_seal(word: object) -> bool:
 ANSWER_FORM = Kind("answer-form", "the answer is none of the allowed ones", Group.FILES)
 WRONG_ANSWER = Kind("wrong-answer", "the answer has the right form, but something else happens", Group.FILES)
 
+OWN_RUN = Kind("own-run", "the line with the recorded run is missing, or is not as the kit wrote it", Group.FILES)
+_NO_RUN = "The table has no recorded run yet."
+_BROKEN_RUN = "The text after `run:` is not a whole line that the kit wrote."
+_COPY_THE_LINE = "Run the cell that records your run, and copy its last line, which begins with `run:`, into the table."
+
 _LINES = "Write one line for each question: `question: answer`, with a space after the colon."
 
 
@@ -153,6 +159,7 @@ class Answers:
         self._table: dict[str, Any] = {}
         self._forms: dict[str, Sequence[Any]] = {}
         self._questions: dict[str, None] = {}
+        self._own_run = OwnRun(asked=())
 
     def __enter__(self) -> Answers:
         current.check.findings.begin_block()
@@ -250,6 +257,38 @@ class Answers:
                     answer = self._answer(question)
                     seals = (seal(question, answer), seal(question, f"/{answer}"))
                     self._judge(question, answer, sealed in seals, hint)
+
+    def expect_own_run(self, questions: int) -> None:
+        """The table carries a recorded run with so many questions, and each of them has an answer of its form."""
+        self._read()
+        title = "`run` is a recorded run with its questions"
+        line = self._table.get("run")
+        try:
+            self._own_run = OwnRun.read(str(line))
+        except ValueError:
+            outcomes.failed(title, OWN_RUN(_NO_RUN if line in (None, "?") else _BROKEN_RUN, _COPY_THE_LINE))
+        asked = self._own_run.named()
+        if len({(one.question.kind, str(one.question.about)) for one in asked.values()}) != questions:
+            outcomes.failed(title, OWN_RUN(f"The run has not {questions} different questions.", _COPY_THE_LINE))
+        self.expect_filled({name: one.question.choices or range(1000) for name, one in asked.items()})
+
+    def expect_own_answers(self) -> None:
+        """The answers are what the recorded run shows. For hidden tests: a student's kit does not know the answers."""
+        from autograder.own_run.keys import key
+
+        for name, one in self._own_run.named().items():
+            if self._lost(name):
+                continue
+            with part(name):
+                answer = self._answer(name)
+                if same(answer, key(one.record, one.question)):
+                    outcomes.passed(f"`{name}`", observed=_spelt(answer))
+                    continue
+                because = f"`{_spelt(answer)}` is not what the picture of your run shows. {one.question.text}"
+                # Of a hidden test, a student only sees the hint.
+                hint = f"Your answer to `{name}` is not what your run shows; look at its picture again"
+                picture = one.question.picture(one.record)
+                outcomes.failed(f"`{name}`", WRONG_ANSWER(because, hint), observed=_spelt(answer), picture=picture)
 
     def _judge(self, question: str, answer: Any, right: bool, hint: str) -> None:
         title = f"`{question}`"

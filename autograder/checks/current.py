@@ -20,6 +20,7 @@ from autograder.core.results import Isolation, NodeLog, Outcome
 from autograder.graph.observer import Observer
 from autograder.graph.patience import Patience
 from autograder.graph.recording import Bag
+from autograder.own_run.record import Record
 from autograder.packages.workspace import SOURCES, Workspace
 from autograder.sandbox.build import BuildRun
 from autograder.sandbox.node_sandbox import NodeSandbox
@@ -110,6 +111,8 @@ class CurrentCheck:
         """What has been found out since the last score."""
         self.bag = Bag()
         """The messages that it receives, where somebody wants to look at them."""
+        self.records: list[Record] | None = None
+        """What its launches did, where somebody wants to ask about it."""
         self._folder: Path | None = None
         self._answers: Mapping[str, bool] = {}
         self._built: Mapping[str, BuildRun] = {}

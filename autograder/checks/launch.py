@@ -19,6 +19,7 @@ from autograder.checks.command_line import CommandLine
 from autograder.checks.launch_file import LaunchFile
 from autograder.checks.misuse import Misuse, refuse_other_class, refuse_text
 from autograder.checks.program import Program, file_of, refuse_to_start, why_missing, words_of
+from autograder.checks.recording import record
 from autograder.checks.robot import Log, Robot, end_robot, log_of, try_out
 from autograder.checks.ros import Ros
 from autograder.checks.running_launch import RunningLaunch
@@ -302,6 +303,9 @@ class Launch(Ros):
 
     def _look_back(self) -> None:
         """Keep what only the running programs show: in a notebook for a picture, else what contradicts itself."""
+        if current.check.records is not None and self._running.programs:
+            with contextlib.suppress(ForgedGraph, ValueError):  # a program may have told nonsense of itself
+                current.check.records.append(record(self._running, self._insides()))
         if current.check.front_end is not None:
             with contextlib.suppress(ForgedGraph):
                 self._running.graph = picture_data.graph(self._observer)

@@ -99,7 +99,7 @@ def _runs_of(inside: Inside) -> list[Run]:
         on = numbers.setdefault(thread, len(numbers) + 1)
         over = (number, began, ended, thread) not in going_on
         group = _OF_KIND.get(thing.kind) or groups.get(thing.group_id, "")
-        found.append(Run(names[number], began, ended, on, group, thing.node or only, over, inside.name))
+        found.append(Run(names[number], began, ended, on, group, thing.node or only, over, inside.name, thing.period))
     return found
 
 

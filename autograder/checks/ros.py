@@ -26,9 +26,11 @@ from autograder.checks.expect.service import Server, Service
 from autograder.checks.expect.topic import CONTENT, Topic
 from autograder.checks.misuse import Misuse
 from autograder.checks.program import Program
+from autograder.checks.recording import record
 from autograder.checks.waiting import waits_for
 from autograder.graph.lifecycle import Change, in_order
 from autograder.graph.publishing import ClockDriver
+from autograder.own_run.sheet import OwnRun
 from autograder.pictures import Runs
 from autograder.reasons import Group, Kind
 
@@ -372,6 +374,20 @@ class Ros(Facts, ABC):
             `print(ros.runs().longest_pause("heartbeat"))`
         """
         return picture_data.runs(self._insides())
+
+    def own_run(self, questions: int = 3) -> OwnRun:
+        """Questions about what the programs have done so far, each with its picture: other ones in each run.
+
+        As the last line of a cell it shows them, and the line that carries them into a table of answers, where
+        `expect_own_run` and `expect_own_answers` look at them.
+
+        Args:
+            questions: how many.
+
+        Example:
+            `own = ros.own_run(questions=3)`
+        """
+        return OwnRun.of([record(self._running, self._insides())], questions)
 
     def programs(self) -> list[Program]:
         """What this launch was asked to start, or what its launch file starts: programs with their arguments.

@@ -194,6 +194,10 @@ class CoursePaths:
         """Return the page with all answers to a question, which is for instructors."""
         return self.build / "report" / f"{lab}_{re.sub(r'[^A-Za-z0-9_-]', '-', cell)}.html"
 
+    def viva_page(self, lab: str, student: str) -> Path:
+        """Return the sheet for a talk with a student about the student's own run, which is for instructors."""
+        return self.build / "viva" / lab / f"{student}.html"
+
     @property
     def term_page(self) -> Path:
         """The page about all labs of a term, which is for instructors."""

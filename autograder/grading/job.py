@@ -47,6 +47,8 @@ class Job(BaseModel):
     """Whether these checks are run again, alone. Then nothing else of this kit runs, and waits may take longer."""
     messages: bool = False
     """Whether the worker also returns the messages that the checks received."""
+    records: bool = False
+    """Whether the worker also returns what the launches of the checks did."""
 
     @property
     def build_seconds(self) -> float:

@@ -186,6 +186,7 @@ def main() -> int:
     _, hard = resource.getrlimit(resource.RLIMIT_DATA)
     resource.setrlimit(resource.RLIMIT_DATA, (MEMORY if hard == resource.RLIM_INFINITY else min(MEMORY, hard), hard))
     current.check.bag.wanted = job.messages
+    current.check.records = [] if job.records else None
     with Scratch() as scratch:
         scratch.chmod(0o755)
         folder = scratch / "submission"
@@ -193,6 +194,9 @@ def main() -> int:
         for check in run_job(job, folder, out):
             out.write(check.model_dump_json() + "\n")
             out.writelines(message.model_dump_json() + "\n" for message in current.check.bag.empty(check.grade_id))
+            if current.check.records is not None:
+                out.writelines(record.by(check.grade_id).model_dump_json() + "\n" for record in current.check.records)
+                current.check.records.clear()
             out.flush()
     out.close()
     return 0

@@ -28,6 +28,8 @@ class Run:
     """Whether it had ended; False if it was still running when it was last seen."""
     program: str = ""
     """The program in which it ran. Each program numbers its own threads."""
+    period: float = 0.0
+    """The period of the timer that it belongs to, in seconds; 0 if it does not belong to a timer."""
 
 
 class Runs(Sequence[Run]):
@@ -426,7 +428,9 @@ class Traffic:
     """How many messages there were, if `times` are only those of the first ones; None if they are all."""
 
 
-def arrivals(topic: str, traffic: Sequence[Traffic], *, seconds: float | None = None) -> Picture:
+def arrivals(
+    topic: str, traffic: Sequence[Traffic], *, seconds: float | None = None, start: float | None = None
+) -> Picture:
     """Draw a row for each end of a topic, and a stroke for each message.
 
     Of strokes that would touch each other, only the first is drawn; the picture says how many are left out.
@@ -434,10 +438,11 @@ def arrivals(topic: str, traffic: Sequence[Traffic], *, seconds: float | None = 
     Args:
         topic: the full name of the topic.
         traffic: the messages of the publishers first, then those of the subscriptions.
-        seconds: the time to draw from the first event on; by default, all of it.
+        seconds: the time to draw; by default, all of it.
+        start: the time at which to begin, in the time of the messages; by default, the first event.
     """
     every = [time for row in traffic for time in (*row.times, *([row.since] if row.since is not None else []))]
-    zero = min(every, default=0.0)
+    zero = min(every, default=0.0) if start is None else start
     length = seconds or max(max(every, default=0.0) - zero, 0.1) * 1.02
     left = 24 + min(
         280.0, max((max(width_of(row.who), width_of(_said(row), SMALL)) for row in traffic), default=80.0) + 8

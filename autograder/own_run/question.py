@@ -1,0 +1,40 @@
+"""A question about a record, and the picture in which its answer can be seen."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict
+
+from autograder import pictures
+from autograder.own_run.record import SECONDS, Record
+from autograder.pictures import Picture
+
+
+class Question(BaseModel):
+    """A question that only this record answers. It does not hold its answer."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    kind: str
+    """The name of the function in `keys` that finds its answer."""
+    about: dict[str, str | int | float]
+    """The arguments of this function."""
+    text: str
+    choices: tuple[str, ...] = ()
+    """The possible answers; empty if the answer is a whole number."""
+    view: Literal["timeline", "arrivals", "lifecycle"]
+    """The picture to look at."""
+    subject: str
+    """The full name of the node or topic of the picture. A timeline without it shows all nodes."""
+
+    def picture(self, record: Record) -> Picture:
+        """Draw the picture in which the answer can be seen."""
+        if self.view == "arrivals":
+            rows = record.traffic[self.subject]
+            last = max((time for row in rows for time in row.times), default=0.1)
+            return pictures.arrivals(self.subject, rows, seconds=1.05 * last, start=0.0)
+        if self.view == "lifecycle":
+            return pictures.lifecycle(self.subject, pictures.steps(record.steps(self.subject)))
+        runs = record.callbacks[self.subject] if self.subject else pictures.Runs(record.runs)
+        return pictures.timeline(runs, seconds=min(SECONDS, max(run.end for run in runs) * 1.02), start=0.0)

@@ -1,0 +1,312 @@
+"""Finds questions about a record. Each function looks for moments of one kind that the picture shows beyond doubt.
+
+A source text says what can happen; which of it happened, when and how often, only the record says. Therefore the
+questions are about moments, numbers and orders of one run.
+"""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable, Iterator, Sequence
+from itertools import pairwise
+
+from autograder import pictures
+from autograder.own_run.question import Question
+from autograder.own_run.record import SECONDS, Record
+from autograder.pictures import Run, Runs
+
+EDGE = 0.015
+"""Seconds by which things must be apart if a question is about which of them came first."""
+_LONG = 0.03
+"""Seconds from which on a run of a callback is a bar in the picture and no stroke."""
+_WITH_NUMBER = 0.17
+"""Seconds from which on a bar has room for the number of its thread, in a picture of 3 s."""
+NONE = "none of them"
+_SOME = 2
+"""A number of strokes or bars that somebody can guess; questions are about as many or more."""
+_COUNTABLE = 25
+"""The number of strokes or bars that somebody can count in a picture."""
+
+
+def _whole(runs: Runs) -> Runs:
+    """Return the runs that the record has from their beginning to their end."""
+    return Runs(run for run in runs if run.ended and run.end < SECONDS)
+
+
+def _long_callbacks(runs: Runs) -> list[str]:
+    return [name for name in runs.callbacks() if runs.longest(name) >= _LONG]
+
+
+def _place(run: Run) -> str:
+    return f"from {run.begin:.2f} s to {run.end:.2f} s"
+
+
+def _countable(times: Sequence[float]) -> bool:
+    """Whether somebody can count the strokes or bars of a picture at these times."""
+    return len(times) <= _COUNTABLE and all(two - one >= EDGE for one, two in pairwise(times))
+
+
+def under_way(record: Record) -> Iterator[Question]:
+    """Ask how many callbacks ran at a moment."""
+    for node, runs in record.callbacks.items():
+        last = max((run.end for run in _whole(runs)), default=0.0)
+        for hundredth in range(5, int(100 * last), 7) if len(_long_callbacks(runs)) > 2 else ():
+            time = hundredth / 100
+            near = [run for run in runs if run.begin - EDGE < time < run.end + EDGE]
+            if len(near) == 1 and hundredth % 4:
+                continue  # otherwise most answers would be that one was
+            if near and all(abs(edge - time) >= EDGE for run in near for edge in (run.begin, run.end)):
+                yield Question(
+                    kind="under_way",
+                    about={"node": node, "time": time},
+                    text=f"How many runs of callbacks of `{node}` were under way at {time:.2f} s?",
+                    view="timeline",
+                    subject=node,
+                )
+
+
+def transition_under_way(record: Record) -> Iterator[Question]:
+    """Ask which callback of a transition of several nodes ran at a moment."""
+    runs = _transitions(record)
+    long = Runs(run for run in runs if run.end - run.begin >= _LONG)
+    names = sorted({f"{run.callback} of {run.node}" for run in long})
+    for time in _moments(long) if len(names) > 3 else ():
+        yield Question(
+            kind="transition_under_way",
+            about={"time": time},
+            text=f"Which callback of a lifecycle transition was under way at {time:.2f} s?",
+            choices=(*names, NONE),
+            view="timeline",
+            subject="",
+        )
+
+
+def _transitions(record: Record) -> Runs:
+    return Runs(run for run in record.runs if run.callback.startswith("on_") and run.group == "")
+
+
+def _moments(runs: Runs) -> Iterator[float]:
+    """Yield moments at which it is beyond doubt which of these runs was under way, and that it was at most one."""
+    last = max((run.end for run in _whole(runs)), default=0.0)
+    for hundredth in range(5, int(100 * last), 7):
+        time = hundredth / 100
+        near = [run for run in runs if run.begin - EDGE < time < run.end + EDGE]
+        if not near and hundredth % 5:
+            continue  # otherwise most answers would be that none was
+        if len(near) < 2 and all(abs(edge - time) >= EDGE for run in near for edge in (run.begin, run.end)):
+            yield time
+
+
+def waited_for(record: Record) -> Iterator[Question]:
+    """Ask for which other callback a timer's callback had to wait that began late."""
+    for node, runs in record.callbacks.items():
+        others = len(runs.callbacks()) - 1
+        for name in runs.callbacks() if others > 1 else ():
+            for one, two in pairwise(runs.of(name)):
+                late = two.begin - one.begin - one.period
+                held = [run for run in _whole(runs) if run.callback != name and run.end - run.begin >= _LONG]
+                held = [run for run in held if abs(two.begin - run.end) < EDGE and run.begin < two.begin - late / 2]
+                same = [run for run in held if (run.group == two.group and "exclusive" in run.group)]
+                if one.period == 0 or late < max(0.4 * one.period, _LONG) or len(held) != 1 or len(same) != 1:
+                    continue
+                yield Question(
+                    kind="waited_for",
+                    about={"node": node, "callback": name, "time": two.begin},
+                    text=f"`{name}` of `{node}` began late at {two.begin:.2f} s."
+                    " The end of which callback did it wait for?",
+                    choices=tuple(sorted(set(runs.callbacks()) - {name})),
+                    view="timeline",
+                    subject=node,
+                )
+
+
+def began_during(record: Record) -> Iterator[Question]:
+    """Ask how often a callback began during one run of another one."""
+    for node, runs in record.callbacks.items():
+        for during in _whole(runs):
+            if during.end - during.begin < 2 * _LONG:
+                continue
+            for name in runs.callbacks():
+                begins = [run.begin for run in runs.of(name)]
+                inside = [begin for begin in begins if during.begin < begin < during.end]
+                near = any(abs(begin - edge) < EDGE for begin in begins for edge in (during.begin, during.end))
+                if name == during.callback or near or len(inside) < _SOME or not _countable(inside):
+                    continue
+                yield Question(
+                    kind="began_during",
+                    about={"node": node, "callback": name, "begin": during.begin, "end": during.end},
+                    text=f"`{during.callback}` of `{node}` ran {_place(during)}."
+                    f" How many runs of `{name}` began in this time?",
+                    view="timeline",
+                    subject=node,
+                )
+
+
+def longest_pause(record: Record) -> Iterator[Question]:
+    """Ask after which run of a callback the longest pause came."""
+    for node, runs in record.callbacks.items():
+        for name in runs.callbacks():
+            begins = [run.begin for run in runs.of(name)]
+            pauses = sorted(((two - one), one) for one, two in pairwise(begins))
+            if (
+                len(begins) < 4
+                or not _countable(begins)
+                or pauses[-1][0] < max(1.15 * pauses[-2][0], pauses[-2][0] + EDGE)
+            ):
+                continue
+            # The others are spread over the record, so that the place of the right one says nothing.
+            step = max(1, (len(begins) - 1) // 4)
+            shown = sorted({pauses[-1][1], *begins[:-1:step][:4]})
+            yield Question(
+                kind="longest_pause",
+                about={"node": node, "callback": name},
+                text=f"After which run of `{name}` of `{node}` was the time until its next run the longest?"
+                " Give the time at which that run began.",
+                choices=tuple(f"{begin:.2f} s" for begin in shown),
+                view="timeline",
+                subject=node,
+            )
+
+
+def thread_of(record: Record) -> Iterator[Question]:
+    """Ask on which thread one run was, if its bar is long enough for the thread's number.
+
+    Threads have their numbers from their first runs, so that the thread of such a run can be known without the picture.
+    """
+    for node, runs in record.callbacks.items():
+        threads = sorted(runs.threads())
+        first = {thread: next(run for run in runs if run.thread == thread) for thread in threads}
+        for run in _whole(runs) if len(threads) > 2 else ():
+            if run.end - run.begin >= _WITH_NUMBER and run != first[run.thread]:
+                yield Question(
+                    kind="thread_of",
+                    about={"node": node, "callback": run.callback, "begin": run.begin},
+                    text=f"On which thread was the run of `{run.callback}` of `{node}` {_place(run)}?",
+                    choices=tuple(map(str, threads)),
+                    view="timeline",
+                    subject=node,
+                )
+
+
+def longest_transition(record: Record) -> Iterator[Question]:
+    """Ask which callback of a transition took the longest."""
+    runs = _transitions(record)
+    names = sorted({f"{run.callback} of {run.node}" for run in runs})
+    long = sorted(run.end - run.begin for run in runs)
+    cut = len(_whole(runs)) < len(runs)  # the picture does not show how long the last one took
+    if len(names) > 3 and not cut and long[-1] > max(1.5 * long[-2], long[-2] + EDGE):
+        yield Question(
+            kind="longest_transition",
+            about={},
+            text="Which callback of a lifecycle transition took the longest?",
+            choices=tuple(names),
+            view="timeline",
+            subject="",
+        )
+
+
+def transitions(record: Record) -> Iterator[Question]:
+    """Ask through how many transitions a lifecycle node went."""
+    for node in sorted({change.node for change in record.changes}):
+        if len(pictures.steps(record.steps(node))) > _SOME:
+            yield Question(
+                kind="transitions",
+                about={"node": node},
+                text=f"Through how many transitions did `{node}` go in this run, with those that failed?",
+                view="lifecycle",
+                subject=node,
+            )
+
+
+def sent_while_active(record: Record) -> Iterator[Question]:
+    """Ask how many messages a lifecycle node published on a topic while it was active."""
+    for topic, times, who in _sent(record):
+        for begin, end in record.active(who):
+            inside = [time for time in times if begin < time < end]
+            if (
+                end >= SECONDS
+                or not _countable(inside)
+                or any(abs(time - edge) < EDGE for time in times for edge in (begin, end))
+            ):
+                continue
+            yield Question(
+                kind="sent_between",
+                about={"topic": topic, "begin": begin, "end": end},
+                text=f"`{who}` was active from {begin:.2f} s to {end:.2f} s. How many messages did it publish on"
+                f" `{topic}` in this time?",
+                view="arrivals",
+                subject=topic,
+            )
+
+
+def sent_between(record: Record) -> Iterator[Question]:
+    """Ask how many messages of a topic were published in a short time."""
+    for topic, times, _ in _sent(record):
+        for twentieth in range(2, int(20 * max(times)) - 8) if len(times) > 3 else ():
+            begin, end = twentieth / 20, min(twentieth + 6 + 5 * (twentieth % 3), int(20 * max(times))) / 20
+            inside = [time for time in times if begin < time < end]
+            if (
+                not inside
+                or not _countable(inside)
+                or any(abs(time - edge) < EDGE for time in times for edge in (begin, end))
+            ):
+                continue
+            yield Question(
+                kind="sent_between",
+                about={"topic": topic, "begin": begin, "end": end},
+                text=f"How many messages were published on `{topic}` from {begin:.2f} s to {end:.2f} s?",
+                view="arrivals",
+                subject=topic,
+            )
+
+
+def longest_silence(record: Record) -> Iterator[Question]:
+    """Ask after which message of a topic the longest silence came."""
+    for topic, times, _ in _sent(record):
+        gaps = sorted((two - one for one, two in pairwise(times)), reverse=True)
+        if len(times) >= 4 and _countable(times) and gaps[0] > max(1.15 * gaps[1], gaps[1] + EDGE):
+            yield Question(
+                kind="longest_silence",
+                about={"topic": topic},
+                text=f"After which message on `{topic}` was the time until the next one the longest?"
+                " The first message is number 1.",
+                view="arrivals",
+                subject=topic,
+            )
+
+
+def _sent(record: Record) -> Iterator[tuple[str, list[float], str]]:
+    """Yield each topic that one node of the programs published, with the times of the messages and the node."""
+    for topic, rows in sorted(record.traffic.items()):
+        publishers = [row for row in rows if row.who.endswith(" publishes") and row.times]
+        nodes = {row.who.removesuffix(" publishes") for row in publishers}
+        if len(nodes) == 1:
+            yield topic, sorted(time for row in publishers for time in row.times), nodes.pop()
+
+
+KINDS: tuple[Callable[[Record], Iterator[Question]], ...] = (
+    under_way, transition_under_way, waited_for, began_during, longest_pause, thread_of, longest_transition,
+    transitions, sent_while_active, sent_between, longest_silence,
+)  # fmt: skip
+
+
+def chosen(records: Sequence[Record], seed: str, number: int) -> list[tuple[Record, Question]]:
+    """Choose questions at random, as far as possible each of another kind and about another node or topic.
+
+    Args:
+        records: of one submission.
+        seed: with the same seed and records, the questions are the same.
+        number: how many questions are wanted. There are fewer if the records do not have enough moments to ask about.
+    """
+    draw = random.Random(seed)
+    kinds = draw.sample(KINDS, len(KINDS))
+    found: list[tuple[Record, Question]] = []
+    for kind in kinds * number:  # another one of a kind only if there are not enough kinds
+        possible = [(record, question) for record in records for question in kind(record)]
+        so_far = [(record, question.subject) for record, question in found]
+        fresh = [(record, question) for record, question in possible if (record, question.subject) not in so_far]
+        texts = [question.text for _, question in found]
+        possible = [pair for pair in fresh or possible if pair[1].text not in texts]
+        if possible and len(found) < number:
+            found.append(draw.choice(possible))
+    return found

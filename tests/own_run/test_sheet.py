@@ -1,0 +1,57 @@
+"""The line that carries a run and its questions into a notebook, and lines that nobody's kit has written."""
+
+from __future__ import annotations
+
+import base64
+import zlib
+
+import pytest
+
+from autograder.own_run.keys import key
+from autograder.own_run.record import Record
+from autograder.own_run.sheet import Asked, OwnRun
+from autograder.pictures import Run
+
+RUNS = tuple(
+    Run(name, begin + offset, begin + offset + 0.2, thread, f"exclusive group {thread}", "/robot", period=0.5)
+    for begin in (0.0, 0.5, 1.0, 1.5)
+    for thread, (name, offset) in enumerate((("camera", 0.0), ("planner", 0.07), ("motor", 0.15)), 1)
+)
+RECORD = Record(recorded_by="check", runs=RUNS)
+
+
+def packed(text: str) -> str:
+    """A text as a line has it."""
+    return base64.urlsafe_b64encode(zlib.compress(text.encode())).decode()
+
+
+def test_a_line_carries_the_questions_and_their_answers() -> None:
+    own = OwnRun.of([RECORD], 3)
+    read = OwnRun.read(own.line())
+    assert read == own
+    assert list(read.named()) == ["question_1", "question_2", "question_3"]
+    for one in read.named().values():
+        assert key(one.record, one.question) == key(RECORD, one.question)
+        assert one.question.text in repr(own)
+    assert f"run: {own.line()}" in repr(own)
+    shown = own._repr_html_()
+    assert shown.count("<img ") == 3 and own.line() in shown
+
+
+def test_each_run_of_the_cell_asks_other_questions() -> None:
+    assert len({OwnRun.of([RECORD], 3).line() for _ in range(10)}) > 1
+
+
+def test_a_line_that_the_kit_did_not_write_is_refused() -> None:
+    own = OwnRun.of([RECORD], 3)
+    one = own.asked[0]
+    easy = one.question.model_copy(update={"about": {"node": "/robot", "callback": "camera", "begin": 0.123}})
+    another = OwnRun(asked=(Asked(record=one.record, question=easy),))
+    bomb = packed(" " * 50_000_000)
+    for line in ("", "None", "é", own.line()[:-30], own.line()[40:], packed("[]"), another.line(), bomb):
+        with pytest.raises(ValueError):
+            OwnRun.read(line)
+
+
+def test_a_program_that_did_nothing_gets_fewer_questions() -> None:
+    assert OwnRun.of([Record()], 4).asked == ()
