@@ -27,8 +27,8 @@ from autograder.checks.expect.topic import CONTENT, Topic
 from autograder.checks.misuse import Misuse
 from autograder.checks.program import Program
 from autograder.checks.waiting import waits_for
-from autograder.graph.lifecycle import Change, in_order
 from autograder.core.results import Ranked
+from autograder.graph.lifecycle import Change, in_order
 from autograder.graph.publishing import ClockDriver
 from autograder.pictures import Runs
 from autograder.reasons import Group, Kind

@@ -186,7 +186,11 @@ def _best(entries: Sequence[Entry]) -> list[dict[str, object]]:
         rows.sort(key=lambda row: (row[2].value, row[0]))
         _, check, ranked = rows[0]
         told = [
-            {"student": student, "value": f"{one.value:.1f}", "figures": [f"{figure:g}" for figure in one.figures.values()]}
+            {
+                "student": student,
+                "value": f"{one.value:.1f}",
+                "figures": [f"{figure:g}" for figure in one.figures.values()],
+            }
             for student, _, one in rows
         ]
         tables.append({"title": _title(check), "unit": ranked.unit, "figures": list(ranked.figures), "rows": told})
