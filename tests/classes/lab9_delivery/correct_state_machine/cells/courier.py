@@ -9,7 +9,7 @@ from rclpy.action import ActionServer, CancelResponse, GoalResponse
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.executors import ExternalShutdownException, MultiThreadedExecutor
 from rclpy.node import Node
-from rclpy.qos import QoSProfile
+from rclpy.qos import DurabilityPolicy, QoSProfile
 from test_msgs.action import Fibonacci
 
 
@@ -21,7 +21,7 @@ class Courier(Node):
         self.route, self.parcels, self.count, self.handle = [], [], 0, None
         self.over = threading.Event()
         self.target = self.create_publisher(Point, "target", 1)
-        self.create_subscription(PoseArray, "parcels", self.on_parcels, QoSProfile(depth=1, durability="transient_local"))
+        self.create_subscription(PoseArray, "parcels", self.on_parcels, QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL))
         self.create_subscription(Odometry, "odom", self.step, 10)
         ActionServer(
             self, Fibonacci, "deliver", self.execute, goal_callback=self.on_goal, cancel_callback=self.on_cancel,
