@@ -15,7 +15,7 @@ from sensor_msgs.msg import LaserScan
 
 ARRIVED = 0.08
 PATIENCE = 0.5
-HALF_WIDTH = 0.3
+HALF_WIDTH = 0.27
 AHEAD = 0.9
 
 
@@ -24,7 +24,7 @@ class Driver(Node):
         super().__init__("driver")
         self.declare_parameter("max_speed", 0.8)
         self.pose = self.target = None
-        self.told = 0.0
+        self.told = self.way = 0.0
         self.wheels = self.create_publisher(Twist, "cmd_vel", 10)
         self.create_subscription(Odometry, "odom", self.on_odom, 10)
         self.create_subscription(Point, "target", self.on_target, 10)
@@ -44,15 +44,17 @@ class Driver(Node):
             away = math.hypot(self.target.x - x, self.target.y - y)
             wanted = math.atan2(self.target.y - y, self.target.x - x) - heading
             if away > ARRIVED:
+                before = math.remainder(self.way - heading, math.tau)
                 turn = math.remainder(wanted, math.tau)
+                self.way = heading + turn
                 command.angular.z = max(-2.0, min(2.0, 2.5 * turn))
                 if abs(turn) < 0.7:
                     limit = self.get_parameter("max_speed").value
                     command.linear.x = min(limit, 1.2 * away) * (1 - abs(turn) / 0.7)
         self.wheels.publish(command)
 
-    def free_direction(self, scan, wanted, away):
-        """Return the free direction that is nearest to the wanted one, as seen from the car."""
+    def free_direction(self, scan, wanted, before, away):
+        """Return the free direction that is nearest to the wanted one, as seen from the car. It does not change without need."""
         ranges = np.array(scan.ranges)
         angles = scan.angle_min + scan.angle_increment * np.arange(len(ranges))
         near = ranges < AHEAD + 0.3
@@ -61,7 +63,7 @@ class Driver(Node):
         for direction in np.append(np.linspace(-math.pi, math.pi, 73), wanted):
             ahead, aside = ranges * np.cos(angles - direction), ranges * np.sin(angles - direction)
             blocked = (ahead > 0) & (ahead < min(AHEAD, away + 0.1)) & (np.abs(aside) < HALF_WIDTH)
-            cost = abs(math.remainder(direction - wanted, math.tau)) + 0.2 * abs(direction)
+            cost = abs(math.remainder(direction - wanted, math.tau)) + 0.4 * abs(math.remainder(direction - before, math.tau))
             if not blocked.any() and cost < least:
                 best, least = float(direction), cost
         return best if least < math.inf else 1.0
