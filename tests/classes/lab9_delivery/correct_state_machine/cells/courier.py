@@ -18,7 +18,7 @@ class Courier(Node):
 
     def __init__(self):
         super().__init__("courier")
-        self.route, self.parcels, self.count, self.handle = [], [], 0, None
+        self.route, self.parcels, self.count, self.order = [], [], 0, None
         self.over = threading.Event()
         self.target = self.create_publisher(Point, "target", 1)
         self.create_subscription(PoseArray, "parcels", self.on_parcels, QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL))
@@ -33,14 +33,14 @@ class Courier(Node):
         self.parcels = list(zip(places[::2], places[1::2]))
 
     def on_goal(self, goal):
-        free = self.handle is None
+        free = self.order is None
         return GoalResponse.ACCEPT if free and 0 < goal.order <= len(self.parcels) else GoalResponse.REJECT
 
     def on_cancel(self, handle):
         return CancelResponse.ACCEPT
 
     def step(self, odom):
-        handle = self.handle
+        handle = self.order
         if handle is None or not self.route:
             return
         if handle.is_cancel_requested:
@@ -60,11 +60,11 @@ class Courier(Node):
 
     def execute(self, handle):
         self.over.clear()
-        self.count, self.handle = 0, handle
+        self.count, self.order = 0, handle
         self.route = list(self.parcels[handle.request.order - 1])
         while rclpy.ok() and not self.over.wait(0.5):
             pass
-        self.handle = None
+        self.order = None
         if handle.is_cancel_requested:
             handle.canceled()
         else:
