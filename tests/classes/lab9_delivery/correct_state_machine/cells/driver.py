@@ -15,7 +15,7 @@ from sensor_msgs.msg import LaserScan
 
 ARRIVED = 0.08
 PATIENCE = 0.5
-HALF_WIDTH = 0.3
+HALF_WIDTH = 0.27
 AHEAD = 0.9
 
 
