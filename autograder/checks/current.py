@@ -16,7 +16,7 @@ from typing import Protocol
 
 from autograder.core import front_end
 from autograder.core.front_end import FrontEnd
-from autograder.core.results import Isolation, NodeLog, Outcome
+from autograder.core.results import Isolation, NodeLog, Outcome, Ranked
 from autograder.graph.observer import Observer
 from autograder.graph.patience import Patience
 from autograder.graph.recording import Bag
@@ -71,6 +71,8 @@ class Findings:
         self.logs: list[NodeLog] = []
         self.varied: list[str] = []
         """The random values that the check drew."""
+        self.ranked: Ranked | None = None
+        """What counts in the class's table of the best."""
         self.patience = Patience(self.alone)
         """How much longer the waits of this check may still take on a busy machine."""
         self.starved = 0.0

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from rclpy.qos import QoSProfile
 
-from autograder.checks import outcomes, picture_data
+from autograder.checks import current, outcomes, picture_data
 from autograder.checks.expect.action import Action
 from autograder.checks.expect.activity import Activity
 from autograder.checks.expect.car import Car
@@ -28,6 +28,7 @@ from autograder.checks.misuse import Misuse
 from autograder.checks.program import Program
 from autograder.checks.recording import record
 from autograder.checks.waiting import waits_for
+from autograder.core.results import Ranked
 from autograder.graph.lifecycle import Change, in_order
 from autograder.graph.publishing import ClockDriver
 from autograder.own_run.sheet import OwnRun
@@ -117,6 +118,20 @@ class Facts(Expectations):
         have, want = _in_words(observed), _in_words(expected)
         because = because or f"It is {have}, not {want}."
         self.require(observed == expected, title, expected=want, observed=have, because=because, hint=hint, code=code)
+
+    def rank(self, value: float, unit: str, **figures: float) -> None:
+        """Put the submission into the class's table of the best, if it gets all points of this check.
+
+        Args:
+            value: what the table is ordered by; the least is the best.
+            unit: of the value, as the heading of its column.
+            figures: what else the table shows, by the headings of its columns.
+
+        Example:
+            `ros.rank(31.5, "seconds", touches=0)`
+        """
+        figures = {name: float(figure) for name, figure in figures.items()}
+        current.check.findings.ranked = Ranked(value=float(value), unit=unit, figures=figures)
 
     def expect_argument_needed(self, name: str, *, hint: str = "") -> None:
         """The launch file cannot be run, because a launch argument has no default and was not given.

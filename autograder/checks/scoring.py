@@ -119,6 +119,7 @@ def score(points: float | Mapping[str, float]) -> Score:
         flags=list(dict.fromkeys(cell.flags)),
         logs=cell.logs,
         varied=cell.varied,
+        ranked=cell.ranked,
         more_at_grading=bool(earned and (more if not parts else any(part.more_at_grading for part in parts))),
     )
     if statuses != {Status.PASSED} or (blank and all(blank.values())):

@@ -27,16 +27,20 @@ class World:
     """A room, and the cars in it that are driven.
 
     Attributes:
-        room: one of the kit's rooms, such as `room`, or a file that a cell of the lab writes, such as `garage.yaml`.
+        room: one of the kit's rooms, such as `room`, or a file that a cell of the lab writes, such as `garage.yaml`; a
+            map that a check draws is given as the text of such a file.
         cars: the namespaces of the cars, such as `/front`, in the order in which the map has its arrows.
         heartbeat: whether the motors also need a message on `heartbeat` (`std_msgs/Empty`) every 0.3 s.
         remappings: rules for the names of the cars, such as `("cmd_vel", "control/command")`; the first match wins.
+        patient: whether the world waits for programs that are late with a command, so that a car does not drive
+            blindly on a slow machine.
     """
 
     room: str = "room"
     cars: Sequence[str] = ("",)
     heartbeat: bool = False
     remappings: Sequence[tuple[str, str]] = ()
+    patient: bool = False
 
     def __post_init__(self) -> None:
         refuse_text("World", cars=self.cars, remappings=self.remappings)
@@ -52,10 +56,11 @@ class World:
         Raises:
             Misuse: there is no such room, or it has fewer cars.
         """
-        from autograder.world import RunningWorld, Simulation, read_room
+        from autograder.world import RunningWorld, Simulation, read_room, room_from
 
         try:
-            room = read_room(self.room, current.check.folder)
+            drawn = "\n" in self.room
+            room = room_from(self.room, "of this check") if drawn else read_room(self.room, current.check.folder)
             names = [name.strip("/") for name in self.cars]
             simulation = Simulation(
                 room, names, heartbeat=self.heartbeat, seed=current.check.random.getrandbits(32)
@@ -68,7 +73,8 @@ class World:
         rules = [word for old, new in self.remappings for word in ("-r", f"{old}:={new}")]
         # The rules are the whole command line of the nodes, so that they do not take those of this process.
         return RunningWorld(
-            simulation, domain_id, closed=here is None or here.scored, arguments=["--ros-args", *rules]
+            simulation, domain_id, closed=here is None or here.scored, patient=self.patient,
+            arguments=["--ros-args", *rules],
         )  # fmt: skip
 
 

@@ -143,6 +143,16 @@ class NodeLog(_Model):
     """The limit that ended the program, such as `memory limit`; empty if no limit did."""
 
 
+class Ranked(_Model):
+    """What the class's table of the best is ordered by."""
+
+    value: float
+    """The least is the best."""
+    unit: Text
+    figures: dict[Text, float] = Field(default_factory=dict)
+    """What else stands in the table, by its name."""
+
+
 class CellResult(_Model):
     """The result of one check cell and its points. It does not know which check of which lab this is."""
 
@@ -167,6 +177,8 @@ class CellResult(_Model):
     """The output of the programs that the check launched."""
     varied: list[Text] = Field(default_factory=list)
     """The random values that the check drew, in their order."""
+    ranked: Ranked | None = None
+    """What counts in the class's table of the best, if the check has such a table."""
 
     @property
     def sure_points(self) -> float | None:

@@ -20,7 +20,7 @@ from markupsafe import Markup
 
 from autograder.core.files import write_beside
 from autograder.core.history import told
-from autograder.core.results import CheckResult, Status
+from autograder.core.results import CheckResult, Ranked, Status
 from autograder.report import words
 from autograder.report.audience import reason
 from autograder.report.export.entry import Entry, points
@@ -81,6 +81,7 @@ def write_class_page(path: Path, entries: Sequence[Entry], written: datetime.dat
         bars=_distribution(scores, most),
         persons=_together(_persons(entries)),
         checks=_checks(entries),
+        best=_best(entries),
         students=[_student(entry, path) for entry in entries],
         script=Markup(script),
         digest=digest,
@@ -171,6 +172,29 @@ def share(entry: Entry, check: CheckResult) -> float:
     cells = entry.grade.cells if entry.grade is not None else ()
     earned = next((cell.points for cell in cells if cell.grade_id == check.grade_id), check.points)
     return (earned or 0.0) / check.max_points if check.max_points else 0.0
+
+
+def _best(entries: Sequence[Entry]) -> list[dict[str, object]]:
+    """Return a table for each check that ranks: who got all of its points, the least value first."""
+    found: dict[str, list[tuple[str, CheckResult, Ranked]]] = {}
+    for entry in entries:
+        for check in entry.result.checks:
+            if check.ranked is not None and check.points == check.max_points:
+                found.setdefault(check.grade_id, []).append((entry.student, check, check.ranked))
+    tables: list[dict[str, object]] = []
+    for rows in found.values():
+        rows.sort(key=lambda row: (row[2].value, row[0]))
+        _, check, ranked = rows[0]
+        told = [
+            {
+                "student": student,
+                "value": f"{one.value:.1f}",
+                "figures": [f"{figure:g}" for figure in one.figures.values()],
+            }
+            for student, _, one in rows
+        ]
+        tables.append({"title": _title(check), "unit": ranked.unit, "figures": list(ranked.figures), "rows": told})
+    return tables
 
 
 def _discrimination(found: Sequence[tuple[Entry, CheckResult]], shares: Sequence[float]) -> str:

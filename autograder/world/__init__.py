@@ -7,7 +7,7 @@ need.
 """
 
 from autograder.world.node import RunningWorld
-from autograder.world.room import Pose, Room, read_room
+from autograder.world.room import Pose, Room, read_room, room_from
 from autograder.world.simulation import Sample, Simulation, Touch
 
-__all__ = ["Pose", "Room", "RunningWorld", "Sample", "Simulation", "Touch", "read_room"]
+__all__ = ["Pose", "Room", "RunningWorld", "Sample", "Simulation", "Touch", "read_room", "room_from"]

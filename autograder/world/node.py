@@ -16,6 +16,7 @@ import array
 import contextlib
 import math
 import threading
+import time
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -41,6 +42,8 @@ TOPICS = ("cmd_vel", "odom", "scan", "camera/image_raw", "battery_state")
 """The relative names of a car's topics."""
 _STEPS_A_PICTURE, _STEPS_A_BATTERY = 4, 20
 """The steps between two pictures of the camera (5 Hz), and between two messages of the battery (1 Hz)."""
+_LATE, _LONGEST = 0.1, 1.0
+"""A patient world waits when the last command is older than so many of its seconds, for at most so many real ones."""
 _CLOSED = "The check has placed the car; nobody else may."
 
 
@@ -60,7 +63,7 @@ class CarNode:
     ) -> None:
         """Create the node with its topics, its service and its parameter."""
         self._world, self._name, self._closed = simulation, name, closed
-        self._placing = False
+        self._heard = -math.inf
         self.node: Node = rclpy.create_node(
             NAME, namespace=name, context=context, cli_args=list(arguments), use_global_arguments=not arguments,
             enable_rosout=False, enable_logger_service=False,
@@ -87,6 +90,7 @@ class CarNode:
 
     def _commanded(self, message: Twist) -> None:
         self.counts["cmd_vel"] += 1
+        self._heard = time.monotonic()
         self._world.command(self._name, message.linear.x, message.angular.z)
 
     def _reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
@@ -107,6 +111,11 @@ class CarNode:
                 if reason:
                     return SetParametersResult(successful=False, reason=reason)
         return SetParametersResult(successful=True)
+
+    def is_awaited(self) -> bool:
+        """Whether the program that drives the car is late with a command, but not so late that it must be gone."""
+        age = self._world.time - self._world.driven[self._name].commanded
+        return age > _LATE + STEP / 2 and time.monotonic() - self._heard < _LONGEST
 
     def publish(self) -> None:
         """Publish what the sensors measure after a step; what nobody subscribes to is not computed."""
@@ -172,16 +181,17 @@ class RunningWorld:
         simulation: the world.
         domain_id: the ROS domain; by default that of the environment.
         closed: whether nobody but the world itself may place the cars, as in a check.
+        patient: whether it takes no step while a program is late with its command.
         arguments: the ROS arguments of its nodes; by default those of this process.
     """
 
     def __init__(
         self, simulation: Simulation, domain_id: int | None = None, *, closed: bool = False,
-        arguments: Sequence[str] = (),
+        patient: bool = False, arguments: Sequence[str] = (),
     ) -> None:  # fmt: skip
         """Create the nodes and start the time of the world."""
         self.simulation = simulation
-        self.paused = False
+        self.paused, self._patient = False, patient
         with contextlib.ExitStack() as leaving:
             self._context = Context()
             rclpy.init(context=self._context, domain_id=domain_id, args=list(arguments) or None)
@@ -198,7 +208,8 @@ class RunningWorld:
             self._leaving = leaving.pop_all()
 
     def _tick(self) -> None:
-        if not self.paused:
+        late = self._patient and any(node.is_awaited() for node in self.nodes.values())
+        if not self.paused and not late:
             self.simulation.step()
             for node in self.nodes.values():
                 node.publish()

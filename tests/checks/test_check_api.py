@@ -18,7 +18,7 @@ LABS = sorted((ROOT / "solutions").glob("*/*.ipynb"))
 OFFERED = {
     "ros": """
         action activity car changes clock draw expect_argument_needed graph lifecycle log node own_run part pause
-        program programs publisher qos require require_equal runs score server service show start stop topic wait
+        program programs publisher qos rank require require_equal runs score server service show start stop topic wait
     """,
     "topic": """
         account expect_last expect_messages expect_publisher expect_silence expect_subscription expect_unused listen

@@ -24,7 +24,7 @@ from junitparser import JUnitXml
 from places import ROOT
 
 from autograder.core.grades import CellGrade, Grade
-from autograder.core.results import CheckResult, Isolation, Outcome, Part, Status, SubmissionResult
+from autograder.core.results import CheckResult, Isolation, Outcome, Part, Ranked, Status, SubmissionResult
 from autograder.course.lab import load_lab
 from autograder.gradebook.class_run import ClassRun, Intake, grade_class
 from autograder.gradebook.grades import class_entries, read_grades
@@ -253,6 +253,23 @@ def test_the_class_page_shows_what_needs_a_person(graded: Graded) -> None:
     assert "check_talker" in text and "secret reason" in text and "<script>alert" not in text
     for student in FILES:
         assert f'href="../feedback/{student}/toy/toy.html"' in text
+
+
+def test_the_class_page_has_a_table_of_the_best_for_a_check_that_ranks(tmp_path: Path) -> None:
+    def entry(student: str, seconds: float, points: float) -> Entry:
+        ranked = Ranked(value=seconds, unit="seconds", figures={"touches": 2 - points})
+        passed = Outcome(status=Status.PASSED, title="It arrives")
+        check = CheckResult(
+            grade_id="check_way", title="The way", max_points=2, points=points, outcomes=[passed], ranked=ranked
+        )
+        result = SubmissionResult(student=student, lab="toy", digest="d", isolation=Isolation.FULL, checks=[check])
+        return Entry(student, "toy", result)
+
+    entries = [entry("slow", 40.25, 2), entry("fast", 31.5, 2), entry("touches", 20.0, 1)]
+    text = write_class_page(tmp_path / "toy.html", entries, datetime.date(2026, 11, 22)).read_text()
+    table = text.partition("The best: The way")[2].partition("</table>")[0]
+    assert table.index("fast") < table.index("31.5") < table.index("slow") < table.index("40.2")
+    assert "touches</button>" in table and ">touches<" not in table.partition("<tbody>")[2]
 
 
 def test_who_is_gone_from_the_source_leaves_the_class_until_they_are_back(graded: Graded, tmp_path: Path) -> None:

@@ -161,3 +161,21 @@ def test_a_world_that_is_paused_stands_still(observer: Observer) -> None:
         assert observer.wait(lambda: len(passed) > 5, WITHIN) and world.simulation.steps == before
     finally:
         world.close()
+
+
+def test_a_patient_world_waits_a_second_for_a_program_that_is_late_and_then_brakes(observer: Observer) -> None:
+    world = RunningWorld(Simulation(read_room("room")), observer.domain_id, patient=True)
+    try:
+        publisher = observer.node.create_publisher(Twist, "cmd_vel", 10)
+        assert observer.wait(publisher.get_subscription_count, WITHIN)
+        message = Twist()
+        message.linear.x = 1.0
+        began = time.monotonic()
+        publisher.publish(message)
+        car = world.simulation.driven[""]
+        assert observer.wait(lambda: world.simulation.time > car.commanded + 0.2 >= 0.2, WITHIN)
+        assert time.monotonic() - began > 1.0
+        assert observer.wait(lambda: world.simulation.time > car.commanded + 0.6, WITHIN)
+        assert car.speed == 0 and world.simulation.records[""].metres > 0.01
+    finally:
+        world.close()
