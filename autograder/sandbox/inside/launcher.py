@@ -8,10 +8,10 @@ There are three kinds of processes, each of which is a fork of the one before:
 - the programs. They cannot see the launcher, and cannot read, write, stop or end the first process. They cannot read or
   write each other's memory either.
 
-Usage: launcher.py FD [SCRATCH], or launcher.py --warm FD. FD is one end of a SOCK_SEQPACKET pair; `requests.py` describes the messages on it. The
-launcher and each first process end, with all their descendants, when their socket is closed. The launcher then removes
-the folder SCRATCH, unless the process that started it is still alive. With `--warm`, this is the server of launchers
-that `warm_launchers.py` describes.
+Usage: launcher.py FD [SCRATCH], or launcher.py --warm FD. FD is one end of a SOCK_SEQPACKET pair; `requests.py`
+describes the messages on it. The launcher and each first process end, with all their descendants, when their socket is
+closed. The launcher then removes the folder SCRATCH, unless the process that started it is still alive. With `--warm`,
+this is the server that `warm_launchers.py` describes.
 """
 
 import importlib

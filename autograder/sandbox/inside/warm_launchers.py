@@ -1,13 +1,13 @@
-"""The work of a launcher that is loaded once and serves many submissions.
+"""The work of the server of launchers, which loads everything once and then serves many submissions.
 
-It runs in the grading sandbox beside the fork server, and hears nothing of a submission but that there is one. There are
-four kinds of processes, each of which is a fork of the one before, and runs none of the student's code:
+It runs in the grading sandbox, beside the fork server, and is told nothing of a submission except that it exists. There
+are three kinds of processes. Each is a fork of the one before, and runs none of the student's code:
 
-- the server, which has loaded everything;
-- for each submission a *spare*, which is in the submission's namespaces, without privileges, and waits;
-- for each node sandbox a launcher, which is in the sandbox's own namespaces; `launcher.py` describes what it does.
+- the server;
+- for each submission a *spare*, which is in the submission's namespaces, has no privileges, and waits;
+- for each node sandbox a launcher, which is in the sandbox's own namespaces and works as `launcher.py` describes.
 
-A spare and a launcher end with the namespace in which they are.
+A spare and a launcher end together with the namespaces that they are in.
 """
 
 import contextlib
