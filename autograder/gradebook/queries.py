@@ -37,16 +37,22 @@ WHERE :lab IN ('', a.name) AND :student IN ('', sa.student_id)
 """
 
 
-@functools.cache
 def engine_of(address: str, **settings: Any) -> Engine:
     """Return this process's engine for a gradebook, which keeps the queries that it has translated into SQL.
 
-    It keeps no connection after a call of its `dispose`, with which each use of it should end.
+    Call its `dispose` after use.
 
     Args:
         address: the gradebook's address in the form that SQLAlchemy expects.
         settings: the settings of the engine.
     """
+    engine = _engine(address, **settings)
+    engine.dispose()  # a use that failed may have left a connection to a file that is gone
+    return engine
+
+
+@functools.cache
+def _engine(address: str, **settings: Any) -> Engine:
     from sqlalchemy import create_engine
 
     return create_engine(address, **settings)
