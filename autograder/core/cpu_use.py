@@ -64,13 +64,22 @@ def computes(pid: int) -> bool:
     return False
 
 
+_above: list[int] = []
+"""The process whose descendants count, if it is not this one."""
+
+
+def count_all_below(pid: int) -> None:
+    """From now on, count the CPU time of all descendants of a process, of which this process is one."""
+    _above[:] = [pid]
+
+
 def cpu_uses() -> dict[int, CpuUse]:
     """Return how much CPU time this process and its descendants have used, by process id.
 
     The result is empty if the kernel does not count it (see `/proc/PID/schedstat` in proc(5)).
     """
     uses: dict[int, CpuUse] = {}
-    for pid in (os.getpid(), *descendants(os.getpid())):
+    for pid in (os.getpid(), *descendants(_above[0] if _above else os.getpid())):
         with contextlib.suppress(OSError, IndexError, ValueError):
             use = _use(pid)
             if use.threads:

@@ -134,16 +134,6 @@ def memory(pid: int) -> int:
     return total
 
 
-def proportional_memory(pid: int) -> int:
-    """Return the bytes of memory of a process, with a proportional part of each shared page; 0 if it has ended."""
-    total = 0
-    with contextlib.suppress(OSError):
-        for line in read_text(f"/proc/{pid}/smaps_rollup").splitlines():
-            if line.startswith(("Pss:", "SwapPss:")):
-                total += int(line.split()[1]) * 1024
-    return total
-
-
 def cpu_time(pid: int) -> float:
     """Return the seconds of CPU time of a process and of its children that have ended; 0 if the process has ended."""
     with contextlib.suppress(OSError):

@@ -26,10 +26,11 @@ def open_api(root: Path, gradebook: bool = True, **directories: Any) -> Any:
     from nbgrader.coursedir import CourseDirectory
 
     from autograder.gradebook.config import leave_gradebook_alone
-    from autograder.gradebook.private_nbgrader import know_version_of_tables
+    from autograder.gradebook.private_nbgrader import do_not_repeat, know_version_of_tables
     from autograder.gradebook.settings import settings_of
 
     know_version_of_tables()
+    do_not_repeat()
     config = copy.deepcopy(settings_of(root))
     if not gradebook:
         leave_gradebook_alone(config)

@@ -15,7 +15,6 @@ from typing import Any
 import nbformat
 from nbconvert.exporters import NotebookExporter
 from nbgrader import utils
-from nbgrader.api import Gradebook
 from nbgrader.converters import Autograde
 from nbgrader.preprocessors import (
     AssignLatePenalties,
@@ -202,19 +201,20 @@ class SaveCheckedGrades(SaveScores):
     Points that a person gave are kept. If the work has changed since then, the person is asked to look at it again.
     """
 
-    def preprocess(self, nb: Any, resources: dict[str, Any]) -> tuple[Any, dict[str, Any]]:
-        """Record all grades of a submission, and a digest of what was recorded."""
-        root, student, lab, path = _submitted(self.parent.parent, resources)
+    def before_cells(self, nb: Any, resources: dict[str, Any]) -> None:
+        """Read what the points depend on, before any of them is recorded."""
+        root, student, lab, _ = _submitted(self.parent.parent, resources)
         self._programs = [cell.source for cell in nb.cells if cell.cell_type == "code" and utils.is_solution(cell)]
-        digest = own_tables.recordable(root, lab.name, lab.source_digest, student)
-        with Gradebook(resources["nbgrader"]["db_url"]) as gradebook:
-            own_tables.make_tables(gradebook.engine)
-        made: tuple[Any, dict[str, Any]] = super().preprocess(nb, resources)
-        with Gradebook(resources["nbgrader"]["db_url"]) as gradebook:
-            own_tables.note_recorded(gradebook.db, lab.name, student, digest)
-            note_graded(gradebook.db.connection(), lab, student, path)
-            gradebook.db.commit()
-        return made
+        self._digest = own_tables.recordable(root, lab.name, lab.source_digest, student)
+        own_tables.make_tables(self.gradebook.db.connection())
+
+    def after_cells(self, resources: dict[str, Any]) -> None:
+        """Record a digest of what was recorded, and the history."""
+        _, student, lab, path = _submitted(self.parent.parent, resources)
+        talks = self.gradebook.db
+        own_tables.note_recorded(talks, lab.name, student, self._digest)
+        talks.flush()
+        note_graded(talks.connection(), lab, student, path)
 
     def score_check(self, grade: Any, resources: dict[str, Any]) -> None:
         """Set the points from the result of the check."""

@@ -75,6 +75,7 @@ def configure(config: Any, root: Path) -> None:
     config.ExchangeFactory.collect = CollectNotebooks
     config.ExportApp.plugin_class = ExportOfClass
     config.Autograde.exporter_class = SubmissionExporter
+    config.SubmissionExporter.optimistic_validation = True  # validate a notebook after the last stage, not after each
     config.Autograde.sanitize_preprocessors = SANITIZE
     config.Autograde.autograde_preprocessors = AUTOGRADE
     config.GenerateFeedback.exporter_class = FeedbackExporter

@@ -13,7 +13,6 @@ from typing import Any
 from nbconvert.exporters import Exporter
 from nbgrader import utils
 from nbgrader.converters import GenerateFeedback
-from sqlalchemy import create_engine
 
 from autograder.core.errors import KitError
 from autograder.core.history import Entry, decisions
@@ -25,7 +24,7 @@ from autograder.course.settings import read_settings
 from autograder.gradebook import own_tables
 from autograder.gradebook.exchange_files import complete, only_notebooks
 from autograder.gradebook.history import note_graded
-from autograder.gradebook.queries import read_grade
+from autograder.gradebook.queries import engine_of, read_grade
 from autograder.grading.store import ResultStore
 from autograder.intake.roster import FILE_NAME, read_roster
 from autograder.report.feedback_page import Heading, Task, feedback_html
@@ -73,7 +72,7 @@ class FeedbackExporter(Exporter):  # type: ignore[misc]
 
 def _history(address: str, lab: Lab, student: str, notebook: Path) -> list[Entry]:
     """Note what is new in the history of a submission, and return the whole history."""
-    engine = create_engine(address)
+    engine = engine_of(address)
     try:
         with engine.begin() as connection:
             own_tables.make_tables(connection)

@@ -15,7 +15,7 @@ from autograder.course.paths import CoursePaths
 from autograder.gradebook.database import damage_told
 from autograder.gradebook.own_tables import THE_LAB, history, recordable, recorded
 from autograder.gradebook.pages import shows
-from autograder.gradebook.queries import digests, grades_in
+from autograder.gradebook.queries import digests, engine_of, grades_in
 from autograder.gradebook.settings import gradebook_address, gradebook_file
 from autograder.grading.store import ResultStore
 from autograder.intake.record import Taken, left_class, read_class
@@ -33,9 +33,9 @@ def ask(root: Path, question: Callable[[Connection], Answer], nothing: Answer) -
     file = gradebook_file(root)
     if file is not None and not file.is_file():
         return nothing
-    from sqlalchemy import create_engine, inspect
+    from sqlalchemy import inspect
 
-    engine = create_engine(gradebook_address(root))
+    engine = engine_of(gradebook_address(root))
     try:
         with damage_told(root), engine.connect() as connection:
             return question(connection) if inspect(connection).has_table("grade") else nothing

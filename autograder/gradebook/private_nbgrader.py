@@ -6,6 +6,8 @@ versions of nbgrader that have not been tested.
 
 from __future__ import annotations
 
+import functools
+import json
 from abc import abstractmethod
 from collections.abc import Callable
 from pathlib import Path
@@ -13,13 +15,17 @@ from typing import Any
 
 from alembic.script import ScriptDirectory
 from nbgrader import api, utils
-from nbgrader.api import MissingEntry
+from nbgrader.api import Gradebook, MissingEntry
 from nbgrader.converters import Autograde
 from nbgrader.converters.generate_solution import GenerateSolution
 from nbgrader.dbutil import ALEMBIC_DIR
+from nbgrader.nbgraderformat import common
 from nbgrader.preprocessors import Execute, SaveAutoGrades, SaveCells
 
+from autograder.gradebook.queries import engine_of
 from autograder.grading.nbgrader_validate import Verdicts, replace_validator
+
+jsonschema: Any = common.jsonschema
 
 
 def in_first_pass(autograde: Autograde) -> bool:
@@ -31,7 +37,33 @@ def in_first_pass(autograde: Autograde) -> bool:
 
 
 class SaveScores(SaveAutoGrades):  # type: ignore[misc]
-    """nbgrader's stage that records points. Subclasses decide on the points and on whether a person has to grade."""
+    """nbgrader's stage that records points. Subclasses decide on the points and on whether a person has to grade.
+
+    All cells of a notebook are recorded in one transaction. nbgrader itself needs about three for each cell.
+    """
+
+    def preprocess(self, nb: Any, resources: dict[str, Any]) -> tuple[Any, dict[str, Any]]:
+        """Record the points of all cells."""
+        told = resources["nbgrader"]
+        self.notebook_id, self.assignment_id, self.student_id = (
+            told[name] for name in ("notebook", "assignment", "student")
+        )
+        with Gradebook(told["db_url"]) as self.gradebook:
+            commit, self.gradebook.db.commit = self.gradebook.db.commit, self.gradebook.db.flush
+            self.before_cells(nb, resources)
+            for index, cell in enumerate(nb.cells):
+                nb.cells[index], resources = self.preprocess_cell(cell, resources, index)
+            self.after_cells(resources)
+            commit()
+        return nb, resources
+
+    @abstractmethod
+    def before_cells(self, nb: Any, resources: dict[str, Any]) -> None:
+        """Do what comes first in the transaction."""
+
+    @abstractmethod
+    def after_cells(self, resources: dict[str, Any]) -> None:
+        """Do what comes last in the transaction."""
 
     @abstractmethod
     def score_check(self, grade: Any, resources: dict[str, Any]) -> None:
@@ -56,7 +88,6 @@ class SaveScores(SaveAutoGrades):  # type: ignore[misc]
         else:
             self.score_check(grade, resources)
         grade.needs_manual_grade = self.needs_person(grade, cell, asked)
-        self.gradebook.db.commit()
 
 
 class SaveLabCells(SaveCells):  # type: ignore[misc]
@@ -101,6 +132,43 @@ def version_of_tables() -> str:
 def know_version_of_tables() -> None:
     """Make nbgrader find the version of the tables in this process when it creates a gradebook."""
     api.get_alembic_version = version_of_tables
+
+
+def do_not_repeat() -> None:
+    """Make nbgrader do some work once in this process that it otherwise does about ten times for each submission.
+
+    For each connection to the gradebook it makes a new engine, which translates every query into SQL anew, and it looks
+    for each table. For each cell that it validates, it validates the schema, too.
+    """
+    api.create_engine = engine_of
+    create_all = api.Base.metadata.create_all
+
+    def create_missing(bind: Any) -> None:
+        if not set(api.Base.metadata.tables) <= set(api.inspect(bind).get_table_names()):
+            create_all(bind=bind)
+
+    if create_all.__qualname__ != create_missing.__qualname__:  # otherwise it has been replaced already
+        api.Base.metadata.create_all = create_missing
+    common.jsonschema = _CheckedSchemas
+
+
+class _CheckedSchemas:
+    """Takes the place of the module `jsonschema` for nbgrader's validation of cells."""
+
+    @staticmethod
+    def validate(instance: object, schema: object) -> None:
+        """Do the same as `jsonschema.validate`, but check each schema only once."""
+        error = jsonschema.exceptions.best_match(_validator(json.dumps(schema)).iter_errors(instance))
+        if error is not None:
+            raise error
+
+
+@functools.cache
+def _validator(schema: str) -> Any:
+    read = json.loads(schema)
+    kind = jsonschema.validators.validator_for(read)
+    kind.check_schema(read)
+    return kind(read)
 
 
 def replace_execution(validate: Callable[[Path, bool], Verdicts], refuse: Callable[[], Exception]) -> None:

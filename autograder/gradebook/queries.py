@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import json
 from collections.abc import Sequence
@@ -12,7 +13,7 @@ from autograder.core.history import Points
 from autograder.gradebook import own_tables
 
 if TYPE_CHECKING:
-    from sqlalchemy.engine import Connection
+    from sqlalchemy.engine import Connection, Engine
 
 _OF_SUBMISSION = """
 JOIN submitted_notebook sn ON x.notebook_id = sn.id
@@ -36,6 +37,27 @@ WHERE :lab IN ('', a.name) AND :student IN ('', sa.student_id)
 """
 
 
+def engine_of(address: str, **settings: Any) -> Engine:
+    """Return this process's engine for a gradebook, which keeps the queries that it has translated into SQL.
+
+    Call its `dispose` after use.
+
+    Args:
+        address: the gradebook's address in the form that SQLAlchemy expects.
+        settings: the settings of the engine.
+    """
+    engine = _engine(address, **settings)
+    engine.dispose()  # a use that failed may have left a connection to a file that is gone
+    return engine
+
+
+@functools.cache
+def _engine(address: str, **settings: Any) -> Engine:
+    from sqlalchemy import create_engine
+
+    return create_engine(address, **settings)
+
+
 def read_grade(address: str, lab: str, student: str) -> Grade:
     """Return the grade of one submission, which must be in the gradebook.
 
@@ -44,9 +66,7 @@ def read_grade(address: str, lab: str, student: str) -> Grade:
         lab: the lab.
         student: the student.
     """
-    from sqlalchemy import create_engine
-
-    engine = create_engine(address)
+    engine = engine_of(address)
     try:
         with engine.connect() as connection:
             return grades_in(connection, lab, student)[0]

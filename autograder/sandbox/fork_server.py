@@ -30,6 +30,8 @@ import traceback
 from pathlib import Path
 from typing import NoReturn
 
+from autograder.core import cpu_use
+from autograder.sandbox import spare_launcher
 from autograder.sandbox.forks import BEGUN
 from autograder.sandbox.inside import own_mounts
 from autograder.sandbox.inside.kernel import (
@@ -87,28 +89,31 @@ def _run(module: str, arguments: list[str]) -> int:
 
 def _serve(channel: socket.socket, idle: float) -> tuple[str, list[str]]:
     """Fork for every request. This returns only in a fork, with the module to run and its arguments."""
+    launchers = spare_launcher.start_server()
     poll = select.poll()
     poll.register(channel, select.POLLIN)
-    forks = 0
+    forks: set[int] = set()
     while True:
         asked = poll.poll(1000 * idle)
         with contextlib.suppress(ChildProcessError):
-            while os.waitpid(-1, os.WNOHANG)[0]:
-                forks -= 1
-        if not asked and forks == 0:
+            while ended := os.waitpid(-1, os.WNOHANG)[0]:
+                forks.discard(ended)
+        if not asked and not forks:
             channel.shutdown(socket.SHUT_RD)  # earlier requests are still served
         if not asked:
             continue
         packet, descriptors, _, _ = socket.recv_fds(channel, 1 << 16, 4)
         if not packet:
+            launchers.close()
             _end()
         module, *arguments = json.loads(packet)
         _load(module)
-        if os.fork() == 0:
+        fork = os.fork()
+        if fork == 0:
             channel.close()
-            _become_first_process(socket.socket(fileno=descriptors[0]), descriptors[1:])
+            _become_first_process(socket.socket(fileno=descriptors[0]), descriptors[1:], launchers)
             return module, arguments
-        forks += 1
+        forks.add(fork)
         for descriptor in descriptors:
             os.close(descriptor)
 
@@ -133,7 +138,7 @@ def _load(module: str) -> None:
     keep_shared()
 
 
-def _become_first_process(life_line: socket.socket, streams: list[int]) -> None:
+def _become_first_process(life_line: socket.socket, streams: list[int], launchers: socket.socket) -> None:
     """Return only in a new process with its own namespaces.
 
     This process waits for its end and reports its exit status.
@@ -156,8 +161,10 @@ def _become_first_process(life_line: socket.socket, streams: list[int]) -> None:
         prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
         life_line.close()
         _furnish()
+        spare_launcher.ask(launchers)
         _fork_main_process()
         return
+    launchers.close()
     with contextlib.suppress(OSError):
         life_line.send(BEGUN)
     handle = os.pidfd_open(first)
@@ -192,6 +199,7 @@ def _fork_main_process() -> None:
     main_process = os.fork()
     if main_process == 0:
         os.setsid()
+        cpu_use.count_all_below(os.getppid())  # the spare launcher is no descendant of this process
         return
     while True:
         pid, status = os.wait()

@@ -18,7 +18,8 @@ class Limits:
     """The limits of a launch. Sizes are in bytes."""
 
     memory: int = 512 * MIB
-    """The sum, over all programs, of the memory that they do not share with each other."""
+    """The sum, over all processes, of the memory that they have beyond what the launcher had loaded. Memory that a
+    program shares with processes which it starts itself counts for each of them."""
     address_space: int = 2048 * MIB
     """The limit of one process. A node's threads alone reserve 0.4 GiB."""
     processes: int = 192

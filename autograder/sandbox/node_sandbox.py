@@ -18,6 +18,7 @@ from pathlib import Path
 
 from autograder.core.errors import KitError
 from autograder.core.results import Isolation
+from autograder.sandbox import spare_launcher
 from autograder.sandbox.environment import INSIDE, python_environment
 from autograder.sandbox.limits import Limits
 from autograder.sandbox.loop import Loop
@@ -56,6 +57,8 @@ class NodeSandbox:
         self._said = -1
         """A file with what the launcher writes to its standard error."""
         self._closed = False
+        self._may_use_spare = True
+        """Whether the launcher may be one that is loaded already; not after such a launcher was lost."""
         self._scratch = None if isolation is Isolation.FULL else Scratch()
         # bwrap ends with the thread that started it, so this thread starts it and runs as long as the sandbox.
         self._loop = Loop(self._busy, self._look)
@@ -78,6 +81,7 @@ class NodeSandbox:
                 group.wait_ready(_READY_WITHIN)
             except (OSError, GroupLost) as error:
                 why = self._last_words() or str(error)
+                self._may_use_spare = False
                 self._loop.do(self._end_launcher)
                 self._loop.do(self._spawn)
                 continue
@@ -161,8 +165,12 @@ class NodeSandbox:
         python = [sys.executable, "-I"]
         try:
             if self._scratch is None:
-                self._launcher = bubblewrap.start_bwrap(
-                    bubblewrap.inner_options(self.folder, self.limits, python_environment()),
+                options = bubblewrap.inner_options(self.folder, self.limits, python_environment())
+                with contextlib.suppress(OSError):  # then this sandbox starts a launcher of its own
+                    if self._may_use_spare:
+                        self._launcher = spare_launcher.start_launcher(options, theirs.fileno(), self._said)
+                self._launcher = self._launcher or bubblewrap.start_bwrap(
+                    options,
                     [*python, f"{bubblewrap.KIT_FOLDER}/launcher.py", end],
                     (theirs.fileno(),),
                     stderr=self._said,

@@ -22,7 +22,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from autograder.core.errors import KitError
-from autograder.core.processes import Process, descendants, memory, pid_of, proportional_memory
+from autograder.core.processes import Process, descendants, memory, pid_of
 from autograder.sandbox.limits import Limits
 from autograder.sandbox.loop import Loop
 from autograder.sandbox.running_program import RunningProgram
@@ -161,10 +161,9 @@ def enforce_limits(first: int, base: int, programs: Sequence[RunningProgram], li
     own = memory(first) - base
     if own > limits.memory:
         return False
-    if own + sum(max(0, memory(pid) - base) for pid in family) > limits.memory:
-        sizes = {pid: proportional_memory(pid) for pid in family}
-        if sum(sizes.values()) > limits.memory:
-            _end_biggest(programs, family, sizes, "memory limit")
+    sizes = {pid: max(0, memory(pid) - base) for pid in family}
+    if own + sum(sizes.values()) > limits.memory:
+        _end_biggest(programs, family, sizes, "memory limit")
     if sum(process.threads for process in family.values()) >= limits.processes - 8:
         _end_biggest(programs, family, {pid: process.threads for pid, process in family.items()}, "process limit")
     return True

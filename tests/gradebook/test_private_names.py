@@ -7,8 +7,10 @@ from __future__ import annotations
 
 import ast
 import inspect
+from collections.abc import Callable
 from pathlib import Path
 
+import nbformat
 import pytest
 from places import ROOT
 
@@ -18,6 +20,7 @@ prepare_nbgrader()
 
 import nbgrader  # noqa: E402
 from nbgrader.converters import Autograde  # noqa: E402
+from nbgrader.nbgraderformat import MetadataValidator, common  # noqa: E402
 from nbgrader.preprocessors import Execute, SaveAutoGrades  # noqa: E402
 from nbgrader.validator import Validator  # noqa: E402
 
@@ -55,6 +58,29 @@ def test_nbgrader_asks_for_the_version_of_its_tables_where_the_kit_answers() -> 
     assert "alembic_version = get_alembic_version()" in inspect.getsource(nbgrader.api.Gradebook.__init__)
     newest = Path(private_nbgrader.ALEMBIC_DIR, "versions").glob(f"{private_nbgrader.version_of_tables()}_*.py")
     assert len(list(newest)) == 1
+
+
+@pytest.mark.parametrize(
+    ("code", "call"),
+    [
+        (nbgrader.api.Gradebook.__init__, "create_engine(db_url, echo=False, future=True)"),
+        (nbgrader.api.Gradebook.__init__, "Base.metadata.create_all(bind=self.engine)"),
+        (nbgrader.api.Gradebook.close, "self.engine.dispose()"),
+        (common.BaseMetadataValidator.validate_cell, "jsonschema.validate(cell.metadata['nbgrader'], self.schema)"),
+        (SaveAutoGrades._add_comment, "self.gradebook.db.commit()"),
+    ],
+    ids=lambda value: value if isinstance(value, str) else "",
+)
+def test_nbgrader_repeats_its_work_where_the_kit_does_it_once(code: Callable[..., object], call: str) -> None:
+    assert call in inspect.getsource(code)
+
+
+def test_a_cell_that_does_not_fit_its_schema_is_still_refused() -> None:
+    private_nbgrader.do_not_repeat()
+    cell = {"schema_version": 3, "grade": True, "locked": True, "solution": False, "points": "many", "grade_id": "one"}
+    for _ in range(2):
+        with pytest.raises(common.ValidationError, match="many"):
+            MetadataValidator().validate_cell(nbformat.v4.new_code_cell(metadata={"nbgrader": cell}))
 
 
 @pytest.mark.parametrize("path", OTHERS, ids=lambda path: path.stem)

@@ -101,9 +101,10 @@ def part_of(pid: int) -> str:
     words = read_text(f"/proc/{pid}/cmdline").split("\0")
     if words[0].endswith("bwrap"):
         return "bubblewrap"
-    numbers = read_text(f"/proc/{pid}/status").partition("NSpid:")[2].partition("\n")[0].split()
     if any(word.endswith("launcher.py") for word in words):
-        return "launchers" if numbers[-1] == "1" else "students' programs"  # the first process of its namespace
+        status = read_text(f"/proc/{pid}/status")
+        first = status.partition("NSpid:")[2].partition("\n")[0].split()[-1] == "1"  # of its namespace: of a launch
+        return "students' programs" if "\nSeccomp:\t2" in status and not first else "launchers"
     if any(word.endswith("fork_server") for word in words):
         return "workers" if read_text(f"/proc/{pid}/comm").strip() == "worker" else "fork server"
     return "grading command: nbgrader, feedback"

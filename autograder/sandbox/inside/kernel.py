@@ -13,6 +13,7 @@ MS_REMOUNT, MS_BIND, MS_REC, MS_PRIVATE = 0x20, 0x1000, 0x4000, 1 << 18
 PR_SET_PDEATHSIG, PR_SET_DUMPABLE, PR_SET_NAME, PR_SET_CHILD_SUBREAPER = 1, 4, 15, 36
 _PR_SET_SECCOMP, _PR_SET_NO_NEW_PRIVS = 22, 38
 _PR_CAPBSET_DROP, _PR_CAP_AMBIENT, _PR_CAP_AMBIENT_CLEAR_ALL = 24, 47, 4
+CAP_SETPCAP, CAP_SYS_ADMIN = 8, 21
 
 libc = ctypes.CDLL(None, use_errno=True)
 prctl = libc.prctl
@@ -44,21 +45,24 @@ def filter_calls(content: bytes) -> None:
         raise OSError("the filter of system calls was refused")
 
 
-def give_up_privileges() -> None:
-    """Give up every capability, in this process and in all that it starts later, and check that none is left.
+def give_up_privileges(*kept: int) -> None:
+    """Give up capabilities, in this process and in all that it starts later, and check that none of them is left.
+
+    Args:
+        kept: the numbers of the capabilities that are not given up.
 
     Raises:
         OSError: a capability is left.
     """
-    number = 0
-    while prctl(_PR_CAPBSET_DROP, number, 0, 0, 0) == 0:
+    number, wanted = 0, sum(1 << one for one in kept)
+    while number in kept or prctl(_PR_CAPBSET_DROP, number, 0, 0, 0) == 0:
         number += 1  # the call fails after the last capability that the kernel knows
     checked(prctl(_PR_CAP_AMBIENT, _PR_CAP_AMBIENT_CLEAR_ALL, 0, 0, 0))
     header = struct.pack("II", 0x20080522, 0)  # capset(2), version 3
-    checked(libc.capset(header, bytes(24)))
+    checked(libc.capset(header, struct.pack("6I", wanted, wanted, 0, 0, 0, 0)))
     checked(prctl(_PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0))
     with open("/proc/self/status") as status:
-        left = [line for line in status if line.startswith("Cap") and int(line.split()[1], 16) != 0]
+        left = [line for line in status if line.startswith("Cap") and int(line.split()[1], 16) & ~wanted]
     if left:
         raise OSError(f"privileges are left: {' '.join(left)}")
 

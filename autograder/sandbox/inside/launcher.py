@@ -8,9 +8,10 @@ There are three kinds of processes, each of which is a fork of the one before:
 - the programs. They cannot see the launcher, and cannot read, write, stop or end the first process. They cannot read or
   write each other's memory either.
 
-Usage: launcher.py FD [SCRATCH]. FD is one end of a SOCK_SEQPACKET pair; `requests.py` describes the messages on it. The
-launcher and each first process end, with all their descendants, when their socket is closed. The launcher then removes
-the folder SCRATCH, unless the process that started it is still alive.
+Usage: launcher.py FD [SCRATCH], or launcher.py --warm FD. FD is one end of a SOCK_SEQPACKET pair; `requests.py`
+describes the messages on it. The launcher and each first process end, with all their descendants, when their socket is
+closed. The launcher then removes the folder SCRATCH, unless the process that started it is still alive. With `--warm`,
+this is the server that `warm_launchers.py` describes.
 """
 
 import importlib
@@ -37,9 +38,12 @@ def _parts(*names: str) -> list[Any]:
 
 
 if __name__ == "__main__":
-    launches, program, warm_up = _parts("launches", "program", "warm_up")
+    launches, program, warm_launchers, warm_up = _parts("launches", "program", "warm_launchers", "warm_up")
     warm_up.warm_up()
-    launch = launches.serve_launches(socket.socket(fileno=int(sys.argv[1])), "".join(sys.argv[2:]))
+    if sys.argv[1] == "--warm":
+        launch = launches.serve_launches(warm_launchers.serve_submissions(socket.socket(fileno=int(sys.argv[2]))), "")
+    else:
+        launch = launches.serve_launches(socket.socket(fileno=int(sys.argv[1])), "".join(sys.argv[2:]))
     start = launches.serve_programs(launch)
     program.become(start)
     program.run(start)

@@ -24,6 +24,7 @@ _NAMESPACES = [
     *("--hostname", "robot"),  # to hide the machine's own name
 ]
 _LIFE = ["--die-with-parent", "--new-session"]
+_KIT = ["--ro-bind", str(INSIDE), KIT_FOLDER]
 
 
 def bwrap() -> str:
@@ -118,6 +119,7 @@ def outer_options(variables: Mapping[str, str], copies: Mapping[str, int]) -> li
     return [
         *_NAMESPACES, "--unshare-net", *_LIFE, "--uid", "1000", "--gid", "1000",
         "--perms", "1777", "--tmpfs", "/tmp", *system_options(copies), *_python(), *_read_only([PACKAGE]),
+        *_KIT,
         "--proc", "/proc", "--dev", "/dev", "--remount-ro", "/dev", "--remount-ro", "/", "--chdir", "/tmp",
         *_environment(variables),
     ]  # fmt: skip
@@ -131,12 +133,11 @@ def inner_options(folder: Path, limits: Limits, variables: Mapping[str, str]) ->
     capabilities, and sets the filter of system calls, before any of the student's code starts.
     """
     size = str(limits.disk)
-    kit = ["--ro-bind", str(INSIDE), KIT_FOLDER]
     return [
         *_NAMESPACES, "--cap-add", "CAP_SYS_ADMIN", "--cap-add", "CAP_SETPCAP", "--disable-userns",
         "--as-pid-1", *_LIFE,
         "--size", size, "--perms", "1777", "--tmpfs", "/tmp",
-        *system_options(), *_python(), *kit, "--ro-bind", str(folder), STUDENT_FOLDER,
+        *system_options(), *_python(), *_KIT, "--ro-bind", str(folder), STUDENT_FOLDER,
         "--proc", "/proc", "--dev", "/dev", "--size", size, "--perms", "1777", "--tmpfs", "/dev/shm",
         "--remount-ro", "/dev", "--remount-ro", "/", "--chdir", STUDENT_FOLDER,
         *_environment(variables),
@@ -152,7 +153,7 @@ def build_options(source: Path, variables: Mapping[str, str]) -> list[str]:
     return [
         *_NAMESPACES, "--unshare-net", "--disable-userns", "--as-pid-1", *_LIFE,
         "--size", str(BUILD_DISK), "--perms", "1777", "--tmpfs", "/tmp",
-        *system_options(), *_python(), "--ro-bind", str(INSIDE), KIT_FOLDER, "--ro-bind", str(source), STUDENT_FOLDER,
+        *system_options(), *_python(), *_KIT, "--ro-bind", str(source), STUDENT_FOLDER,
         "--proc", "/proc", "--dev", "/dev", "--remount-ro", "/dev", "--remount-ro", "/", "--chdir", "/tmp",
         *_environment(variables),
     ]  # fmt: skip
