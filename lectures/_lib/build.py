@@ -1,7 +1,6 @@
 """Build book and slides: `python build.py OUTPUT [more options for Sphinx]`, every lecture's cells included.
 
-What a lecture measures is measured once more if it did not hold. On a busy machine a program may come too late for an
-experiment; a statement that is wrong fails the second time, too, and with it the build.
+What a lecture measures is measured once more if it did not hold (`_ext/execution.py`).
 """
 
 from __future__ import annotations
@@ -13,8 +12,6 @@ from pathlib import Path
 
 LECTURES = Path(__file__).resolve().parent.parent
 TARGETS = (("html", "book", LECTURES), ("revealjs", "slides", LECTURES / "slides"))
-DID_NOT_HOLD = "Executing notebook failed"
-"""What MyST-NB says of a lecture of which a cell failed."""
 
 
 def build(output: Path, options: list[str]) -> int:
@@ -29,14 +26,9 @@ def build(output: Path, options: list[str]) -> int:
         command = [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", "-b", builder, "-c", str(LECTURES)]
         command += ["-d", str(output / "doctrees" / name), "-D", f"nb_execution_cache_path={output / 'cache'}"]
         command += [*options, str(source), str(output / name)]
-        done = subprocess.run(command, stderr=subprocess.PIPE, text=True)
-        if DID_NOT_HOLD in done.stderr:
-            print(done.stderr, "Not everything held that is measured: what failed is run once more.", file=sys.stderr)
-            # Sphinx takes the pages of before for finished, unless it forgets what it knows of them.
-            done = subprocess.run([*command, "-E"], stderr=subprocess.PIPE, text=True)
-        if done.returncode != 0:
-            print(done.stderr, file=sys.stderr)
-            return done.returncode
+        status = subprocess.run(command).returncode
+        if status != 0:
+            return status
         # MyST-NB writes those of both builds into one folder, where a talk would take the place of its lecture.
         if (output / "jupyter_execute").is_dir():
             shutil.copytree(output / "jupyter_execute", output / name / "notebooks", dirs_exist_ok=True)
