@@ -16,6 +16,7 @@ import time
 import zipfile
 from pathlib import Path
 
+import forked_command
 import psutil
 import pytest
 import toy
@@ -44,10 +45,9 @@ def start(root: Path, *arguments: str, **more: object) -> subprocess.Popen[str]:
 
 
 def run(root: Path, *arguments: str) -> tuple[int, str, str]:
-    process = start(root, *arguments)
-    out, err = process.communicate(timeout=180)
-    assert "Traceback" not in err, err
-    return process.returncode, out, err
+    done = forked_command.run(root, *arguments)
+    assert "Traceback" not in done.stderr, done.stderr
+    return done.returncode, done.stdout, done.stderr
 
 
 @pytest.fixture(scope="module")

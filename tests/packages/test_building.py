@@ -418,8 +418,8 @@ def test_a_package_that_nobody_wrote_is_said_to_be_missing(found: dict[str, Chec
 
 
 def test_a_build_is_used_again_for_the_same_files_and_for_no_others() -> None:
-    typo = changed(INTERFACES, "CMakeLists.txt", "project(", "projekt(")
-    other = {**typo, "msg/Thing.msg": "string label\n"}
+    refused = changed(INTERFACES, "package.xml", "</package>", "")  # by colcon, at once and for a reason that is known
+    other = {**refused, "msg/Thing.msg": "string label\n"}
     cells = [Cell(grade_id="check", points=1, source='with build("things") as package:\n    package.expect_built()')]
 
     def built(files: Mapping[str, str]) -> dict[str, Any]:
@@ -427,7 +427,7 @@ def test_a_build_is_used_again_for_the_same_files_and_for_no_others() -> None:
         isolation = Isolation.FULL if preflight().full else Isolation.NONE
         return with_interfaces(Job(student="ann", lab="lab", digest="0", isolation=isolation, seed=1, **what), 1).built
 
-    (first,), (again,), (different,) = (list(built(files).items()) for files in (typo, typo, other))
+    (first,), (again,), (different,) = (list(built(files).items()) for files in (refused, refused, other))
     assert first[0] == again[0] and first[1] is again[1]
     assert different[0] != first[0] and different[1] is not first[1]
 

@@ -174,11 +174,23 @@ def test_an_interrupted_environment_is_made_anew(tmp_path: Path) -> None:
     assert found.stdout == "{}\n", found.stderr
 
 
-def test_the_active_environment_is_not_built_on_itself(small: Path) -> None:
-    path = f"{small / '.venv' / 'bin'}:{ENVIRON['PATH']}"
-    (small / ".venv" / MARKER.name).unlink()
+def test_an_unpinned_package_is_refused_and_the_environment_made_anew_but_not_on_itself(small: Path) -> None:
+    for lock in ("requirements.lock", "requirements-dev.lock"):
+        write_lock(small, lock, "uv", "defusedxml")
+        head, package = (small / lock).read_text().split("defusedxml", 1)
+        (small / lock).write_text(head + "defusedxml" + re.sub(r"sha256:\w{8}", "sha256:00000000", package))
+    done = make(small, "setup")
+    assert done.returncode == 2
+    assert "hash" in done.stderr.lower()
+    assert not imports(small, "defusedxml")
+    assert not (small / ".venv" / MARKER.name).exists()
+
+    for lock in ("requirements.lock", "requirements-dev.lock"):
+        write_lock(small, lock, "uv")
+    path = f"{small / '.venv' / 'bin'}:{ENVIRON['PATH']}"  # as in a shell in which it is active
     done = make(small, "setup", path=path, VIRTUAL_ENV=str(small / ".venv"))
     assert done.returncode == 0, done.stderr
+    assert "Creating .venv again" in done.stderr
     assert f": {small}" not in done.stderr
     assert make(small, "setup", path=path).stderr == ""
 
@@ -257,25 +269,14 @@ def test_without_network_it_says_so(tmp_path: Path) -> None:
     assert not (folder / ".venv" / MARKER.name).exists()
 
 
-def test_pip_helps_where_uv_does_not_manage(tmp_path: Path) -> None:
-    folder = check_out(tmp_path / "course")
-    write_lock(folder, "requirements.lock", "uv", "annotated-doc")
-    done = make(folder, "setup", UV_DEFAULT_INDEX=UNREACHABLE, UV_NO_CACHE="1", UV_HTTP_RETRIES="0")
+def test_pip_helps_where_uv_does_not_manage(small: Path) -> None:
+    for lock in ("requirements.lock", "requirements-dev.lock"):
+        write_lock(small, lock, "uv", "mdurl")
+    assert not imports(small, "mdurl")
+    done = make(small, "setup", UV_DEFAULT_INDEX=UNREACHABLE, UV_NO_CACHE="1", UV_HTTP_RETRIES="0")
     assert "uv failed" in done.stderr
     assert done.returncode == 0, done.stderr
-    assert imports(folder, "annotated_doc")
-
-
-def test_a_package_that_is_not_the_pinned_one_is_refused(tmp_path: Path) -> None:
-    folder = check_out(tmp_path / "course")
-    lock = folder / "requirements.lock"
-    write_lock(folder, lock.name, "uv", "annotated-doc")
-    head, package = lock.read_text().split("annotated-doc", 1)
-    lock.write_text(head + "annotated-doc" + re.sub(r"sha256:\w{8}", "sha256:00000000", package))
-    done = make(folder, "setup")
-    assert done.returncode == 2
-    assert "hash" in done.stderr.lower()
-    assert not imports(folder, "annotated_doc")
+    assert imports(small, "mdurl")
 
 
 @pytest.mark.parametrize(
