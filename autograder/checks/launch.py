@@ -306,10 +306,12 @@ class Launch(Ros):
         if current.check.records is not None and self._running.programs:
             with contextlib.suppress(ForgedGraph, ValueError):  # a program may have told nonsense of itself
                 current.check.records.append(record(self._running, self._insides()))
-        if current.check.front_end is not None:
+        here = current.check.front_end
+        if here is not None:
             with contextlib.suppress(ForgedGraph):
                 self._running.graph = picture_data.graph(self._observer)
-            if any(program.running() for _, program in self._running.programs):
+            # A check draws its picture when it fails, and a student should not wait for what nobody looks at.
+            if not here.scored and any(program.running() for _, program in self._running.programs):
                 self._observer.pause(_PROBE_WRITES)
             return
         varied = [node.may_vary_names() for node, _ in self._running.programs]

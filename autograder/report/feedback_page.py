@@ -117,27 +117,9 @@ def feedback_html(
     cells = {cell.grade_id: cell for cell in grade.cells}
     repairs = _repairs(tasks, cells, checks)
     first = {name for repair in repairs for name in repair.checks}
-    sections = []
-    for number, task in enumerate(tasks, start=1):
-        graded = [
-            _graded(cells[name], checks.get(name), task, decided.get(name), fold=name not in first)
-            for name in task.graded
-            if name in cells
-        ]
-        of_task = [cells[name] for name in task.graded if name in cells]
-        sections.append(
-            {
-                "title": task.title,
-                "anchor": f"task-{number}",
-                "points": _points(of_task),
-                "verdict": _verdict(of_task, [checks[name] for name in task.graded if name in checks], task),
-                "graded": graded,
-                "lost": [
-                    name for name in task.graded if name not in decided and _lost(cells.get(name), checks.get(name))
-                ],
-                "programs": [(name, text) for name, text in task.answers.items() if name not in task.graded],
-            }
-        )
+    sections = [
+        _section(f"task-{number}", task, cells, checks, decided, first) for number, task in enumerate(tasks, start=1)
+    ]
     return render(
         "feedback.html",
         heading=heading,
@@ -155,6 +137,31 @@ def feedback_html(
         digest=result.digest[:12] if result is not None else "",
         isolation=result.isolation.value if result is not None else "",
     )
+
+
+def _section(
+    anchor: str,
+    task: Task,
+    cells: Mapping[str, CellGrade],
+    checks: Mapping[str, CheckResult],
+    decided: Mapping[str, Decided],
+    first: set[str],
+) -> dict[str, object]:
+    """Return what the page shows of a task; the pictures of checks that are not repaired first are folded."""
+    graded = {name: cells[name] for name in task.graded if name in cells}
+    of_task = list(graded.values())
+    return {
+        "title": task.title,
+        "anchor": anchor,
+        "points": _points(of_task),
+        "verdict": _verdict(of_task, [checks[name] for name in task.graded if name in checks], task),
+        "graded": [
+            _graded(cell, checks.get(name), task, decided.get(name), fold=name not in first)
+            for name, cell in graded.items()
+        ],
+        "lost": [name for name, cell in graded.items() if name not in decided and _lost(cell, checks.get(name))],
+        "programs": [(name, text) for name, text in task.answers.items() if name not in task.graded],
+    }
 
 
 def _parts(
@@ -222,9 +229,9 @@ def _graded(cell: CellGrade, check: CheckResult | None, task: Task, decided: Dec
     )
 
 
-def _lost(cell: CellGrade | None, check: CheckResult | None) -> bool:
+def _lost(cell: CellGrade, check: CheckResult | None) -> bool:
     """Return whether an attempted check lost points."""
-    if cell is None or check is None or cell.points is None or cell.points >= cell.max_points:
+    if check is None or cell.points is None or cell.points >= cell.max_points:
         return False
     return words.verdict(check) is not Verdict.NOT_ATTEMPTED
 
