@@ -5,9 +5,10 @@ what it shows. Check cells, lectures and the reports of failed checks use the sa
 """
 
 from autograder.core.results import Picture
+from autograder.pictures.arrivals import Traffic, arrivals
 from autograder.pictures.graph import Endpoint, graph, qos
 from autograder.pictures.lifecycle import lifecycle, steps
-from autograder.pictures.timeline import Run, Runs, Traffic, arrivals, timeline
+from autograder.pictures.timeline import Run, Runs, timeline
 
 __all__ = [
     "Endpoint",
