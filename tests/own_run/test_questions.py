@@ -120,7 +120,7 @@ def answer(record: Record, question: Question) -> str:
 def test_of_real_runs_every_key_is_what_a_replay_of_the_run_shows(lab_name: str) -> None:
     records = recorded(lab_name)
     asked = [(record, question) for record in records for kind in questions.KINDS for question in kind(record)]
-    assert len({question.kind for _, question in asked}) >= 3
+    assert len({question.kind for _, question in asked}) >= 2
     for record, question in asked:
         assert key(record, question) == answer(record, question), question
         assert not question.choices or key(record, question) in question.choices, question
