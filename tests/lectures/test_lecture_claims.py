@@ -109,7 +109,8 @@ def run(
     request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
 ) -> Iterator[Callable[[Path], dict[str, bool]]]:
     """Run the pages of all chosen tests side by side, the longest first; return what gives the result of one."""
-    chosen = [item.callspec.params["table"] for item in request.session.items if "run" in item.fixturenames]
+    here = [item for item in request.session.items if item.path == request.path and "run" in item.fixturenames]
+    chosen = [item.callspec.params["table"] for item in here]
 
     def mutated_page(table: Path) -> dict[str, bool]:
         changes = yaml.safe_load(table.read_text(encoding="utf-8"))
