@@ -123,6 +123,7 @@ INSTRUCTORS = (
     "report/viva_page.py",
     "report/templates/answers.html",
     "report/templates/class.html",
+    "report/templates/instructors_page.html",
     "report/templates/term.html",
     "report/templates/viva.html",
 )
