@@ -18,9 +18,7 @@ from autograder.core.files import write_beside
 from autograder.core.output import plain
 from autograder.core.version import VERSION
 
-_CARD = (
-    "border:1px solid #8c8c8c; border-radius:6px; box-sizing:border-box; min-width:620px; max-width:100%; height:auto"
-)
+_CARD = "border:1px solid #8c8c8c; border-radius:6px; box-sizing:border-box; max-width:100%; height:auto"
 """The style of a picture. It paints its own background; the border shows where it ends on a page of the same colour."""
 
 
@@ -39,15 +37,10 @@ class Picture(BaseModel):
     """A description of the picture in words."""
 
     def html(self) -> str:
-        """Return the `<img>` element as a card that is readable on light and dark pages.
-
-        It is never so narrow that its words become unreadable: on a phone it is moved sideways.
-        """
+        """Return the `<img>` element as a card that is readable on light and dark pages."""
         data = base64.b64encode(self.svg.encode()).decode()
         return (
-            '<span style="display:block; overflow-x:auto">'
             f'<img alt="{escape(" ".join(self.alt.split()))}" src="data:image/svg+xml;base64,{data}" style="{_CARD}">'
-            "</span>"
         )
 
     def _repr_html_(self) -> str:

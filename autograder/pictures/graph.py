@@ -294,7 +294,7 @@ def _match(
     narrow = column < _LEAST_COLUMN
     canvas.words(centre, y + 24, "✗" if narrow else f"✗ {policy}", size=SMALL + 1, anchor="middle", bold=True)
     said = [policy] if narrow else [f"offers {offer.value(policy)}", f"asks {request.value(policy)}"]
-    size = SMALL - 4 if narrow else SMALL - 3
+    size = SMALL - 4 if narrow else SMALL - 2
     for number, words in enumerate(said):
         canvas.words(centre, y + 45 + number * 19, shortened(words, column - 4, size), size=size, anchor="middle")
 

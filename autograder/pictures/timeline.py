@@ -183,7 +183,7 @@ def timeline(
     height = 12 + 2 * TEXT + 14 + sum(_height(title, own) for title, own in sections.items())
     keys = _keys(shown, looks if by == "thread" else {}, _least(left, length))
     lines = _key_lines(keys)
-    canvas = Canvas(height + len(lines) * _KEY_LINE, WIDTH)
+    canvas = Canvas(height + max(4, (len(lines) - 1) * _KEY_LINE), WIDTH)
     y = 8.0
     for title, own in sections.items():
         if title:
@@ -198,7 +198,7 @@ def timeline(
             canvas.words(left + 8, y + TEXT, "no callback ran", italic=True)
             y += _LANE
         y += 8
-    _draw_key(canvas, height, lines)
+    _draw_key(canvas, height - 36, lines)  # its first line stands beside the word "seconds"
     return canvas.picture(_alt(shown, length))
 
 
@@ -367,14 +367,14 @@ def _keys(shown: Mapping[str, Sequence[Run]], looks: Mapping[_Callback, int], ba
 
 
 def _key_lines(keys: Sequence[_Key]) -> list[list[tuple[float, _Key]]]:
-    """Distribute the keys to lines; each is returned with where it begins."""
-    lines: list[list[tuple[float, _Key]]] = []
-    x = WIDTH
+    """Distribute the keys to lines; each is returned with where it begins. The first line leaves room for "seconds"."""
+    lines: list[list[tuple[float, _Key]]] = [[]]
+    x, end = 14.0, WIDTH - 24 - width_of("seconds", SMALL)
     for key in keys:
         width = 54 + width_of(key.words, SMALL)
-        if x + width > WIDTH:
+        if x + width > end:
             lines.append([])
-            x = 14.0
+            x, end = 14.0, WIDTH
         lines[-1].append((x, key))
         x += width
     return lines
