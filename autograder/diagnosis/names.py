@@ -256,13 +256,13 @@ def why_no_endpoint(scene: Scene, topic: str, msg_type: type | None, kind: str, 
         if end.topic_type == (wanted or end.topic_type) and node_of(end) == (node or node_of(end))
     }
     twins = _twins(scene, topic)
-    # What only other nodes have, such as the car of a world, is not what the student wrote.
+    # What the car of a world has, or uses, has its right name, so it is not what the student meant to call otherwise.
     written = {name for inside in scene.insides for name in inside.nodes}
     near = [
         name
         for name in (meant or used)
-        for owners in [{node_of(end) for end in reach(name)}]
-        if not owners <= twins and (not written or owners & written)
+        for users in [{node_of(end) for end in [*observer.publishers(name), *observer.subscriptions(name)]}]
+        if not {node_of(end) for end in reach(name)} <= twins and (not written or users <= written)
     ]
     found = _idle_rule(scene, topic, node)
     unmade = taken_away(scene, topic, kind, node) or not_made_yet(scene, topic, kind, node)

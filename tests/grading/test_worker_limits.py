@@ -154,7 +154,7 @@ def test_an_interrupt_that_comes_while_workers_are_begun_ends_those_that_run(mon
         return submit(pool, *call)  # type: ignore[arg-type]
 
     monkeypatch.setattr(ThreadPoolExecutor, "submit", interrupted)
-    stuck = "import time\ntime.sleep(1000)\nscore(1)"
+    stuck = "import time\ntime.sleep(1000)  # launch(…)\nscore(1)"  # a check that launches has a worker of its own
     asked = time.monotonic()
     with pytest.raises(KeyboardInterrupt):
         run_in_workers(job(stuck, stuck), 2)

@@ -132,7 +132,7 @@ def test_every_launch_file_names_packages_and_programs_that_are_written(
                 assert f'"{program} = ' in setup, (launch, program)
         for beside in re.findall(r"\$\(dirname\)/([\w.]+)", launch.read_text(encoding="utf-8")):
             assert (launch.parent / beside).is_file(), (launch, beside)
-    named = {"lab3_remapping": ["camera_lab"], "lab8_bringup": ["car_lab", "porter_lab"]}
+    named = {"lab3_remapping": ["camera_lab"], "lab8_bringup": ["car_lab", "porter_lab"], "lab9_delivery": ["delivery"]}
     assert list(written) == named.get(path, [path])
 
 
