@@ -40,12 +40,12 @@ def print_talks(folder: Path) -> list[Path]:
     with sync_playwright() as playwright:
         started = playwright.chromium.launch(executable_path=browser, args=["--no-sandbox", "--disable-gpu"])
         window = started.new_page(viewport={"width": 1280, "height": 720})
+        window.add_init_script("addEventListener('pdf-ready', () => { window.laidOut = true })")
         for deck in decks:
             for ending, notes in FORMS.items():
                 window.goto(f"{deck.resolve().as_uri()}?print-pdf{notes}")
-                window.wait_for_function(
-                    "Reveal.isReady() && document.querySelectorAll('.pdf-page').length >= Reveal.getTotalSlides()"
-                )
+                # All pages are there earlier, but reveal.js still moves them, and then only one would be printed.
+                window.wait_for_function("window.laidOut")
                 window.add_style_tag(content=NOTES_STYLE)
                 file = deck.with_name(f"{deck.stem}{ending}.pdf")
                 window.pdf(path=file, prefer_css_page_size=True, print_background=True)

@@ -117,7 +117,8 @@ def test_a_page_of_which_a_cell_failed_is_run_once_more(tmp_path: Path, fails: i
 @pytest.fixture
 def page(browser: Any) -> Iterator[Any]:
     """Open a window as large as a projector; whatever a page asks for beyond its own folder fails the test."""
-    window = browser.new_page(viewport={"width": 1280, "height": 720})
+    # Without motion a colour is there at once, so that nothing is measured on its way from one to another.
+    window = browser.new_page(viewport={"width": 1280, "height": 720}, reduced_motion="reduce")
     window.set_default_timeout(1000 * BROWSER_SECONDS)
     outside: list[str] = []
     window.on(
