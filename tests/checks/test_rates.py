@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from autograder.checks.expect.rates import at_rate, in_time, in_words, too_slow
+from autograder.checks.expect.rates import at_rate, in_time, in_words, together, too_slow
 from autograder.graph.recording import Received
 
 
@@ -36,19 +36,19 @@ def test_messages_at_their_rate(messages: list[Received]) -> None:
 
 
 @pytest.mark.parametrize(
-    ("messages", "said"),
+    ("messages", "said", "close"),
     [
-        (received([0.1 * n for n in range(10)]), "10.0 Hz"),
-        (received([0.04 * n for n in range(10)]), "25.0 Hz"),
-        (received([at for n in range(5) for at in (0.05 * n, 0.05 * n + 0.001)]), "close together"),
-        (received([at for n in range(5) for at in (0.05 * n, 0.05 * n + 0.001)][1:]), "close together"),
-        (received([0.0] * 10), "all at once"),
+        (received([0.1 * n for n in range(10)]), "10.0 Hz", False),
+        (received([0.04 * n for n in range(10)]), "25.0 Hz", False),
+        (received([at for n in range(5) for at in (0.05 * n, 0.05 * n + 0.001)]), "44.8 Hz", True),
+        (received([at for n in range(5) for at in (0.05 * n, 0.05 * n + 0.001)][1:]), "40.0 Hz", True),
+        (received([0.0] * 10), "all at once", False),
     ],
     ids=["too slow", "too fast", "two timers", "two timers, an odd number of gaps", "a burst"],
 )
-def test_messages_at_another_rate(messages: list[Received], said: str) -> None:
+def test_messages_at_another_rate(messages: list[Received], said: str, close: bool) -> None:
     assert not at_rate(messages, 20, 0.2)
-    assert said in in_words(messages)
+    assert (in_words(messages), together(messages)) == (said, close)
 
 
 def test_messages_chosen_by_what_they_say_are_not_lost_in_between() -> None:

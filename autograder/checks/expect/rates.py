@@ -82,6 +82,10 @@ def in_words(received: Sequence[Received], every: bool = True) -> str:
     gaps = _gaps(received, every)
     if not gaps or sum(gaps) <= 0 or statistics.median(gaps) <= 0:
         return "all at once"
-    if _in_bursts(gaps, sum(gaps) / len(gaps)):
-        return f"{len(gaps) / sum(gaps):.1f} Hz on the average, and several close together,"
-    return f"{1 / statistics.median(gaps):.1f} Hz"
+    return f"{len(gaps) / sum(gaps) if together(received, every) else 1 / statistics.median(gaps):.1f} Hz"
+
+
+def together(received: Sequence[Received], every: bool = True) -> bool:
+    """Whether several messages came close together, so that a median says nothing about their rate."""
+    gaps = _gaps(received, every)
+    return bool(gaps) and _in_bursts(gaps, statistics.fmean(gaps))

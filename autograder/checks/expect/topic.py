@@ -332,10 +332,11 @@ class Topic(Sources):
         if not right():
             self._sure_if(not rates.too_slow(last, rate, every))
             measured = rates.in_words(last, every)
+            bursts = " on the average, and several come close together" * rates.together(last, every)
             self._fail(
                 wanted.title,
                 RATE(
-                    f"The messages arrive at {measured} instead of {rate:g} Hz. "
+                    f"The messages arrive at {measured} instead of {rate:g} Hz{bursts}. "
                     + diagnosis.paces(self._scene(), wanted.recording.topic),
                 ),
                 expected=f"{rate:g} Hz within {tolerance:.0%}",
