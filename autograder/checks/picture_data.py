@@ -114,7 +114,7 @@ def _names(inside: Inside) -> dict[int, str]:
     return names
 
 
-_OF_KIND = {"execute": "outside of all groups", "task": "outside of all groups", "": "callback group not known"}
+_OF_KIND = {"execute": "outside of all groups", "task": "outside of all groups", "": "group not known"}
 """What stands for the group of a callback whose kind says it. rclpy runs the execute callback of an action as a task of
 the executor, whatever the server's group is. The probe sees no group of a callback such as that for feedback."""
 
@@ -127,7 +127,7 @@ def _name(thing: Thing) -> str:
         return f"timer {thing.period:g} s"
     if thing.kind == "action_server":  # each of its runs is one feedback message
         return f"feedback of {thing.name}"
-    return f"{thing.kind} {thing.name}".strip() or (f"callback in {thing.line}" if thing.line else "rclpy itself")
+    return f"{thing.kind} {thing.name}".strip() or (f"callback in {thing.line}" if thing.line else "callback outside your code")
 
 
 def _groups(inside: Inside) -> dict[int, str]:

@@ -499,7 +499,10 @@ def built_in_short_time(folder: Path, cpu: str) -> str:
 
 
 def test_a_build_that_hardly_does_anything_has_taken_too_long_and_not_been_kept_from_it(tmp_path: Path) -> None:
-    assert built_in_short_time(tmp_path, str(max(os.sched_getaffinity(0)))) == "time"
+    found = built_in_short_time(tmp_path, str(max(os.sched_getaffinity(0))))
+    if found != "time" and os.getloadavg()[0] > 8 * len(os.sched_getaffinity(0)):
+        pytest.skip("this machine had too much else to do, so the build was kept from it indeed")
+    assert found == "time"
 
 
 def test_a_build_that_others_kept_from_the_cpu_has_not_taken_too_long(tmp_path: Path, crowded_cpu: str) -> None:
