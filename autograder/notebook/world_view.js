@@ -81,6 +81,11 @@ function drawRoom(box, room, cars) {
   };
 }
 
+// Changes a text only if it is another one: each change is an event that a screen reader has to work through.
+function write(node, text) {
+  if (node.textContent !== text) node.textContent = text;
+}
+
 function button(parent, text, press) {
   const made = element(parent, "button", { type: "button" }, text);
   made.addEventListener("click", press);
@@ -137,9 +142,11 @@ function render({ model, el }) {
   const kills = new Map();
   for (const name of programs) kills.set(name, button(buttons, `Kill ${name}`, () => send({ do: "kill", name })));
 
+  // In an application a screen reader leaves the arrow keys to the page. It reads the name of what has the focus in it.
+  const keys = element(right, "div", { role: "application", "aria-label": "Steering" });
   const pad = element(
-    right, "div",
-    { class: "aw-pad", tabindex: 0, role: "application", "aria-label": "Drive with the arrow keys", "data-lm-suppress-shortcuts": "true" },
+    keys, "div",
+    { class: "aw-pad", tabindex: 0, role: "group", "aria-label": "Drive with the arrow keys", "data-lm-suppress-shortcuts": "true" },
     "Click here, or come here with Tab, and drive with the arrow keys.",
   );
   const stop = steering(pad, send);
@@ -155,7 +162,7 @@ function render({ model, el }) {
     const row = element(meters, "div");
     element(row, "span", {}, `${name || "speed"} `);
     const meter = element(row, "meter", { min: 0, max: 1, value: 0, "aria-label": `speed ${name}` });
-    return { meter, text: element(row, "span", { class: "aw-figure" }), state: element(meters, "div", { class: "aw-state" }) };
+    return { meter, text: element(row, "span", { class: "aw-figure", "aria-hidden": "true" }), state: element(meters, "div", { class: "aw-state" }) };
   });
   const table = element(right, "table");
   element(table, "caption", {}, "Messages a second");
@@ -172,23 +179,23 @@ function render({ model, el }) {
       return;
     }
     move(message);
-    pause.textContent = message.paused ? "Go on" : "Pause";
+    write(pause, message.paused ? "Go on" : "Pause");
     message.cars.forEach(({ speed, state }, number) => {
       speeds[number].meter.value = Math.abs(speed);
-      speeds[number].text.textContent = ` ${speed.toFixed(2)} m/s`;
-      speeds[number].state.textContent = state;
+      write(speeds[number].text, ` ${speed.toFixed(2)} m/s`); // the meter tells it to a screen reader
+      write(speeds[number].state, state);
     });
     for (const [name, made] of kills) {
       const ended = !message.running.includes(name);
       made.setAttribute("aria-disabled", ended); // a button that is disabled would lose the focus
-      made.textContent = ended ? `${name} has ended` : `Kill ${name}`;
+      write(made, ended ? `${name} has ended` : `Kill ${name}`);
     }
-    rates.replaceChildren();
-    for (const [topic, rate] of message.rates) {
-      const row = element(rates, "tr");
-      element(row, "th", { scope: "row" }, topic);
-      element(row, "td", {}, rate.toFixed(0));
-    }
+    while (rates.children.length > message.rates.length) rates.lastChild.remove();
+    message.rates.forEach(([topic, rate], number) => {
+      const row = rates.children[number] ?? element(rates, "tr");
+      write(row.children[0] ?? element(row, "th", { scope: "row" }), topic);
+      write(row.children[1] ?? element(row, "td"), rate.toFixed(0));
+    });
     for (const sentence of message.news) element(news, "li", {}, sentence);
     while (news.children.length > NEWS_KEPT) news.firstChild.remove();
   };
