@@ -33,7 +33,10 @@ from autograder.submission.reader import read_submission
 LABS = kill_matrix.labs()
 MEMBERS = [(lab, student) for lab in LABS for student in sample_class.students(lab)]
 ALONE = "the solution, with each check's own files alone"
-SETTINGS = Settings(force=True, jobs=4 * len(os.sched_getaffinity(0)))
+SHARED = int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1")) > 1
+"""Whether other processes of this run grade other labs at the same time; `pytest_collection_modifyitems` lets about two
+of them do so."""
+SETTINGS = Settings(force=True, jobs=(2 if SHARED else 4) * len(os.sched_getaffinity(0)))
 LEAVE_ONLY = """
 from autograder.checks import current
 for name, text in {files!r}.items():
@@ -131,21 +134,46 @@ def each_check_alone(lab: Lab, job: Job) -> Job:
     return job.model_copy(update={"cells": cells})
 
 
+class Classes:
+    """Everybody whose test runs (`-k` may leave most of them out), several at a time as `autograder grade` does.
+
+    Where other processes grade other labs, a lab begins when its first test asks.
+
+    Args:
+        pool: runs what is begun.
+        wanted: labs and students.
+        complete: whether every check of everybody runs.
+        stop: ends all runs.
+    """
+
+    def __init__(
+        self, pool: ThreadPoolExecutor, wanted: list[tuple[str, str]], complete: bool, stop: threading.Event
+    ) -> None:
+        self._pool, self._wanted, self._complete, self._stop = pool, wanted, complete, stop
+        self._futures: dict[tuple[str, str], Future[SubmissionResult]] = {}
+
+    def result(self, lab: str, student: str) -> SubmissionResult:
+        """Wait for what a student gets."""
+        if (lab, student) not in self._futures:
+            self._begin([one for one in self._wanted if one[0] == lab or not SHARED])
+        return self._futures[lab, student].result()
+
+    def _begin(self, members: list[tuple[str, str]]) -> None:
+        grades = {(name, student): grading(load_lab(ROOT, name), student, self._complete) for name, student in members}
+        for (name, student), grade in grades.items():
+            same = None if self._complete or student != ALONE else self._futures.get((name, "solution"))
+            self._futures[name, student] = same or self._pool.submit(grade, self._stop)
+
+
 @pytest.fixture(scope="session")
-def graded(request: pytest.FixtureRequest) -> Iterator[dict[tuple[str, str], Future[SubmissionResult]]]:
-    """Everybody whose test runs (`-k` may leave most of them out), several at a time as `autograder grade` does."""
+def graded(request: pytest.FixtureRequest) -> Iterator[Classes]:
+    """The classes of all labs."""
     chosen = [item.callspec.params for item in request.session.items if hasattr(item, "callspec")]
     wanted = [(p["lab_name"], p["student"]) for p in chosen if {"lab_name", "student"} <= p.keys()]
-    complete = request.config.getoption("complete")
     stop = threading.Event()
     with ThreadPoolExecutor(SETTINGS.at_once) as pool:
         try:
-            jobs = {(name, student): grading(load_lab(ROOT, name), student, complete) for name, student in wanted}
-            futures: dict[tuple[str, str], Future[SubmissionResult]] = {}
-            for (name, student), grade in jobs.items():
-                same = None if complete or student != ALONE else futures.get((name, "solution"))
-                futures[name, student] = same or pool.submit(grade, stop)
-            yield futures
+            yield Classes(pool, wanted, request.config.getoption("complete"), stop)
         finally:
             stop.set()
             pool.shutdown(cancel_futures=True)
@@ -199,19 +227,15 @@ def lost_parts(check: CheckResult) -> list[str]:
 
 
 @pytest.mark.parametrize(("lab_name", "student"), MEMBERS)
-def test_a_student_gets_exactly_the_expected_points_and_reasons(
-    lab_name: str, student: str, graded: dict[tuple[str, str], Future[SubmissionResult]]
-) -> None:
-    result = graded[lab_name, student].result()
+def test_a_student_gets_exactly_the_expected_points_and_reasons(lab_name: str, student: str, graded: Classes) -> None:
+    result = graded.result(lab_name, student)
     assert differences(load_lab(ROOT, lab_name), student, result) == []
     skip_if_too_busy(result)
 
 
 @pytest.mark.parametrize(("lab_name", "student"), [(lab, ALONE) for lab in LABS])
-def test_no_other_answer_reaches_a_check(
-    lab_name: str, student: str, graded: dict[tuple[str, str], Future[SubmissionResult]]
-) -> None:
-    result = graded[lab_name, student].result()
+def test_no_other_answer_reaches_a_check(lab_name: str, student: str, graded: Classes) -> None:
+    result = graded.result(lab_name, student)
     assert [one for one in result.checks if one.points != one.max_points and not was_too_busy(one)] == []
     skip_if_too_busy(result)
 

@@ -22,6 +22,9 @@ from autograder.course.cells import grade_id_of
 from autograder.course.lab import Lab, load_lab
 from autograder.course.paths import CoursePaths
 
+_LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+"""The one in C, where PyYAML has it, reads these hundreds of files ten times as fast."""
+
 
 @dataclass
 class Expected:
@@ -60,7 +63,9 @@ def students(lab: str) -> list[str]:
 
 
 def _yaml(path: Path) -> dict[str, Any]:
-    return (yaml.safe_load(path.read_text(encoding="utf-8")) or {}) if path.is_file() else {}
+    if not path.is_file():
+        return {}
+    return yaml.load(path.read_text(encoding="utf-8"), Loader=_LOADER) or {}
 
 
 def _only(mapping: dict[str, Any], known: set[str], path: Path) -> None:

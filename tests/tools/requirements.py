@@ -8,6 +8,7 @@ fails for a sentence that is in neither list. As a script it writes `tests/class
 
 from __future__ import annotations
 
+import functools
 import sys
 from pathlib import Path
 
@@ -25,8 +26,9 @@ PAGE = ROOT / "tests" / "classes" / "REQUIREMENTS.md"
 LOST_PAGE = PAGE.with_name("BROKEN_AND_LOST.md")
 
 
+@functools.cache
 def read(lab: str) -> Requirements:
-    """A lab's requirements."""
+    """A lab's requirements; the file is long, and it is asked for at every point that somebody loses."""
     return read_file(sample_class.class_folder(lab) / "requirements.yaml")
 
 

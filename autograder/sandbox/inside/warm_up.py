@@ -4,6 +4,7 @@ import contextlib
 import functools
 import gc
 import importlib
+import inspect
 import sys
 import threading
 from typing import Any
@@ -58,13 +59,29 @@ _MODULES = (
     "builtin_interfaces.msg",
     "geometry_msgs.msg",
     "lifecycle_msgs.srv",
+    "rcl_interfaces.msg",
     "rcl_interfaces.srv",
     "sensor_msgs.msg",
     "std_msgs.msg",
     "std_srvs.srv",
+    "type_description_interfaces.srv",
 )
 _GENERATOR = "rosidl_generator_py.generate_py_impl"
-_TYPES = ("std_msgs.msg:String", "std_msgs.msg:Int32", "std_srvs.srv:Trigger", "std_srvs.srv:SetBool")
+_TYPES = (
+    "std_msgs.msg:String",
+    "std_msgs.msg:Int32",
+    "std_srvs.srv:Trigger",
+    "std_srvs.srv:SetBool",
+    # Every node makes these: its publisher of parameter events, its parameter services, and its type descriptions.
+    "rcl_interfaces.msg:ParameterEvent",
+    "rcl_interfaces.srv:DescribeParameters",
+    "rcl_interfaces.srv:GetParameterTypes",
+    "rcl_interfaces.srv:GetParameters",
+    "rcl_interfaces.srv:ListParameters",
+    "rcl_interfaces.srv:SetParameters",
+    "rcl_interfaces.srv:SetParametersAtomically",
+    "type_description_interfaces.srv:GetTypeDescription",
+)
 
 
 def warm_up() -> None:
@@ -81,6 +98,7 @@ def warm_up() -> None:
         attach.prepare()
     with contextlib.suppress(Exception):  # the probe reports what has changed in rclpy
         keep_answers(sys.modules["rclpy.action"].ActionClient)
+    _find_modules_by_file()
     keep_shared()
     # From here on, no program can trace this process or its forks, or open their memory or descriptors. This is done
     # after the imports.
@@ -105,6 +123,16 @@ def load_ros() -> None:
             # the type support in every program.
             getattr(importlib.import_module(module), kind).__class__.__import_type_support__()
     del sys.modules[_GENERATOR]
+
+
+def _find_modules_by_file() -> None:
+    """Let `inspect` learn which file each loaded module is from.
+
+    rclpy's loggers ask it where a line is logged, and the first answer in a process takes longer than making a node,
+    because `inspect` resolves the path of every loaded module. It keeps what it has found, and so do the forks.
+    """
+    with contextlib.suppress(Exception):
+        inspect.getmodule(inspect.currentframe())
 
 
 def keep_shared() -> None:
