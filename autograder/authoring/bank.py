@@ -178,11 +178,14 @@ def _submission(entry: Banked, lab: Lab) -> Submission:
 
 def _differences(name: str, entry: Banked, result: SubmissionResult) -> list[Difference]:
     found = []
-    for one in result.checks:
-        before = entry.points.get(one.grade_id)
-        known = entry.explained.get(one.grade_id)
-        if before is None or one.points == before or (known is not None and known.points == one.points):
-            continue  # nobody had decided, or the check is new
-        why = one.first_failure.because if one.first_failure is not None else ""
-        found.append(Difference(name, one.grade_id, before, one.points, why))
+    today = {one.grade_id: one for one in result.checks}
+    for check_id, before in entry.points.items():
+        one, known = today.get(check_id), entry.explained.get(check_id)
+        now = one.points if one is not None else None
+        if before is None or now == before or (known is not None and known.points == now):
+            continue  # nobody had decided, or somebody has explained it
+        why = "It gives no result any more."
+        if one is not None:
+            why = one.first_failure.because if one.first_failure is not None else ""
+        found.append(Difference(name, check_id, before, now, why))
     return found

@@ -71,7 +71,9 @@ def explain_difference(
     entry: Annotated[str, typer.Argument(help="The entry, as `bank check` names it.")],
     check: Annotated[str, typer.Argument(help="The check, by its id.")],
     reason: Annotated[str, typer.Argument(help="Why today's points are right.")],
-    now: Annotated[float, typer.Option("--points", help="The points that the check gives today.")],
+    now: Annotated[
+        float | None, typer.Option("--points", help="The points that the check gives today; default: no result.")
+    ] = None,
     course: CourseOption = None,
 ) -> None:
     """Record why today's points of an entry are right. `bank check` lists the entry again if they change once more."""

@@ -107,9 +107,10 @@ def _show_run(
 ) -> None:
     """Show a run of the course's own check with everything that it found."""
     from autograder.cli.explain import pictures
+    from autograder.core.files import write_beside
     from autograder.course.paths import CoursePaths
     from autograder.course.settings import read_book
-    from autograder.grading.messages import write_mcap
+    from autograder.grading.messages import timeline_of, write_mcap
     from autograder.report.terminal import evidence_view
 
     folder = CoursePaths(root).explained / "appeals" / name / f"run_{number + 1}"
@@ -121,6 +122,9 @@ def _show_run(
         screen.print(f"values    {', '.join(result.varied)}", markup=False)
     screen.print(f"messages  {_by_topic(messages)}", markup=False)
     if messages:
+        timeline = folder / "messages.svg"
+        write_beside(timeline, timeline_of(result.title or result.grade_id, messages).svg)
+        print(timeline)
         try:
             write_mcap(messages, folder / "messages")
         except KitError as error:  # the library for it is not installed

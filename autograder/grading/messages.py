@@ -14,14 +14,19 @@ from typing import Any
 from pydantic import ValidationError
 
 from autograder.core.errors import KitError
-from autograder.core.results import CheckResult
+from autograder.core.results import CheckResult, Picture
 from autograder.course.lab import Lab
+from autograder.grading.builds import with_interfaces
 from autograder.grading.runner import Settings, job_of
 from autograder.grading.supervisor import limit
 from autograder.graph.recording import BagMessage
+from autograder.pictures.arrivals import Traffic, arrivals
 from autograder.ros2.interfaces import source_of
 from autograder.sandbox.grading_sandbox import run_in_sandbox
 from autograder.submission.reader import read_submission
+
+_MOST_ROWS = 12
+"""The number of topics in a picture."""
 
 
 def received(
@@ -38,7 +43,7 @@ def received(
     """
     job = job_of(read_submission(notebook, lab), student, lab, settings)
     cells = [cell for cell in job.cells if cell.points is None or cell.grade_id in wanted]
-    job = job.model_copy(update={"cells": cells, "messages": True})
+    job = with_interfaces(job.model_copy(update={"cells": cells, "messages": True}), 1)
     seconds = limit(len(wanted)) + job.build_seconds
     run = run_in_sandbox(["autograder.grading.worker"], job.model_dump_json().encode("utf-8"), job.isolation, seconds)
     checks, messages = [], []
@@ -51,6 +56,14 @@ def received(
         except ValidationError:
             break  # if the worker died, its last line may be incomplete
     return checks, messages
+
+
+def timeline_of(title: str, messages: Sequence[BagMessage]) -> Picture:
+    """Return a picture of when messages were published: a row for each topic, in the order of their first messages."""
+    times: dict[str, list[float]] = {}
+    for message in sorted(messages, key=lambda one: one.stamp):
+        times.setdefault(message.topic, []).append(message.stamp / 1e9)
+    return arrivals(title, [Traffic(topic, times[topic]) for topic in list(times)[:_MOST_ROWS]])
 
 
 def write_mcap(messages: Sequence[BagMessage], folder: Path) -> list[str]:

@@ -58,3 +58,12 @@ def test_a_release_waits_until_every_difference_is_explained(tmp_path: Path, mon
     notebook.write_text(notebook.read_text().replace("within=60", "within=50"))
     with pytest.raises(KitError, match="was not run with today's version"):
         release(root, toy.LAB)
+
+    notebook.write_text(notebook.read_text().replace("check_answers", "check_table"))  # its points are nobody's now
+    status, said = run(root, "check", toy.LAB, "--isolation", "none")
+    assert status == 1 and said.count("check_answers: 2 → ?: It gives no result any more.") == 2
+    with pytest.raises(KitError, match="2 differences are unexplained"):
+        release(root, toy.LAB)
+    for path in (root / "bank" / toy.LAB).glob("*.json"):
+        assert run(root, "explain", toy.LAB, path.stem, "check_answers", "It has another name.")[0] == 0
+    assert run(root, "check", toy.LAB, "--isolation", "none")[0] == 0

@@ -21,7 +21,9 @@ from autograder.course.paths import CoursePaths
 from autograder.gradebook.class_run import grade_class
 from autograder.gradebook.grades import read_grades, read_history
 from autograder.grading.appeal import MOST_BYTES, read_appeal
+from autograder.grading.messages import timeline_of
 from autograder.grading.runner import Settings
+from autograder.graph.recording import BagMessage
 
 SENTENCE = "My talker ends as it should."
 
@@ -110,6 +112,16 @@ def test_the_answers_say_whose_it_is_and_not_the_name_in_the_file(course: Course
     assert done.exit_code and "nobody handed in these answers; the file says 'ann'" in done.output
     assert "Nobody in the class handed in the answers" in str(done.stderr_bytes)
     assert {one.student: one.earned for one in read_grades(course.root)} == {"ann": 2, "bob": 2}
+
+
+def test_the_messages_of_a_run_are_drawn_with_a_row_for_each_topic() -> None:
+    came = [("/late", 3), ("/early", 2), ("/early", 1)]
+    messages = [
+        BagMessage(grade_id="check", topic=topic, type="std_msgs/msg/Int64", stamp=second * 10**9, data="")
+        for topic, second in came
+    ]
+    picture = timeline_of("The talker", messages)
+    assert "The talker" in picture.svg and picture.alt.index("/early") < picture.alt.index("/late")
 
 
 def deep(made: dict[str, Any]) -> dict[str, Any]:
