@@ -30,6 +30,8 @@ CELL = re.compile(r"^```\{code-cell\}[^\n]*\n(.*?)^```$", re.MULTILINE | re.DOTA
 OPTIONS = re.compile(r"\A(?:---\n.*?\n---\n|(?::\w[^\n]*\n)+\n?)", re.DOTALL)
 HELD = "HELD "
 """What stands before the result in the last cell's output."""
+ENDED = "a cell ended with"
+"""How a line on standard error begins that says which cell raised what."""
 AT_ONCE = 3 * len(os.sched_getaffinity(0))
 """The pages that run at a time: each uses a CPU for about a sixth of its time."""
 STARTS_WITHIN = 300
@@ -67,6 +69,10 @@ def held(sources: list[str], folder: Path) -> dict[str, bool]:
         resources={"metadata": {"path": str(folder)}},
     )  # fmt: skip
     client.execute(env={**os.environ, "PYTHONPATH": path, "LECTURES": str(LECTURES)})
+    for cell in notebook.cells:
+        for output in cell.outputs:
+            if output.output_type == "error":  # its statements do not hold for another reason than the page's programs
+                print(f"{ENDED} {output.ename}: {output.evalue!r}\n    in: {cell.source[:60]!r}", file=sys.stderr)
     said: list[Any] = [output.get("text", "") for output in notebook.cells[-1].outputs]
     return dict(json.loads(next(text for text in said if text.startswith(HELD)).removeprefix(HELD)))
 

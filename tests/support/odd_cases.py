@@ -225,14 +225,6 @@ CASES = {
         (('"camera_driver"', _ELSEWHERE),),
         "transitions were made",
     ),
-    "a count at its lowest": Case(
-        "lab4_lifecycle",
-        "check_obstacle_counter",
-        "obstacle_counter",
-        (("Int32(data=self.count)", "Int32(data=-(2**31))"),),
-        "",
-        held=True,
-    ),
     "counts that become empty": Case(
         "lab5_qos",
         "check_sensor_monitor",

@@ -18,6 +18,7 @@ import subprocess
 import sys
 import tomllib
 from collections.abc import Callable
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -89,6 +90,10 @@ def in_kit(*command: str) -> str:
     environment = {**os.environ, "PATH": path, "PYTHONPATH": "tests/support"}
     program = KIT / ".venv" / "bin" / command[0]
     done = subprocess.run([program, *command[1:]], cwd=KIT, env=environment, capture_output=True, text=True)
+    # A cell that raises takes all its statements with it, so the reason is worth a look.
+    for line, place in pairwise(done.stderr.splitlines()):
+        if line.startswith("a cell ended with"):
+            print(f"{command[-1]}: {line}\n{place}", file=sys.stderr)
     if not done.stdout.strip():
         sys.exit(f"{' '.join(command)} printed nothing. Its last words:\n{done.stderr[-2000:]}")
     return done.stdout
