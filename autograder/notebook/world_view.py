@@ -298,7 +298,6 @@ class WorldView:
             "rays": ends,
         }
 
-
     def _seen(self, name: str) -> list[tuple[float, float]]:
         """Return the directions and the metres of the rays that are shown of a car."""
         if self._scans:

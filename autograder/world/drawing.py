@@ -28,6 +28,8 @@ _BADGES = 20
 _MARGIN = 40.0
 _BRAKE = 9.0
 """The side of the square where a car was braked."""
+_BESIDE = 18.0
+"""The way from the trail to that square, so that it does not cover the seconds."""
 
 
 @dataclass(frozen=True)
@@ -156,9 +158,10 @@ class _Panel:
         return "M" + "L".join("{:.1f} {:.1f}".format(*self.at(*corner)) for corner in corners) + "Z"
 
     def brake(self, pose: Pose) -> None:
-        """Draw a small square where the watchdog began to brake a car."""
+        """Draw a small square beside the trail, where the watchdog began to brake a car."""
         x, y = self.at(pose.x, pose.y)
-        self._canvas.box(x - _BRAKE / 2, y - _BRAKE / 2, _BRAKE, _BRAKE, fill="#000")
+        left = x + _BESIDE * math.sin(pose.heading) - _BRAKE / 2
+        self._canvas.box(left, y + _BESIDE * math.cos(pose.heading) - _BRAKE / 2, _BRAKE, _BRAKE, fill="#000")
 
     def cross(self, x: float, y: float, size: float = 14.0) -> None:
         """Draw a cross in a ring around a point."""
