@@ -212,14 +212,20 @@ class Launch(Ros):
         """
         self._end()
 
-    def show(self) -> None:
+    def show(self, *, scan: str = "", buttons: Mapping[str, Callable[[], object]] | None = None) -> None:
         """Show the world of the launch live, below the cell, while the cells after it go on.
 
         It stops with the launch; then the picture of the world with the trails takes its place. At grading it does
         nothing.
 
+        Args:
+            scan: the relative name of the topic whose rays are shown, as long as scans come on it; by default the
+                rays are those of the world's own lidar.
+            buttons: what each further button of the view does when it is clicked, by the words on it; a text that is
+                returned is told below the picture.
+
         Example:
-            `robot = launch("driver", world="room").start(); robot.show()`
+            `robot.show(buttons={"Cancel": lambda: goal.cancel()})`
         """
         here = current.check.front_end
         if self._world is None:
@@ -230,7 +236,7 @@ class Launch(Ros):
             return
         if self._running.view is not None:
             self._running.view.close()
-        self._running.view = here.show(self._running)
+        self._running.view = here.show(self._running, scan, buttons or {})
 
     def log(self, program: str = "") -> Log:
         """Return what the programs, or one of them, have printed so far; also after the block.

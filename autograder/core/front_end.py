@@ -6,7 +6,7 @@ interface, not the notebook.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -67,8 +67,8 @@ class FrontEnd(Protocol):
     def watch(self, observer: Any, programs: Callable[[], Sequence[Any]]) -> Watcher:
         """Start to show what happens during a launch: what the check waits for, and what the programs print."""
 
-    def show(self, running: Any) -> View:
-        """Start to show the world of a running launch, below the running cell."""
+    def show(self, running: Any, scan: str, buttons: Mapping[str, Callable[[], object]]) -> View:
+        """Start to show the world of a running launch, below the running cell, with the lab's own buttons."""
 
 
 active: FrontEnd | None = None

@@ -187,7 +187,7 @@ class Observer:
                 self.patience.withheld.measure()
             if self._error is not None:  # otherwise the silence would be blamed on the program
                 raise KitError(f"The observer hears nothing any more: {self._error!r}.", "Run it again.")
-            late = now >= deadline or give_up()
+            late = now >= deadline or self._closing or give_up()
             if ready():
                 return True
             if late:

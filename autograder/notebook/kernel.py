@@ -12,7 +12,7 @@ import re
 import sys
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -154,11 +154,11 @@ class Kernel:
         self._watch = Watch(observer, programs, streams=not self.scored, updates=self.updates_outputs)
         return self._watch
 
-    def show(self, running: RunningLaunch) -> WorldView:
+    def show(self, running: RunningLaunch, scan: str, buttons: Mapping[str, Callable[[], object]]) -> WorldView:
         """Begin to show the world of a launch, live."""
         from autograder.notebook.world_view import WorldView
 
-        return WorldView(running, lambda: self._in_cell)
+        return WorldView(running, lambda: self._in_cell, lambda: self._in_cell and self.scored, scan, buttons)
 
     @property
     def number(self) -> int:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import threading
 import time
 from collections.abc import Callable, Sequence
 from html import escape
@@ -135,6 +136,8 @@ class Watch:
 
     def look(self) -> None:
         """Show new output, and what the check waits for."""
+        if threading.current_thread() is not threading.main_thread():  # a button waits, which belongs to no cell
+            return
         now = time.monotonic()
         if now - self._looked < _LOOK_EVERY:
             return

@@ -43,6 +43,7 @@ function drawRoom(box, room, cars) {
   }
   const trails = cars.map((_, number) => element(up, "path", { class: `aw-trail aw-car${number % 4}` }));
   const rays = cars.map(() => element(up, "path", { class: "aw-rays" }));
+  const brakes = element(up, "g");
   const touches = element(up, "g");
   const [long, wide] = room.car;
   const drawCar = (look) => {
@@ -73,6 +74,8 @@ function drawRoom(box, room, cars) {
       const [x, y] = car.pose;
       rays[number].setAttribute("d", car.rays.map(([to, at]) => `M${x} ${y}L${to} ${at}`).join(""));
     });
+    brakes.replaceChildren();
+    for (const [x, y] of message.brakes) rectangle(brakes, [x - 0.05, y - 0.05, 0.1, 0.1], { class: "aw-brake" });
     touches.replaceChildren();
     for (const [x, y] of message.touches) {
       element(touches, "circle", { cx: x, cy: y, r: 0.1, class: "aw-touch" });
@@ -125,7 +128,7 @@ function steering(pad, send) {
 }
 
 function render({ model, el }) {
-  const { room, cars, programs, still } = model.get("scene");
+  const { room, cars, programs, still, buttons: own } = model.get("scene");
   el.classList.add("aw-view");
   // The picture below, which stands for this view where it cannot be shown, is not needed while this view is shown.
   const hidden = element(el, "style", {}, `.${still} { display: none; }`);
@@ -141,6 +144,11 @@ function render({ model, el }) {
   button(buttons, "Reset", () => send({ do: "reset" }));
   const kills = new Map();
   for (const name of programs) kills.set(name, button(buttons, `Kill ${name}`, () => send({ do: "kill", name })));
+
+  if (own.length) {
+    const row = element(right, "div", { class: "aw-buttons", role: "group", "aria-label": "The programs" });
+    for (const name of own) button(row, name, () => send({ do: "press", name }));
+  }
 
   // In an application a screen reader leaves the arrow keys to the page. It reads the name of what has the focus in it.
   const keys = element(right, "div", { role: "application", "aria-label": "Steering" });

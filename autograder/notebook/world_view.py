@@ -15,7 +15,7 @@ import math
 import threading
 import time
 import uuid
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -23,6 +23,7 @@ from typing import TYPE_CHECKING, Any
 from geometry_msgs.msg import Twist
 from rclpy.qos import QoSProfile
 
+from autograder.notebook.world_extras import Buttons, ShownScan
 from autograder.world import RunningWorld
 from autograder.world import car as cars
 from autograder.world.drawing import blocks, drawn, still, thinned
@@ -59,9 +60,15 @@ class WorldView:
     Args:
         running: the launch, which has a world.
         busy: tells whether a cell runs, while which a page may not be heard.
+        checking: tells whether it is a check, during which the lab's buttons do nothing.
+        scan: the topic of the rays that are shown, as seen from each car's namespace; by default the world's own.
+        buttons: what each of the lab's buttons does, by its words.
     """
 
-    def __init__(self, running: RunningLaunch, busy: Callable[[], bool]) -> None:
+    def __init__(
+        self, running: RunningLaunch, busy: Callable[[], bool], checking: Callable[[], bool],
+        scan: str, buttons: Mapping[str, Callable[[], object]],
+    ) -> None:  # fmt: skip
         """Begin to show it below the running cell."""
         assert running.world is not None
         self._running, self._busy = running, busy
@@ -75,6 +82,12 @@ class WorldView:
         self._news: list[str] = []
         self._told = _Told(running, self._world)
         self._rates = _Rates(self._world)
+        self._buttons = Buttons(buttons, self._tell, checking)
+        self._scans = {
+            name: ShownScan(running.observer, f"/{name}/{scan}" if name else f"/{scan}")
+            for name in (self._names if scan else ())
+        }
+        """The scans that are shown, by the car's namespace; empty for those of the world."""
         self._wheels: dict[str, Any] = {}
         """The publishers through which a page drives, by the car's namespace."""
         self._keys: tuple[str, float, float, float] | None = None
@@ -144,6 +157,7 @@ class WorldView:
         return {
             "cars": self._names,
             "still": self._still_class,
+            "buttons": self._buttons.words,
             "programs": list(dict.fromkeys(program.name for _, program in self._running.programs)),
             "room": {
                 "width": room.width,
@@ -176,6 +190,8 @@ class WorldView:
                 self._drive(name, float(content["speed"]), float(content["turn"]))
             case "kill":
                 self._kill(str(content["name"]))
+            case "press":
+                self._buttons.press(str(content["name"]))
 
     def _drive(self, name: str, speed: float, turn: float) -> None:
         """Drive as the keys say, until they say something else or nothing more comes."""
@@ -247,10 +263,13 @@ class WorldView:
             shown = [self._car(number, name, whole) for number, name in enumerate(self._names)]
             touches = [[round(one.x, 2), round(one.y, 2)] for record in world.records.values()
                        for one in list(record.touches)[-50:]]  # fmt: skip
+            brakes = [[round(one.pose.x, 2), round(one.pose.y, 2)] for record in world.records.values()
+                      for one in list(record.brakes)[-200:]]  # fmt: skip
         return {
             "whole": whole,
             "cars": shown,
             "touches": touches,
+            "brakes": brakes,
             "rates": self._rates.now(),
             "running": [program.name for _, program in self._running.programs if program.running()],
             "paused": self._world.paused,
@@ -266,24 +285,32 @@ class WorldView:
             0, len(trail) - new - 1
         )  # with the last one that was sent, from which the car may have been put away
         points = thinned([sample.pose for sample in islice(trail, since, None)], _APART)[-_TRAIL:]
-        metres, angles = world.scan(name)[::_EVERY_RAY], world.angles[::_EVERY_RAY] + car.pose.heading
         ends = [
-            [round(car.pose.x + one * math.cos(angle), 2), round(car.pose.y + one * math.sin(angle), 2)]
-            for one, angle in zip((min(float(one), RANGE_MAX) for one in metres), angles, strict=True)
-        ]
+            [round(car.pose.x + metres * math.cos(car.pose.heading + angle), 2),
+             round(car.pose.y + metres * math.sin(car.pose.heading + angle), 2)]
+            for angle, metres in self._seen(name)
+        ]  # fmt: skip
         return {
             "pose": [round(value, 3) for value in car.pose],
             "speed": round(car.speed, 2),
-            "state": _state(car),
+            "state": _state(car, world.missing(car)),
             "trail": [[round(pose.x, 2), round(pose.y, 2), jumped] for pose, jumped in points],
             "rays": ends,
         }
 
+    def _seen(self, name: str) -> list[tuple[float, float]]:
+        """Return the directions and the metres of the rays that are shown of a car."""
+        if self._scans:
+            return self._scans[name].rays(_EVERY_RAY)
+        world = self._world.simulation
+        metres = (min(float(one), RANGE_MAX) for one in world.scan(name)[::_EVERY_RAY])
+        return list(zip(map(float, world.angles[::_EVERY_RAY]), metres, strict=True))
 
-def _state(car: cars.Car) -> str:
+
+def _state(car: cars.Car, missing: str) -> str:
     if car.touches:
         return f"touches {car.touches}"
-    return "brakes: no command" if car.braked else ""
+    return f"brakes: no {missing}" if missing else ""
 
 
 class _Told:
@@ -294,6 +321,7 @@ class _Told:
         self._touches = {name: len(record.touches) for name, record in world.simulation.records.items()}
         self._places = {name: len(record.places) for name, record in world.simulation.records.items()}
         self._moves = dict.fromkeys(world.simulation.records, False)
+        self._held_up = {name: bool(record.brakes) for name, record in world.simulation.records.items()}
         self._ended: set[int] = set()
 
     def news(self) -> list[str]:
@@ -306,6 +334,9 @@ class _Told:
             for place in list(record.places)[self._places[name] :]:
                 found.append(f"{car} has reached {place}, after {record.places[place]:.1f} s.")
             self._touches[name], self._places[name] = len(record.touches), len(record.places)
+            if record.brakes and not self._held_up[name]:  # it may happen twice a second, so it is told once
+                self._held_up[name] = True
+                found.append(f"{car} was braked by its motors. A square marks each place where that happens.")
             trail: list[Sample] = list(record.trail)[-10:]
             moves = any(abs(sample.speed) > STANDS for sample in trail)
             if trail and moves != self._moves[name]:

@@ -26,6 +26,10 @@ _POINTS = 600
 _BADGES = 20
 """The badges with seconds that a trail has at the most."""
 _MARGIN = 40.0
+_BRAKE = 9.0
+"""The side of the square where a car was braked."""
+_BESIDE = 18.0
+"""The way from the trail to that square, so that it does not cover the seconds."""
 
 
 @dataclass(frozen=True)
@@ -35,6 +39,8 @@ class Way:
     name: str
     trail: Sequence[Sample]
     touches: Sequence[Touch] = ()
+    brakes: Sequence[Sample] = ()
+    """Where the watchdog began to brake the car, and it drove on later."""
 
     def until(self, time: float) -> Way:
         """Return the part of the way up to a moment."""
@@ -42,6 +48,7 @@ class Way:
             self,
             trail=[one for one in self.trail if one.time <= time],
             touches=[one for one in self.touches if one.time <= time],
+            brakes=[one for one in self.brakes if one.time <= time],
         )
 
 
@@ -76,7 +83,9 @@ def _way(world: Simulation, name: str, record: Record) -> Way:
     trail = list(record.trail) or [Sample(world.time, car.pose, car.speed, False)]
     if trail[-1].pose != car.pose:  # it has been placed since
         trail.append(Sample(world.time, car.pose, car.speed, False))
-    return Way(name, trail, list(record.touches))
+    # A program that ends leaves its car to the watchdog; that is no place at which the car was held up.
+    driven = max((one.time for one in trail if not one.braked and one.speed), default=0.0)
+    return Way(name, trail, list(record.touches), [one for one in record.brakes if one.time < driven])
 
 
 class _Panel:
@@ -148,6 +157,12 @@ class _Panel:
     def _closed(self, corners: Any) -> str:
         return "M" + "L".join("{:.1f} {:.1f}".format(*self.at(*corner)) for corner in corners) + "Z"
 
+    def brake(self, pose: Pose) -> None:
+        """Draw a small square beside the trail, where the watchdog began to brake a car."""
+        x, y = self.at(pose.x, pose.y)
+        left = x + _BESIDE * math.sin(pose.heading) - _BRAKE / 2
+        self._canvas.box(left, y + _BESIDE * math.cos(pose.heading) - _BRAKE / 2, _BRAKE, _BRAKE, fill="#000")
+
     def cross(self, x: float, y: float, size: float = 14.0) -> None:
         """Draw a cross in a ring around a point."""
         across, down = self.at(x, y)
@@ -198,7 +213,9 @@ def still(world: Drawn, marks: Sequence[Mark] = ()) -> Picture:
     """Draw a world with the trails of its cars; a cross and a sentence show each mark."""
     room = world.room
     scale = min((WIDTH - 2 * _MARGIN) / room.width, _TALLEST / room.height)
-    lines = [one for mark in marks for one in _wrapped(mark.text)]
+    lines = [one for mark in marks for one in _wrapped("✗", mark.text)]
+    if any(way.brakes for way in world.ways):
+        lines += _wrapped("■", "The motors braked here, because no command or no heartbeat had come for 0.3 s.")
     foot = 52 + (len(lines) + (1 if lines else 0)) * (SMALL + 8)
     canvas = Canvas(18 + room.height * scale + foot, WIDTH)
     panel = _Panel(canvas, room, (WIDTH - room.width * scale) / 2, 18, scale)
@@ -215,6 +232,8 @@ def _fill(panel: _Panel, world: Drawn, names: bool) -> None:
     panel.floor(names)
     for number, way in enumerate(world.ways):
         panel.trail(way, dashed=bool(number % 2), seconds=names)
+        for brake in way.brakes:
+            panel.brake(brake.pose)
     for pose in world.parked:
         panel.car(pose, _PARKED, "parked" if names else "")
     for number, way in enumerate(world.ways):
@@ -240,8 +259,8 @@ def _ruler(canvas: Canvas, panel: _Panel, room: Room) -> None:
     )
 
 
-def _wrapped(text: str) -> list[str]:
-    lines = ["✗"]
+def _wrapped(sign: str, text: str) -> list[str]:
+    lines = [sign]
     for word in text.split():
         if width_of(f"{lines[-1]} {word}", SMALL) > WIDTH - 2 * _MARGIN:
             lines.append("   ")
@@ -303,6 +322,8 @@ def _told(way: Way, room: Room) -> str:
         return f"{car} stands {where}."
     touched = f"; it touched something {'once' if len(way.touches) == 1 else f'{len(way.touches)} times'}"
     touched = touched if way.touches else "; it touched nothing"
+    times = "once" if len(way.brakes) == 1 else f"{len(way.brakes)} times"
+    touched += f"; its motors braked {times} on the way" if way.brakes else ""
     return (
         f"{car} drove {metres:.1f} m from ({first.pose.x:.1f}, {first.pose.y:.1f}) in {last.time - first.time:.1f} s"
         f" and is {where}{touched}."

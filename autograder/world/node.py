@@ -74,14 +74,15 @@ class CarNode:
         self._laser, self._camera = f"{prefix}laser", f"{prefix}camera_optical_frame"
         node = self.node
         self.counts = dict.fromkeys(TOPICS, 0)
-        """The messages that came on `cmd_vel`, and that were sent on the other topics."""
+        """The messages that came on `cmd_vel` and `heartbeat`, and that were sent on the other topics."""
         self._odometry = node.create_publisher(Odometry, "odom", 10)
         self._scan = node.create_publisher(LaserScan, "scan", qos_profile_sensor_data)
         self._image = node.create_publisher(Image, "camera/image_raw", qos_profile_sensor_data)
         self._battery = node.create_publisher(BatteryState, "battery_state", 10)
         node.create_subscription(Twist, "cmd_vel", self._commanded, QoSProfile(depth=1))
         if simulation.heartbeat:
-            node.create_subscription(Empty, "heartbeat", lambda _: simulation.beat(name), QoSProfile(depth=1))
+            self.counts["heartbeat"] = 0
+            node.create_subscription(Empty, "heartbeat", self._beat, QoSProfile(depth=1))
         node.create_service(Trigger, "~/reset", self._reset)
         start = simulation.driven[name].pose
         about = ParameterDescriptor(description="x and y in metres, heading in radians; setting it places the car")
@@ -92,6 +93,10 @@ class CarNode:
         self.counts["cmd_vel"] += 1
         self._heard = time.monotonic()
         self._world.command(self._name, message.linear.x, message.angular.z)
+
+    def _beat(self, _: Empty) -> None:
+        self.counts["heartbeat"] += 1
+        self._world.beat(self._name)
 
     def _reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         response.success, response.message = not self._closed, _CLOSED if self._closed else "The car is at its start."

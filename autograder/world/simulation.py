@@ -36,7 +36,7 @@ CLEAR = 0.03
 """The metres that must be free around a car before it can touch the same thing again."""
 KEPT = 20 * 60 * 20
 """The samples that are kept of a car: twenty minutes."""
-TOUCHES_KEPT = 1000
+TOUCHES_KEPT = BRAKES_KEPT = 1000
 
 
 class Sample(NamedTuple):
@@ -69,6 +69,8 @@ class Record:
 
     trail: deque[Sample] = field(default_factory=lambda: deque(maxlen=KEPT))
     touches: deque[Touch] = field(default_factory=lambda: deque(maxlen=TOUCHES_KEPT))
+    brakes: deque[Sample] = field(default_factory=lambda: deque(maxlen=BRAKES_KEPT))
+    """Where the car drove when the watchdog began to brake it."""
     places: dict[str, float] = field(default_factory=dict)
     """When the car's middle came onto each place for the first time, by the place's name."""
     metres: float = 0.0
@@ -130,10 +132,11 @@ class Simulation:
         with self.lock:
             self.driven[name].beat = self.time
 
-    def is_braked(self, car: Car) -> bool:
-        """Whether the watchdog keeps a car from driving."""
-        needed = [car.commanded, *([car.beat] if self.heartbeat else [])]
-        return self.time - min(needed) > WATCHDOG + STEP / 2
+    def missing(self, car: Car) -> str:
+        """Return what the watchdog of a car misses, `command` or `heartbeat`; empty if it lets the car drive."""
+        if self.time - car.commanded > WATCHDOG + STEP / 2:
+            return "command"
+        return "heartbeat" if self.heartbeat and self.time - car.beat > WATCHDOG + STEP / 2 else ""
 
     def reset(self, name: str) -> None:
         """Put a car where it began. What it did so far stays in its record."""
@@ -166,7 +169,9 @@ class Simulation:
                     record.places.setdefault(place, self.time)
 
     def _drive(self, car: Car, record: Record) -> None:
-        car.braked = self.is_braked(car)
+        was_braked, car.braked = car.braked, bool(self.missing(car))
+        if car.braked and not was_braked and abs(car.speed) > STANDS:
+            record.brakes.append(Sample(self.time, car.pose, car.speed, braked=True))
         car.accelerate((0.0, 0.0) if car.braked or not car.charge else car.wanted, STEP)
         car.use_battery(STEP)
         if not car.speed and not car.turn:

@@ -65,6 +65,30 @@ def test_a_button_works_while_a_cell_runs(notebook: Notebook) -> None:
     press.join()
 
 
+OWN = """from rclpy.qos import qos_profile_sensor_data
+from sensor_msgs.msg import LaserScan
+robot = launch("driver", world="room").start()
+robot.show(scan="seen", buttons={"Greet": lambda: "hello", "Break": lambda: 1 / 0})
+view, news = robot._running.view, []
+"""
+PRESSED = """for name in ("Greet", "Break", "Nothing"):
+    view._take({"do": "press", "name": name, "car": 0})
+robot.wait(lambda: news.extend(view._message()["news"]) or {"Greet: hello", "Break: division by zero"} <= set(news), 30)
+"""
+SEEN = """scan = LaserScan(angle_increment=0.1, range_max=8.0, ranges=[1.0, float("inf")] * 90)
+sender = robot.publisher("/seen", LaserScan, qos_profile_sensor_data)
+robot.wait(lambda: sender.publish(scan) or view._message()["cars"][0]["rays"], 30)
+"""
+
+
+def test_a_lab_adds_buttons_and_shows_the_rays_that_a_program_publishes(notebook: Notebook) -> None:
+    notebook.run(DRIVER)
+    assert not notebook.run(OWN).error
+    assert notebook.run('view._message()["cars"][0]["rays"]').result == "[]"
+    assert notebook.run(PRESSED).result == "True"
+    assert notebook.run(SEEN).result == "True"
+
+
 def test_what_cannot_be_shown_is_told(notebook: Notebook) -> None:
     notebook.run(DRIVER)
     assert "this launch has no world" in notebook.run('launch("driver").show()').error

@@ -38,6 +38,17 @@ def test_a_car_that_was_put_back_has_no_trail_across_the_room() -> None:
     assert "drove 2.2 m" in still(drawn(world)).alt
 
 
+def test_a_square_shows_where_the_motors_braked_unless_the_car_drove_no_further() -> None:
+    world = driven(2.0)
+    for _ in range(20):
+        world.step()
+    assert "braked" not in still(drawn(world)).alt and "■" not in still(drawn(world)).svg
+    world.command("", -0.5, 0.0)
+    for _ in range(20):
+        world.step()
+    assert "its motors braked once on the way" in still(drawn(world)).alt and "■" in still(drawn(world)).svg
+
+
 def test_a_film_strip_shows_moments_from_the_beginning_to_the_end() -> None:
     picture = strip(drawn(driven(5.0)), frames=4)
     assert re.findall(r">(\d\.\d) s<", picture.svg) == ["0.1", "1.7", "3.4", "5.0"]

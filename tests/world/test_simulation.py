@@ -132,6 +132,14 @@ def test_where_a_heartbeat_is_needed_commands_alone_do_not_move_the_car() -> Non
     assert world.driven[""].speed > 0
     drive(world, 0.6, 0.0, 0.6)
     assert world.driven[""].speed == 0.0
+    assert world.missing(world.driven[""]) == "heartbeat"
+    go_on(world, 0.6)
+    assert world.missing(world.driven[""]) == "command"
+    (brake,) = world.records[""].brakes
+    assert (
+        brake.time == pytest.approx(0.5 + 0.3 + STEP)
+        and world.room.starts[0].x < brake.pose.x < world.driven[""].pose.x
+    )
 
 
 @pytest.mark.parametrize("command", [(math.nan, 0.0), (0.5, math.inf), (-math.inf, math.nan)])
