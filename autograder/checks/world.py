@@ -64,8 +64,9 @@ class World:
             drawn = "\n" in self.room
             room = room_from(self.room, "of this check") if drawn else read_room(self.room, current.check.folder)
             names = [name.strip("/") for name in self.cars]
+            room = room if self.boxes else room.without_boxes()
             simulation = Simulation(
-                room if self.boxes else room.without_boxes(), names, heartbeat=self.heartbeat, seed=current.check.random.getrandbits(32)
+                room, names, heartbeat=self.heartbeat, seed=current.check.random.getrandbits(32)
             )  # fmt: skip
         except KitError as error:
             raise Misuse(f"World: {error.what} {error.do}") from None
