@@ -34,6 +34,7 @@ class World:
         remappings: rules for the names of the cars, such as `("cmd_vel", "control/command")`; the first match wins.
         patient: whether the world waits for programs that are late with a command, so that a car does not drive
             blindly on a slow machine.
+        boxes: whether the boxes of the map are there; without them, a check sees what a car would do that a box holds.
     """
 
     room: str = "room"
@@ -41,6 +42,7 @@ class World:
     heartbeat: bool = False
     remappings: Sequence[tuple[str, str]] = ()
     patient: bool = False
+    boxes: bool = True
 
     def __post_init__(self) -> None:
         refuse_text("World", cars=self.cars, remappings=self.remappings)
@@ -62,6 +64,7 @@ class World:
             drawn = "\n" in self.room
             room = room_from(self.room, "of this check") if drawn else read_room(self.room, current.check.folder)
             names = [name.strip("/") for name in self.cars]
+            room = room if self.boxes else room.without_boxes()
             simulation = Simulation(
                 room, names, heartbeat=self.heartbeat, seed=current.check.random.getrandbits(32)
             )  # fmt: skip

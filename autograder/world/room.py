@@ -17,7 +17,7 @@ points to the right, y up, and angles grow counter-clockwise from x; the origin 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -76,6 +76,12 @@ class Room:
     def height(self) -> float:
         """Metres from bottom to top."""
         return float(self.solid.shape[0] * self.cell)
+
+    def without_boxes(self) -> Room:
+        """Return the same room with free floor where its boxes are."""
+        solid = np.where(self.solid == BOX, FREE, self.solid)
+        segments, edge_of = _edges(solid, self.cell)
+        return replace(self, solid=solid, segments=segments, edge_of=edge_of)
 
     def is_solid(self, points: Any) -> Any:
         """Tell for each row (x, y) whether a wall or a box, or the outside, is there."""

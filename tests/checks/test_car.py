@@ -88,6 +88,14 @@ def test_a_failure_says_where_it_went_wrong_and_marks_the_place() -> None:
     assert failed.because in failed.picture.alt
 
 
+def test_a_check_sees_where_a_car_would_come_without_the_box_that_holds_it() -> None:
+    room = "cell: 0.5\nplaces: {P: parking}\nmap: |\n  ########\n  #> %  P#\n  ########\n"
+    check = 'with launch("p", world=World("small.yaml", boxes=False)) as ros:\n'
+    check += '    ros.car().expect_reached("parking", within=20)\n    ros.car().expect_no_touch()\nros.score(1)'
+    found = graded(check, DRIVES.format(speed=0.5, more=""), small__yaml=room)
+    assert found.points == 1, found
+
+
 def test_a_program_that_sends_no_command_reads_why() -> None:
     check = 'with launch("p", world="street") as ros:\n    ros.car().expect_driven(1.0, within=1)\nros.score(1)'
     found = graded(check, DRIVES.format(speed=1.0, more="").replace('"cmd_vel"', '"cmd_vell"'))

@@ -13,7 +13,7 @@ class Recorder(Node):
         super().__init__("recorder")
         self.work = self.declare_parameter("work", 0.02).value
         self.publisher = self.create_publisher(Int32, "recorded", 100)
-        self.create_subscription(Int32, "frames", self.record, QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE))
+        self.create_subscription(Int32, "frames", self.record, QoSProfile(depth=99, reliability=ReliabilityPolicy.RELIABLE))
 
     def record(self, frame):
         time.sleep(self.work)
