@@ -261,7 +261,7 @@ class SentGoal(Meanwhile):
         came = measured if measured == "all at once" else f"at {measured}"
         reason = RATE(f"The feedback messages come {came} instead of {rate:.3g} Hz.")
         title = f"Feedback of `{goal.name}` comes at {rate:.3g} Hz"
-        self._fail(title, reason, expected=f"{rate:.3g} Hz", observed=measured.rstrip(","), hint=hint)
+        self._fail(title, reason, expected=f"{rate:.3g} Hz", observed=measured, hint=hint)
 
     def messages_during(self, topic: Topic) -> list[int]:
         """How many messages were published while it was executed: from `executing` to its last status.
