@@ -90,8 +90,9 @@ class CarNode:
 
     def _commanded(self, message: Twist) -> None:
         self.counts["cmd_vel"] += 1
-        self._heard = time.monotonic()
-        self._world.command(self._name, message.linear.x, message.angular.z)
+        # A command that is passed over does not make a patient world wait: the next one would be passed over, too.
+        if self._world.command(self._name, message.linear.x, message.angular.z):
+            self._heard = time.monotonic()
 
     def _reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         response.success, response.message = not self._closed, _CLOSED if self._closed else "The car is at its start."

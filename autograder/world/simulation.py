@@ -117,13 +117,15 @@ class Simulation:
         """Seconds of the world since its beginning."""
         return self.steps * STEP
 
-    def command(self, name: str, speed: float, turn: float) -> None:
-        """Tell a car how fast to drive and to turn; one that is not finite is passed over."""
+    def command(self, name: str, speed: float, turn: float) -> bool:
+        """Tell a car how fast to drive and to turn. One that is not finite is passed over; return whether it was not."""
+        finite = math.isfinite(speed) and math.isfinite(turn)
         with self.lock:
             self.records[name].commands += 1
-            if math.isfinite(speed) and math.isfinite(turn):
+            if finite:
                 car = self.driven[name]
                 car.wanted, car.commanded = (speed, turn), self.time
+        return finite
 
     def beat(self, name: str) -> None:
         """Note a heartbeat of a car."""
