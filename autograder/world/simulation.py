@@ -118,7 +118,7 @@ class Simulation:
         return self.steps * STEP
 
     def command(self, name: str, speed: float, turn: float) -> bool:
-        """Tell a car how fast to drive and to turn. One that is not finite is passed over; return whether it was not."""
+        """Tell a car how fast to drive and to turn; return False if one is not finite, so that it is passed over."""
         finite = math.isfinite(speed) and math.isfinite(turn)
         with self.lock:
             self.records[name].commands += 1
