@@ -74,6 +74,8 @@ class Record:
     metres: float = 0.0
     commands: int = 0
     """The commands that came."""
+    passed_over: float = -math.inf
+    """When the last command came that was not finite."""
 
 
 class Simulation:
@@ -125,6 +127,8 @@ class Simulation:
             if finite:
                 car = self.driven[name]
                 car.wanted, car.commanded = (speed, turn), self.time
+            else:
+                self.records[name].passed_over = self.time
         return finite
 
     def beat(self, name: str) -> None:
