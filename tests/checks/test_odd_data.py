@@ -266,7 +266,7 @@ def test_no_check_of_a_table_breaks_over_odd_answers(lab: str) -> None:
     tables = {cell.grade_id: re.findall(r'answers\("([^"]+)"\)', cell.source) for cell in course_lab.checks}
     checks = [grade_id for grade_id, named in tables.items() if named]
     odd = itertools.cycle(ODD_ANSWERS)
-    for name in {name for named in tables.values() for name in named}:
+    for name in sorted({name for named in tables.values() for name in named}):
         files[name] = re.sub(r"(?m)^(\w+):.*$", lambda line: f"{line[1]}: {next(odd)}", files[name])
     found = odd_data.checked(course_lab, files, checks) if checks else []
     assert not {check.grade_id: why for check in found if (why := odd_data.broken(check))}
