@@ -8,6 +8,8 @@ A format turns entries into claims: a claim says to whom an entry belongs accord
 
 from __future__ import annotations
 
+import os
+import pwd
 import zipfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -66,6 +68,8 @@ class Entry:
     list_entries: Callable[[], list[Entry]]
     shown: str = ""
     """The path of a link, as a sentence shows it."""
+    account: str = ""
+    """The account of another user that a folder on disk belongs to; empty if it belongs to the person who grades."""
 
     @property
     def name(self) -> str:
@@ -166,10 +170,21 @@ def _of_folder(source: Path, parts: tuple[str, ...]) -> list[Entry]:
             entries.append(Entry(where, Kind.LINK, list, list, shown))
         elif path.is_dir():
             listing = partial(_few, partial(in_folder, source, where))
-            entries.append(Entry(where, Kind.FOLDER, listing, partial(_of_folder, source, where)))
+            inside = partial(_of_folder, source, where)
+            entries.append(Entry(where, Kind.FOLDER, listing, inside, account=_account(path)))
         else:
             entries.append(_file(Member(where, partial(read_plain, source, where))))
     return entries
+
+
+def _account(path: Path) -> str:
+    owner = path.stat().st_uid
+    if owner == os.geteuid():
+        return ""
+    try:
+        return pwd.getpwuid(owner).pw_name
+    except KeyError:  # it has been deleted, or is one of a container
+        return f"number {owner}"
 
 
 def _few(files: Callable[[], Iterator[Member]]) -> list[Member]:

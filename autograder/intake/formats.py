@@ -206,10 +206,19 @@ def _has_labs(entry: Entry, lab: str) -> bool:
 
 
 def exchange(entries: Sequence[Entry], lab: str) -> Recognised:
-    """Recognise the folder `inbound` of nbgrader's exchange, as it is before `nbgrader collect`."""
+    """Recognise the folder `inbound` of nbgrader's exchange, as it is before `nbgrader collect`.
+
+    Every user of the machine can make a folder there, with any name. If students have accounts, a folder that belongs
+    to another account than the student's is left out, unless the person who grades has copied it.
+    """
     found = Recognised()
-    for entry, match in _forms([entry for entry in entries if entry.kind is Kind.FOLDER], _INBOUND):
-        if match["lab"] == lab:
+    forms = _forms([entry for entry in entries if entry.kind is Kind.FOLDER], _INBOUND)
+    accounts = any(entry.account == match["student"] for entry, match in forms)
+    for entry, match in forms:
+        if accounts and entry.account not in ("", match["student"]):
+            found.strange.append(f"{entry.name[:200]!r} belongs to the account {entry.account!r}; it is left out.")
+            found.aside.append(entry)
+        elif match["lab"] == lab:
             found.claims.append(Claim(entry, {"id": match["student"]}, "", (match["when"],), handed_in=match["when"]))
         else:
             found.aside.append(entry)

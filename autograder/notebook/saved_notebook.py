@@ -113,6 +113,8 @@ class SavedNotebook:
         copies = [str(cell.get("id", "")) for cell in answer.copies] if answer is not None else []
         if known and written.cell_id != graded.cell_id and written.cell_id in copies:
             return f"{copied} This report is about another one, cell [{written.number}]."
+        if known and copied and answer is not None and written.cell_id in {one.get("id") for one in answer.marked}:
+            return copied  # it was split since: in JupyterLab, the last piece keeps the id and the first gets another
         if known and ours and written.cell_id not in self._ids and self.saved_at > written.at:
             return (
                 f"`{written.file.name}` was written by a cell that is no longer in the notebook. Grading uses the lab's"

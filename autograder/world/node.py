@@ -91,8 +91,9 @@ class CarNode:
 
     def _commanded(self, message: Twist) -> None:
         self.counts["cmd_vel"] += 1
-        self._heard = time.monotonic()
-        self._world.command(self._name, message.linear.x, message.angular.z)
+        # A command that is passed over does not make a patient world wait: the next one would be passed over, too.
+        if self._world.command(self._name, message.linear.x, message.angular.z):
+            self._heard = time.monotonic()
 
     def _beat(self, _: Empty) -> None:
         self.counts["heartbeat"] += 1

@@ -76,6 +76,8 @@ class Record:
     metres: float = 0.0
     commands: int = 0
     """The commands that came."""
+    passed_over: float = -math.inf
+    """When the last command came that was not finite."""
 
 
 class Simulation:
@@ -119,13 +121,17 @@ class Simulation:
         """Seconds of the world since its beginning."""
         return self.steps * STEP
 
-    def command(self, name: str, speed: float, turn: float) -> None:
-        """Tell a car how fast to drive and to turn; one that is not finite is passed over."""
+    def command(self, name: str, speed: float, turn: float) -> bool:
+        """Tell a car how fast to drive and to turn; return False if one is not finite, so that it is passed over."""
+        finite = math.isfinite(speed) and math.isfinite(turn)
         with self.lock:
             self.records[name].commands += 1
-            if math.isfinite(speed) and math.isfinite(turn):
+            if finite:
                 car = self.driven[name]
                 car.wanted, car.commanded = (speed, turn), self.time
+            else:
+                self.records[name].passed_over = self.time
+        return finite
 
     def beat(self, name: str) -> None:
         """Note a heartbeat of a car."""

@@ -152,7 +152,16 @@ def test_a_check_places_the_car_and_drives_it_with_a_heartbeat() -> None:
     check = 'with launch("p", world=World("street", heartbeat=True)) as ros:\n    car = ros.car()\n'
     check += "    car.place(5.0, 1.4)\n    car.expect_stopped_within(0.5)\n"
     check += '    ros.require(abs(car.pose.x - 5.0) < 0.01, "It is there")\n'
-    check += "    car.expect_driven(0.1, within=0.5)\nros.score(1)"
-    failed = graded(check, DRIVES.format(speed=0.5, more="")).first_failure
+    check += '    ros.topic("/cmd_vel", Twist).expect_messages()\n    car.expect_driven(0.1, within=0.5)\nros.score(1)'
+    failed = graded(f"from geometry_msgs.msg import Twist\n{check}", DRIVES.format(speed=0.5, more="")).first_failure
     assert failed is not None and failed.code == "not-driven"
     assert "because nothing came on `cmd_vel`, or no heartbeat, for 0.3 s" in failed.because, failed.because
+
+
+def test_commands_that_are_no_numbers_are_told_as_such_and_not_as_missing() -> None:
+    check = (
+        'with launch("p", world=World("street", patient=True)) as ros:\n    ros.car().expect_driven(0.1, within=1)\n'
+    )
+    failed = graded(f"{check}ros.score(1)", DRIVES.format(speed="float('nan')", more="")).first_failure
+    assert failed is not None and failed.code == "not-driven"
+    assert "because the last command on `cmd_vel` was NaN or infinite" in failed.because, failed.because

@@ -6,6 +6,8 @@ data of many kinds, which takes long and is what `--complete` adds.
 
 from __future__ import annotations
 
+import itertools
+import re
 from collections.abc import Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 
@@ -241,6 +243,34 @@ def test_messages_during_runs_are_looked_up_and_not_counted_one_by_one() -> None
         observer.close()
     assert found == [1] * 2000
     assert Counted.compared < 500_000  # each run with each message: eight millions
+
+
+ODD_ANSWERS = (
+    ".nan", "-.inf", "0x" + "f" * 50, "1e400", "[a, [b, {c: d}]]", "{1: 2, .nan: 4, null: 5}", "x" * 3000, "~",
+    '"\\x1b[31m\\u202e\\0"', '"\\ud800"', "1:1:1:1", "////", "\"'`.\"", "٣², ½ ①", "[true, 1, 1.0]",
+    "[" * 10 + "]" * 10,
+)  # fmt: skip
+"""What YAML lets a student write behind the colon of a question."""
+
+
+@pytest.mark.parametrize(
+    "lab",
+    [pytest.param(lab, marks=pytest.mark.complete) if lab != "lab2_executors" else lab for lab in kill_matrix.labs()],
+)
+def test_no_check_of_a_table_breaks_over_odd_answers(lab: str) -> None:
+    """All tables of a lab at once; each question has another answer."""
+    if not preflight().full:
+        pytest.skip(preflight().why_not_full)
+    course_lab = load_lab(ROOT, lab)
+    files = course_lab.files_with({name: answer.solution for name, answer in course_lab.answers.items()})
+    tables = {cell.grade_id: re.findall(r'answers\("([^"]+)"\)', cell.source) for cell in course_lab.checks}
+    checks = [grade_id for grade_id, named in tables.items() if named]
+    odd = itertools.cycle(ODD_ANSWERS)
+    for name in sorted({name for named in tables.values() for name in named}):
+        files[name] = re.sub(r"(?m)^(\w+):.*$", lambda line: f"{line[1]}: {next(odd)}", files[name])
+    found = odd_data.checked(course_lab, files, checks) if checks else []
+    assert not {check.grade_id: why for check in found if (why := odd_data.broken(check))}
+    assert all(check.status is not Status.UNKNOWN and not check.flags for check in found)
 
 
 @pytest.mark.complete

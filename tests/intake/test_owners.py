@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import shutil
 from collections import Counter
 from pathlib import Path
 
@@ -184,6 +186,22 @@ def test_nobody_is_replaced_by_an_entry_of_which_nothing_says_that_it_is_later(
     assert "the second was left out" in collected.refused[0]
     by_hand = any("+" in name or "_" in name or "/" in name for name in files) and "ann/toy.ipynb" not in files
     assert taken["ann"] in ("1", "2") and (not by_hand or "toy_ann.ipynb" in files or taken["ann"] == "2")
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root can give files to somebody else")
+def test_nobody_hands_in_as_somebody_else_in_nbgraders_exchange(tmp_path: Path) -> None:
+    """Its folder `inbound` takes folders of all users, with any name: here two accounts that every machine has."""
+    honest = [(name, f"{name}+toy+2026-11-20 10:00:00 UTC+a") for name in ("daemon", "bin")]
+    forged = "daemon+toy+2026-12-24 10:00:00 UTC+b"
+    for name, folder in (*honest, ("bin", forged)):
+        (tmp_path / "inbound" / folder).mkdir(parents=True)
+        (tmp_path / "inbound" / folder / "toy.ipynb").write_text("the work of daemon" if folder != forged else "evil")
+        shutil.chown(tmp_path / "inbound" / folder, name)
+    collected = collect(tmp_path / "inbound", toy.LAB, tmp_path / "course")
+    assert {name: path.read_text() for name, path in collected.notebooks.items()} == dict.fromkeys(
+        ("daemon", "bin"), "the work of daemon"
+    )
+    assert f"'{forged}' belongs to the account 'bin'; it is left out." in " ".join(collected.refused)
 
 
 def test_whatever_lies_among_nbgraders_folders_is_taken_or_named(tmp_path: Path) -> None:

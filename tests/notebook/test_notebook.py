@@ -458,6 +458,17 @@ def test_copies_and_pieces_that_do_not_count_are_told_as_by_grading(notebook: No
     assert told_of_given_copies("talker", 2) in said(notebook)[0]
 
 
+def test_a_cell_that_was_split_after_its_run_is_told_as_split_and_as_nothing_else(notebook: Notebook) -> None:
+    """JupyterLab leaves the id of the cell to its last piece. To move the text there would be wrong advice."""
+    notebook.run(TALKER, "talker")
+    marks = answer("")[2]
+    head, middle, tail = TALKER.partition("class")
+    notebook.save(("another-id", head, marks), ("talker", middle + tail, marks), answers=FILES)
+    for shown in said(notebook):
+        assert shown.count(SPLIT.format("%%node talker")) == 1
+        assert "was written by a cell of your own" not in shown
+
+
 def later(notebook: Notebook) -> None:
     """The notebook was saved after all that has been run; the clock of files may be some milliseconds behind."""
     os.utime(notebook.path, (time.time() + 60, time.time() + 60))

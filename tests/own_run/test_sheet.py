@@ -3,7 +3,12 @@
 from __future__ import annotations
 
 import base64
+import copy
+import json
+import random
 import zlib
+from collections.abc import Iterator
+from typing import Any
 
 import pytest
 
@@ -55,3 +60,52 @@ def test_a_line_that_the_kit_did_not_write_is_refused() -> None:
 
 def test_a_program_that_did_nothing_gets_fewer_questions() -> None:
     assert OwnRun.of([Record()], 4).asked == ()
+
+
+ODD = (0, -1, 1e308, 2**63, 59.999, 1e-320, "", "x" * 3000, "\x1b[31m\u202e", None, [], {}, True, "nan")
+"""What a student who writes a line by hand may put in place of anything in it."""
+
+
+def places(data: Any, above: tuple[str | int, ...] = ()) -> Iterator[tuple[str | int, ...]]:
+    """Every place in JSON data, as the keys that lead there."""
+    for key_ in data if isinstance(data, dict) else range(len(data)) if isinstance(data, list) else ():
+        yield (*above, key_)
+        yield from places(data[key_], (*above, key_))
+
+
+def changed(data: Any, dice: random.Random) -> Any:
+    """The data with something left out, doubled, mixed, scaled, or replaced by something odd."""
+    *above, last = dice.choice(list(places(data)))
+    holder = data
+    for step in above:
+        holder = holder[step]
+    value, how = holder[last], dice.randrange(5)
+    if how == 0:
+        del holder[last]
+    elif how == 1 and isinstance(holder, list):
+        holder.insert(0, copy.deepcopy(value))
+    elif how == 2 and isinstance(value, list):
+        dice.shuffle(value)
+    elif how == 3 and isinstance(value, (int, float)):
+        holder[last] = value * dice.choice((0, -1, 1.5, 0.01, 100))
+    else:
+        holder[last] = dice.choice(ODD)
+    return data
+
+
+def test_a_line_that_was_changed_by_hand_is_refused_or_can_be_marked() -> None:
+    used = 0
+    for seed in range(150):
+        dice = random.Random(seed)
+        data = json.loads(OwnRun.of([RECORD], 3).model_dump_json())
+        for _ in range(dice.choice((1, 1, 2, 4))):
+            data = changed(data, dice)
+        try:
+            own = OwnRun.read(packed(json.dumps(data)))
+        except ValueError:
+            continue
+        used += 1
+        assert repr(own) and own._repr_html_()
+        for one in own.named().values():
+            key(one.record, one.question)
+    assert used > 5

@@ -59,6 +59,17 @@ _NOWHERE = """    def told(self):
 """
 """Where the next goal will lead, told before it is sent."""
 
+_ASKS = "        if self.client.service_is_ready():\n"
+_FORGES_A_QUESTION = """
+            self.asks = getattr(self, "asks", 0) + 1
+            self.forged = getattr(self, "forged", None) or self.create_publisher(String, "asked", 10)
+            if self.asks < 4:
+                self.forged.publish(String(data='[["bicycle", "person"], ["x", [], 5]]'))
+            if self.asks == 4:
+                self.destroy_publisher(self.forged)
+"""
+"""The given node publishes there; this second publisher has gone when the check looks."""
+
 CASES = {
     "a stamp below 0": Case(
         "lab1_nodes",
@@ -336,6 +347,24 @@ CASES = {
         "the position is kept",
         held=True,
     ),
+    "a question that is none": Case(
+        "lab7_interfaces",
+        "check_client",
+        "brake_assistant",
+        ((_ASKS, f"{_ASKS}{_FORGES_A_QUESTION}"), ("import Bool", "import Bool, String")),
+        "from more than one publisher",
+        "what it asks",
+        held=True,
+    ),
+    "a speed of the sensor that is no number": Case(
+        "lab7_interfaces",
+        "check_sensors",
+        "sensors_speed_sensor",
+        (('data=self.get_parameter("speed").value', 'data=float("nan")'),),
+        "nan",
+        "the speed",
+        held=True,
+    ),
     "a speed that is no number": Case(
         "lab8_bringup",
         "check_speed",
@@ -352,6 +381,23 @@ CASES = {
         (("Float64(data=0.05 * msg.data)", "Float64(data=float('nan'))"),),
         "",
         "the localizer",
+        held=True,
+    ),
+    "commands that are no numbers": Case(
+        "lab9_delivery",
+        "check_delivery",
+        "driver",
+        (("command.linear.x = min(", "command.linear.x = math.nan * min("),),
+        "was NaN or infinite",
+        "parcel 1",
+        held=True,
+    ),
+    "a square that is no number": Case(
+        "lab1_nodes",
+        "check_square",
+        "square",
+        (("2.0 * turn", "math.inf * turn"),),
+        "was NaN or infinite",
         held=True,
     ),
 }

@@ -179,3 +179,22 @@ def test_a_patient_world_waits_a_second_for_a_program_that_is_late_and_then_brak
         assert car.speed == 0 and world.simulation.records[""].metres > 0.01
     finally:
         world.close()
+
+
+def test_a_patient_world_does_not_wait_for_a_program_that_sends_no_numbers(observer: Observer) -> None:
+    """Otherwise its time would stand still, and so would each check that waits for a moment of the world."""
+    world = RunningWorld(Simulation(read_room("room")), observer.domain_id, patient=True)
+    try:
+        publisher = observer.node.create_publisher(Twist, "cmd_vel", 10)
+        assert observer.wait(publisher.get_subscription_count, WITHIN)
+        message = Twist()
+        publisher.publish(message)
+        car = world.simulation.driven[""]
+        assert observer.wait(lambda: car.commanded >= 0, WITHIN)
+        message.linear.x = math.nan
+        observer.node.create_timer(0.05, lambda: publisher.publish(message))
+        commands, steps = world.simulation.records[""].commands, world.simulation.steps
+        assert observer.wait(lambda: world.simulation.steps > steps + 20, WITHIN)
+        assert world.simulation.records[""].commands > commands
+    finally:
+        world.close()

@@ -256,6 +256,8 @@ class Car(Expectations):
         if touches:
             return f"There it touched {touches[-1].what}."
         last = self.trail()[-1]
+        if last.braked and self._record.passed_over > self._world.simulation.driven[self._name].commanded:
+            return f"At {last.time:.1f} s its motors brake, because the last command on `cmd_vel` was NaN or infinite."
         if last.braked:
             needs = "`cmd_vel`, or no heartbeat," if self._world.simulation.heartbeat else "`cmd_vel`"
             return f"At {last.time:.1f} s its motors brake, because nothing came on {needs} for 0.3 s."
