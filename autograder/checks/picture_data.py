@@ -127,7 +127,8 @@ def _name(thing: Thing) -> str:
         return f"timer {thing.period:g} s"
     if thing.kind == "action_server":  # each of its runs is one feedback message
         return f"feedback of {thing.name}"
-    return f"{thing.kind} {thing.name}".strip() or (f"callback in {thing.line}" if thing.line else "callback outside your code")
+    own = f"callback in {thing.line}" if thing.line else "callback outside your code"
+    return f"{thing.kind} {thing.name}".strip() or own
 
 
 def _groups(inside: Inside) -> dict[int, str]:
