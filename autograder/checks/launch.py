@@ -212,16 +212,21 @@ class Launch(Ros):
         """
         self._end()
 
-    def show(self) -> None:
+    def show(self, listen: Iterable[tuple[str, type]] = ()) -> None:
         """Show the world of the launch live, below the cell, while the cells after it go on.
 
         It stops with the launch; then the picture of the world with the trails takes its place. At grading it does
         nothing.
 
+        Args:
+            listen: (topic, message class) of further topics: the view shows their rates and their last messages.
+
         Example:
             `robot = launch("driver", world="room").start(); robot.show()`
         """
-        here = current.check.front_end
+        here, topics = current.check.front_end, list(listen)
+        for topic, msg_type in topics:
+            refuse_other_class(f'show: listen, "{topic}"', msg_type, "message")
         if self._world is None:
             raise Misuse('show: this launch has no world; write launch(…, world="room").')
         if not self._entered or self._over:
@@ -230,7 +235,7 @@ class Launch(Ros):
             return
         if self._running.view is not None:
             self._running.view.close()
-        self._running.view = here.show(self._running)
+        self._running.view = here.show(self._running, topics)
 
     def log(self, program: str = "") -> Log:
         """Return what the programs, or one of them, have printed so far; also after the block.

@@ -67,8 +67,8 @@ class FrontEnd(Protocol):
     def watch(self, observer: Any, programs: Callable[[], Sequence[Any]]) -> Watcher:
         """Start to show what happens during a launch: what the check waits for, and what the programs print."""
 
-    def show(self, running: Any) -> View:
-        """Start to show the world of a running launch, below the running cell."""
+    def show(self, running: Any, listen: Sequence[tuple[str, type]] = ()) -> View:
+        """Start to show the world of a running launch, below the running cell, and what comes on these topics."""
 
 
 active: FrontEnd | None = None

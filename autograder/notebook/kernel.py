@@ -154,11 +154,11 @@ class Kernel:
         self._watch = Watch(observer, programs, streams=not self.scored, updates=self.updates_outputs)
         return self._watch
 
-    def show(self, running: RunningLaunch) -> WorldView:
-        """Begin to show the world of a launch, live."""
+    def show(self, running: RunningLaunch, listen: Sequence[tuple[str, type]] = ()) -> WorldView:
+        """Begin to show the world of a launch, live, and the last messages of these topics beside it."""
         from autograder.notebook.world_view import WorldView
 
-        return WorldView(running, lambda: self._in_cell)
+        return WorldView(running, lambda: self._in_cell, listen)
 
     @property
     def number(self) -> int:

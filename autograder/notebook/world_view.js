@@ -120,7 +120,7 @@ function steering(pad, send) {
 }
 
 function render({ model, el }) {
-  const { room, cars, programs, still } = model.get("scene");
+  const { room, cars, still } = model.get("scene");
   el.classList.add("aw-view");
   // The picture below, which stands for this view where it cannot be shown, is not needed while this view is shown.
   const hidden = element(el, "style", {}, `.${still} { display: none; }`);
@@ -134,8 +134,11 @@ function render({ model, el }) {
   const buttons = element(right, "div", { class: "aw-buttons", role: "group", "aria-label": "The world" });
   const pause = button(buttons, "Pause", () => send({ do: "pause" }));
   button(buttons, "Reset", () => send({ do: "reset" }));
-  const kills = new Map();
-  for (const name of programs) kills.set(name, button(buttons, `Kill ${name}`, () => send({ do: "kill", name })));
+  const kills = new Map(); // a program may be started later
+  const kill = (name) => {
+    if (!kills.has(name)) kills.set(name, button(buttons, `Kill ${name}`, () => send({ do: "kill", name })));
+    return kills.get(name);
+  };
 
   const pad = element(
     right, "div",
@@ -178,16 +181,18 @@ function render({ model, el }) {
       speeds[number].text.textContent = ` ${speed.toFixed(2)} m/s`;
       speeds[number].state.textContent = state;
     });
-    for (const [name, made] of kills) {
-      const ended = !message.running.includes(name);
+    for (const [name, runs] of Object.entries(message.running)) {
+      const made = kill(name);
+      const ended = !runs;
       made.setAttribute("aria-disabled", ended); // a button that is disabled would lose the focus
       made.textContent = ended ? `${name} has ended` : `Kill ${name}`;
     }
     rates.replaceChildren();
-    for (const [topic, rate] of message.rates) {
+    for (const [topic, rate, said] of message.rates) {
       const row = element(rates, "tr");
       element(row, "th", { scope: "row" }, topic);
       element(row, "td", {}, rate.toFixed(0));
+      if (said) element(element(rates, "tr"), "td", { colspan: 2, class: "aw-said" }, said);
     }
     for (const sentence of message.news) element(news, "li", {}, sentence);
     while (news.children.length > NEWS_KEPT) news.firstChild.remove();

@@ -15,7 +15,7 @@ import math
 import threading
 import time
 import uuid
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -23,6 +23,8 @@ from typing import TYPE_CHECKING, Any
 from geometry_msgs.msg import Twist
 from rclpy.qos import QoSProfile
 
+from autograder.checks.message_text import in_words, set_fields, shorten
+from autograder.checks.program import Program
 from autograder.world import RunningWorld
 from autograder.world import car as cars
 from autograder.world.drawing import blocks, drawn, still, thinned
@@ -31,6 +33,7 @@ from autograder.world.simulation import RANGE_MAX, STANDS, Sample
 
 if TYPE_CHECKING:
     from autograder.checks.running_launch import RunningLaunch
+    from autograder.graph.recording import Recording
 
 _HERE = Path(__file__).parent
 _EVERY = 0.1
@@ -51,6 +54,8 @@ _SEE_IT_LIVE = (
 )
 _RATES_OVER = 2.0
 """The seconds over which the rates of topics are counted."""
+_SAID = 80
+"""The characters that are shown of a message."""
 
 
 class WorldView:
@@ -59,9 +64,12 @@ class WorldView:
     Args:
         running: the launch, which has a world.
         busy: tells whether a cell runs, while which a page may not be heard.
+        listen: (topic, message class) of further topics to show beside the map.
     """
 
-    def __init__(self, running: RunningLaunch, busy: Callable[[], bool]) -> None:
+    def __init__(
+        self, running: RunningLaunch, busy: Callable[[], bool], listen: Iterable[tuple[str, type]] = ()
+    ) -> None:
         """Begin to show it below the running cell."""
         assert running.world is not None
         self._running, self._busy = running, busy
@@ -74,7 +82,7 @@ class WorldView:
         self._whole = True
         self._news: list[str] = []
         self._told = _Told(running, self._world)
-        self._rates = _Rates(self._world)
+        self._rates = _Rates(self._world, [running.observer.record(*one) for one in listen])
         self._wheels: dict[str, Any] = {}
         """The publishers through which a page drives, by the car's namespace."""
         self._keys: tuple[str, float, float, float] | None = None
@@ -144,7 +152,6 @@ class WorldView:
         return {
             "cars": self._names,
             "still": self._still_class,
-            "programs": list(dict.fromkeys(program.name for _, program in self._running.programs)),
             "room": {
                 "width": room.width,
                 "height": room.height,
@@ -202,8 +209,8 @@ class WorldView:
             self._wheels[name].publish(message)
 
     def _kill(self, name: str) -> None:
-        for _, program in list(self._running.programs):
-            if program.name == name and program.running():
+        for described, program in list(self._running.programs):
+            if name_of(described) == name and program.running():
                 self._running.may_end.append(program)
                 self._running.stopped.append(program)
                 program.stop(grace=0.0)
@@ -252,10 +259,14 @@ class WorldView:
             "cars": shown,
             "touches": touches,
             "rates": self._rates.now(),
-            "running": [program.name for _, program in self._running.programs if program.running()],
+            "running": self._programs(),
             "paused": self._world.paused,
             "news": news,
         }
+
+    def _programs(self) -> dict[str, bool]:
+        """Return whether each program runs; one that was started again runs if its last run does."""
+        return {name_of(described): program.running() for described, program in list(self._running.programs)}
 
     def _car(self, number: int, name: str, whole: bool) -> dict[str, Any]:
         world = self._world.simulation
@@ -278,6 +289,13 @@ class WorldView:
             "trail": [[round(pose.x, 2), round(pose.y, 2), jumped] for pose, jumped in points],
             "rays": ends,
         }
+
+
+def name_of(described: Program) -> str:
+    """Return what a program is called in the view: the full name of its node, as far as the launch gives it."""
+    space = next((rule for rule in described.all_rules() if rule.startswith("__ns:=")), "").removeprefix("__ns:=")
+    name = described.node_name() or described.program
+    return f"{space.rstrip('/')}/{name}" if space else name
 
 
 def _state(car: cars.Car) -> str:
@@ -313,34 +331,39 @@ class _Told:
                 where = f"({pose.x:.1f}, {pose.y:.1f})"
                 found.append(f"{car} drives, from {where}." if moves else f"{car} stands at {where}.")
                 self._moves[name] = moves
-        for number, (_, program) in enumerate(self._running.programs):
+        for number, (described, program) in enumerate(self._running.programs):
             if not program.running() and number not in self._ended:
                 self._ended.add(number)
-                found.append(f"The program {program.name} has ended.")
+                found.append(f"The program {name_of(described)} has ended.")
         return found
 
 
 class _Rates:
-    """How many messages a second came and went on each topic of the cars."""
+    """How many messages a second came and went on each topic of the cars, and on further ones, with their last."""
 
-    def __init__(self, world: RunningWorld) -> None:
-        self._world = world
+    def __init__(self, world: RunningWorld, further: list[Recording]) -> None:
+        self._world, self._further = world, further
         self._since = time.monotonic()
         self._before = self._counts()
-        self._shown = [(topic, 0.0) for topic in self._before]
+        self._rates = dict.fromkeys(self._before, 0.0)
 
     def _counts(self) -> dict[str, int]:
-        return {
+        return {recording.topic: recording.count for recording in self._further} | {
             self._world.full_name(name, topic): count
             for name, node in self._world.nodes.items()
             for topic, count in node.counts.items()
         }
 
-    def now(self) -> list[tuple[str, float]]:
-        """Return the topics with their rates, over the last two seconds."""
+    def now(self) -> list[tuple[str, float, str]]:
+        """Return the topics with their rates, over the last two seconds, and the last message of further ones."""
         passed = time.monotonic() - self._since
         if passed >= _RATES_OVER:
             counts = self._counts()
-            self._shown = [(topic, (count - self._before[topic]) / passed) for topic, count in counts.items()]
+            self._rates = {topic: (count - self._before[topic]) / passed for topic, count in counts.items()}
             self._before, self._since = counts, time.monotonic()
-        return self._shown
+        said = {one.topic: _said(one.messages[-1].msg) for one in self._further if one.count}
+        return [(topic, rate, said.get(topic, "")) for topic, rate in self._rates.items()]
+
+
+def _said(message: Any) -> str:
+    return shorten(in_words(message) if hasattr(message, "data") else set_fields(message), _SAID)
