@@ -54,8 +54,6 @@ _SEE_IT_LIVE = (
 )
 _RATES_OVER = 2.0
 """The seconds over which the rates of topics are counted."""
-_SAID = 80
-"""The characters that are shown of a message."""
 
 
 class WorldView:
@@ -366,4 +364,4 @@ class _Rates:
 
 
 def _said(message: Any) -> str:
-    return shorten(in_words(message) if hasattr(message, "data") else set_fields(message), _SAID)
+    return shorten(in_words(message) if hasattr(message, "data") else set_fields(message))
