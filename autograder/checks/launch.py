@@ -212,13 +212,20 @@ class Launch(Ros):
         """
         self._end()
 
-    def show(self, *, scan: str = "", buttons: Mapping[str, Callable[[], object]] | None = None) -> None:
+    def show(
+        self,
+        listen: Iterable[tuple[str, type]] = (),
+        *,
+        scan: str = "",
+        buttons: Mapping[str, Callable[[], object]] | None = None,
+    ) -> None:
         """Show the world of the launch live, below the cell, while the cells after it go on.
 
         It stops with the launch; then the picture of the world with the trails takes its place. At grading it does
         nothing.
 
         Args:
+            listen: (topic, message class) of further topics: the view shows their rates and their last messages.
             scan: the relative name of the topic whose rays are shown, as long as scans come on it; by default the
                 rays are those of the world's own lidar.
             buttons: what each further button of the view does when it is clicked, by the words on it; a text that is
@@ -227,7 +234,9 @@ class Launch(Ros):
         Example:
             `robot.show(buttons={"Cancel": lambda: goal.cancel()})`
         """
-        here = current.check.front_end
+        here, topics = current.check.front_end, list(listen)
+        for topic, msg_type in topics:
+            refuse_other_class(f'show: listen, "{topic}"', msg_type, "message")
         if self._world is None:
             raise Misuse('show: this launch has no world; write launch(…, world="room").')
         if not self._entered or self._over:
@@ -236,7 +245,7 @@ class Launch(Ros):
             return
         if self._running.view is not None:
             self._running.view.close()
-        self._running.view = here.show(self._running, scan, buttons or {})
+        self._running.view = here.show(self._running, topics, scan, buttons or {})
 
     def log(self, program: str = "") -> Log:
         """Return what the programs, or one of them, have printed so far; also after the block.

@@ -67,8 +67,14 @@ class FrontEnd(Protocol):
     def watch(self, observer: Any, programs: Callable[[], Sequence[Any]]) -> Watcher:
         """Start to show what happens during a launch: what the check waits for, and what the programs print."""
 
-    def show(self, running: Any, scan: str, buttons: Mapping[str, Callable[[], object]]) -> View:
-        """Start to show the world of a running launch, below the running cell, with the lab's own buttons."""
+    def show(
+        self,
+        running: Any,
+        listen: Sequence[tuple[str, type]],
+        scan: str,
+        buttons: Mapping[str, Callable[[], object]],
+    ) -> View:
+        """Start to show the world of a running launch below the running cell, with these topics and the lab's buttons."""
 
 
 active: FrontEnd | None = None

@@ -154,11 +154,18 @@ class Kernel:
         self._watch = Watch(observer, programs, streams=not self.scored, updates=self.updates_outputs)
         return self._watch
 
-    def show(self, running: RunningLaunch, scan: str, buttons: Mapping[str, Callable[[], object]]) -> WorldView:
-        """Begin to show the world of a launch, live."""
+    def show(
+        self,
+        running: RunningLaunch,
+        listen: Sequence[tuple[str, type]],
+        scan: str,
+        buttons: Mapping[str, Callable[[], object]],
+    ) -> WorldView:
+        """Begin to show the world of a launch, live, with the last messages of these topics and the lab's buttons."""
         from autograder.notebook.world_view import WorldView
 
-        return WorldView(running, lambda: self._in_cell, lambda: self._in_cell and self.scored, scan, buttons)
+        scored = lambda: self._in_cell and self.scored  # noqa: E731
+        return WorldView(running, lambda: self._in_cell, scored, listen, scan, buttons)
 
     @property
     def number(self) -> int:

@@ -128,7 +128,7 @@ function steering(pad, send) {
 }
 
 function render({ model, el }) {
-  const { room, cars, programs, still, buttons: own } = model.get("scene");
+  const { room, cars, still, buttons: own } = model.get("scene");
   el.classList.add("aw-view");
   // The picture below, which stands for this view where it cannot be shown, is not needed while this view is shown.
   const hidden = element(el, "style", {}, `.${still} { display: none; }`);
@@ -142,8 +142,11 @@ function render({ model, el }) {
   const buttons = element(right, "div", { class: "aw-buttons", role: "group", "aria-label": "The world" });
   const pause = button(buttons, "Pause", () => send({ do: "pause" }));
   button(buttons, "Reset", () => send({ do: "reset" }));
-  const kills = new Map();
-  for (const name of programs) kills.set(name, button(buttons, `Kill ${name}`, () => send({ do: "kill", name })));
+  const kills = new Map(); // a program may be started later
+  const kill = (name) => {
+    if (!kills.has(name)) kills.set(name, button(buttons, `Kill ${name}`, () => send({ do: "kill", name })));
+    return kills.get(name);
+  };
 
   if (own.length) {
     const row = element(right, "div", { class: "aw-buttons", role: "group", "aria-label": "The programs" });
@@ -193,16 +196,22 @@ function render({ model, el }) {
       write(speeds[number].text, ` ${speed.toFixed(2)} m/s`); // the meter tells it to a screen reader
       write(speeds[number].state, state);
     });
-    for (const [name, made] of kills) {
-      const ended = !message.running.includes(name);
+    for (const [name, runs] of Object.entries(message.running)) {
+      const made = kill(name);
+      const ended = !runs;
       made.setAttribute("aria-disabled", ended); // a button that is disabled would lose the focus
       write(made, ended ? `${name} has ended` : `Kill ${name}`);
     }
-    while (rates.children.length > message.rates.length) rates.lastChild.remove();
-    message.rates.forEach(([topic, rate], number) => {
+    const rows = message.rates.flatMap(([topic, rate, said]) => [[topic, rate.toFixed(0)], ...(said ? [[said]] : [])]);
+    while (rates.children.length > rows.length) rates.lastChild.remove();
+    rows.forEach((texts, number) => {
       const row = rates.children[number] ?? element(rates, "tr");
-      write(row.children[0] ?? element(row, "th", { scope: "row" }), topic);
-      write(row.children[1] ?? element(row, "td"), rate.toFixed(0));
+      if (row.children.length !== texts.length) {
+        row.replaceChildren();
+        if (texts.length === 1) element(row, "td", { colspan: 2, class: "aw-said" });
+        else element(row, "th", { scope: "row" }), element(row, "td");
+      }
+      texts.forEach((text, place) => write(row.children[place], text));
     });
     for (const sentence of message.news) element(news, "li", {}, sentence);
     while (news.children.length > NEWS_KEPT) news.firstChild.remove();

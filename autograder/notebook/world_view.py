@@ -15,7 +15,7 @@ import math
 import threading
 import time
 import uuid
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -23,6 +23,8 @@ from typing import TYPE_CHECKING, Any
 from geometry_msgs.msg import Twist
 from rclpy.qos import QoSProfile
 
+from autograder.checks.message_text import in_words, set_fields, shorten
+from autograder.checks.program import Program
 from autograder.notebook.world_extras import Buttons, ShownScan
 from autograder.world import RunningWorld
 from autograder.world import car as cars
@@ -32,6 +34,7 @@ from autograder.world.simulation import RANGE_MAX, STANDS, Sample
 
 if TYPE_CHECKING:
     from autograder.checks.running_launch import RunningLaunch
+    from autograder.graph.recording import Recording
 
 _HERE = Path(__file__).parent
 _EVERY = 0.1
@@ -61,13 +64,14 @@ class WorldView:
         running: the launch, which has a world.
         busy: tells whether a cell runs, while which a page may not be heard.
         checking: tells whether it is a check, during which the lab's buttons do nothing.
+        listen: (topic, message class) of further topics to show beside the map.
         scan: the topic of the rays that are shown, as seen from each car's namespace; by default the world's own.
         buttons: what each of the lab's buttons does, by its words.
     """
 
     def __init__(
         self, running: RunningLaunch, busy: Callable[[], bool], checking: Callable[[], bool],
-        scan: str, buttons: Mapping[str, Callable[[], object]],
+        listen: Iterable[tuple[str, type]], scan: str, buttons: Mapping[str, Callable[[], object]],
     ) -> None:  # fmt: skip
         """Begin to show it below the running cell."""
         assert running.world is not None
@@ -81,7 +85,7 @@ class WorldView:
         self._whole = True
         self._news: list[str] = []
         self._told = _Told(running, self._world)
-        self._rates = _Rates(self._world)
+        self._rates = _Rates(self._world, [running.observer.record(*one) for one in listen])
         self._buttons = Buttons(buttons, self._tell, checking)
         self._scans = {
             name: ShownScan(running.observer, f"/{name}/{scan}" if name else f"/{scan}")
@@ -158,7 +162,6 @@ class WorldView:
             "cars": self._names,
             "still": self._still_class,
             "buttons": self._buttons.words,
-            "programs": list(dict.fromkeys(program.name for _, program in self._running.programs)),
             "room": {
                 "width": room.width,
                 "height": room.height,
@@ -218,8 +221,8 @@ class WorldView:
             self._wheels[name].publish(message)
 
     def _kill(self, name: str) -> None:
-        for _, program in list(self._running.programs):
-            if program.name == name and program.running():
+        for described, program in list(self._running.programs):
+            if name_of(described) == name and program.running():
                 self._running.may_end.append(program)
                 self._running.stopped.append(program)
                 program.stop(grace=0.0)
@@ -271,10 +274,14 @@ class WorldView:
             "touches": touches,
             "brakes": brakes,
             "rates": self._rates.now(),
-            "running": [program.name for _, program in self._running.programs if program.running()],
+            "running": self._programs(),
             "paused": self._world.paused,
             "news": news,
         }
+
+    def _programs(self) -> dict[str, bool]:
+        """Return whether each program runs; one that was started again runs if its last run does."""
+        return {name_of(described): program.running() for described, program in list(self._running.programs)}
 
     def _car(self, number: int, name: str, whole: bool) -> dict[str, Any]:
         world = self._world.simulation
@@ -305,6 +312,13 @@ class WorldView:
         world = self._world.simulation
         metres = (min(float(one), RANGE_MAX) for one in world.scan(name)[::_EVERY_RAY])
         return list(zip(map(float, world.angles[::_EVERY_RAY]), metres, strict=True))
+
+
+def name_of(described: Program) -> str:
+    """Return what a program is called in the view: the full name of its node, as far as the launch gives it."""
+    space = next((rule for rule in described.all_rules() if rule.startswith("__ns:=")), "").removeprefix("__ns:=")
+    name = described.node_name() or described.program
+    return f"{space.rstrip('/')}/{name}" if space else name
 
 
 def _state(car: cars.Car, missing: str) -> str:
@@ -344,34 +358,39 @@ class _Told:
                 where = f"({pose.x:.1f}, {pose.y:.1f})"
                 found.append(f"{car} drives, from {where}." if moves else f"{car} stands at {where}.")
                 self._moves[name] = moves
-        for number, (_, program) in enumerate(self._running.programs):
+        for number, (described, program) in enumerate(self._running.programs):
             if not program.running() and number not in self._ended:
                 self._ended.add(number)
-                found.append(f"The program {program.name} has ended.")
+                found.append(f"The program {name_of(described)} has ended.")
         return found
 
 
 class _Rates:
-    """How many messages a second came and went on each topic of the cars."""
+    """How many messages a second came and went on each topic of the cars, and on further ones, with their last."""
 
-    def __init__(self, world: RunningWorld) -> None:
-        self._world = world
+    def __init__(self, world: RunningWorld, further: list[Recording]) -> None:
+        self._world, self._further = world, further
         self._since = time.monotonic()
         self._before = self._counts()
-        self._shown = [(topic, 0.0) for topic in self._before]
+        self._rates = dict.fromkeys(self._before, 0.0)
 
     def _counts(self) -> dict[str, int]:
-        return {
+        return {recording.topic: recording.count for recording in self._further} | {
             self._world.full_name(name, topic): count
             for name, node in self._world.nodes.items()
             for topic, count in node.counts.items()
         }
 
-    def now(self) -> list[tuple[str, float]]:
-        """Return the topics with their rates, over the last two seconds."""
+    def now(self) -> list[tuple[str, float, str]]:
+        """Return the topics with their rates, over the last two seconds, and the last message of further ones."""
         passed = time.monotonic() - self._since
         if passed >= _RATES_OVER:
             counts = self._counts()
-            self._shown = [(topic, (count - self._before[topic]) / passed) for topic, count in counts.items()]
+            self._rates = {topic: (count - self._before[topic]) / passed for topic, count in counts.items()}
             self._before, self._since = counts, time.monotonic()
-        return self._shown
+        said = {one.topic: _said(one.messages[-1].msg) for one in self._further if one.count}
+        return [(topic, rate, said.get(topic, "")) for topic, rate in self._rates.items()]
+
+
+def _said(message: Any) -> str:
+    return shorten(in_words(message) if hasattr(message, "data") else set_fields(message))

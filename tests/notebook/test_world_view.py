@@ -28,6 +28,12 @@ command.angular.z = 1.0
 node.create_timer(0.05, lambda: wheels.publish(command))
 rclpy.spin(node)
 """
+TWO_SHOWN = """from autograder.checks import Program
+from geometry_msgs.msg import Twist
+drivers = [Program("driver", namespace=name) for name in ("/front", "/rear")]
+robot = launch(*drivers, world=World("street", cars=["/front", "/rear"])).start()
+robot.show(listen=[("/rear/cmd_vel", Twist)])
+"""
 SHOWN = 'robot = launch("driver", world="room").start()\nrobot.show()'
 
 
@@ -52,16 +58,18 @@ def test_the_view_does_not_block_and_leaves_a_picture_with_the_trail(notebook: N
     assert "moments from" in notebook.run("robot.draw.film()").result
 
 
-def test_a_button_works_while_a_cell_runs(notebook: Notebook) -> None:
+def test_a_button_kills_one_of_two_nodes_of_a_program_while_a_cell_runs(notebook: Notebook) -> None:
     notebook.run(DRIVER)
-    notebook.run(SHOWN)
+    notebook.run(TWO_SHOWN)
     comm = notebook.run("robot._running.view._widget.comm.comm_id").result.strip("'")
     subshell = notebook.open_subshell()
-    press = threading.Timer(1.0, notebook.tell_widget, (comm, {"do": "kill", "name": "driver", "car": 0}, subshell))
+    press = threading.Timer(
+        1.0, notebook.tell_widget, (comm, {"do": "kill", "name": "/front/driver", "car": 0}, subshell)
+    )
     press.start()
-    waits = 'import time\nend = time.monotonic() + 60\nprogram = robot.program("driver")\n'
-    waits += "while program.running() and time.monotonic() < end:\n    time.sleep(0.1)\nprogram.running()"
-    assert notebook.run(waits).result == "False"
+    waits = "import time\nend = time.monotonic() + 60\nfront, rear = (one for _, one in robot._running.programs)\n"
+    waits += "while front.running() and time.monotonic() < end:\n    time.sleep(0.1)\nfront.running(), rear.running()"
+    assert notebook.run(waits).result == "(False, True)"
     press.join()
 
 
@@ -87,6 +95,17 @@ def test_a_lab_adds_buttons_and_shows_the_rays_that_a_program_publishes(notebook
     assert notebook.run('view._message()["cars"][0]["rays"]').result == "[]"
     assert notebook.run(PRESSED).result == "True"
     assert notebook.run(SEEN).result == "True"
+
+
+def test_topics_that_are_asked_for_are_shown_with_their_last_message(notebook: Notebook) -> None:
+    notebook.run(DRIVER)
+    notebook.run(TWO_SHOWN)
+    assert notebook.run("robot.topic('/rear/cmd_vel', Twist).listen().wait_for(1, within=60)").result == "True"
+    seen = notebook.run(
+        "shown = robot._running.view._message()\n{topic: said for topic, _, said in shown['rates'] if said}"
+    )
+    assert seen.result == "{'/rear/cmd_vel': 'linear.x=0.4, angular.z=1.0'}"
+    assert notebook.run("shown['running']").result == "{'/front/driver': True, '/rear/driver': True}"
 
 
 def test_what_cannot_be_shown_is_told(notebook: Notebook) -> None:
