@@ -73,4 +73,5 @@ def _moved(run: Run, zero: float) -> Run:
 
 def _within(row: Traffic, zero: float) -> Traffic:
     times = [round(time - zero, _DIGITS) for time in row.times if time - zero < SECONDS]
-    return Traffic(row.who, times)
+    since = None if row.since is None else round(row.since - zero, _DIGITS)
+    return Traffic(row.who, times, since if since is not None and 0 <= since < SECONDS else None)
