@@ -29,7 +29,8 @@ def record(running: RunningLaunch, insides: Sequence[Inside]) -> Record:
         running: the launch, whose programs still run.
         insides: its programs as their probes show them.
     """
-    runs = _named_in_their_node([run for run in picture_data.runs(insides) if run.node])
+    known = [run for run in picture_data.runs(insides) if run.node and run.callback != picture_data.RCLPY_ITSELF]
+    runs = _named_in_their_node(known)
     things = [thing for inside in insides for thing in inside.things.values()]
     topics = sorted({thing.name for thing in things if thing.kind in ("publisher", "subscription") and thing.node})
     traffic = {topic: picture_data.traffic(insides, topic) for topic in topics if not topic.startswith("/rosout")}
