@@ -218,8 +218,6 @@ KINDS: tuple[Callable[[Record], Iterator[Question]], ...] = (
 def chosen(records: Sequence[Record], seed: str, number: int) -> list[tuple[Record, Question]]:
     """Choose questions at random, as far as possible each of another kind and about another node or topic.
 
-    Two questions of one kind are never about the same node or topic.
-
     Args:
         records: of one submission.
         seed: with the same seed and records, the questions are the same.
@@ -228,11 +226,12 @@ def chosen(records: Sequence[Record], seed: str, number: int) -> list[tuple[Reco
     draw = random.Random(seed)
     kinds = draw.sample(KINDS, len(KINDS))
     found: list[tuple[Record, Question]] = []
-    for turn, kind in enumerate(kinds * number):  # another one of a kind only if there are not enough kinds
+    for kind in kinds * number:  # another one of a kind only if there are not enough kinds
         possible = [(record, question) for record in records for question in kind(record)]
         so_far = [(record, question.subject) for record, question in found]
         fresh = [(record, question) for record, question in possible if (record, question.subject) not in so_far]
-        possible = fresh or (possible if turn < len(kinds) else [])
+        texts = [question.text for _, question in found]
+        possible = [pair for pair in fresh or possible if pair[1].text not in texts]
         if possible and len(found) < number:
             found.append(draw.choice(possible))
     return found

@@ -105,9 +105,8 @@ def about_messages(record: Record, question: Question) -> str:
             return str(sent + (moment.time - taken[0] < 0.015))
         if mine and (moment.what, question.kind) == ("starts", "sent_before_start"):
             return str(sent)
-        if mine and moment.what == "taken" and question.kind == "first_taken":
-            taken.append(moment.time)
-        elif mine and moment.what == "taken" and about.get("begin", 9.0) < moment.time < about.get("end", 9.0):
+        counts = question.kind != "taken_between" or about["begin"] < moment.time < about["end"]
+        if mine and moment.what == "taken" and counts:
             taken.append(moment.time)
         sent += moment.what == "sent"
     return str(len(taken))

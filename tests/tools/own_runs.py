@@ -50,7 +50,7 @@ def record(lab: Lab, student: str, seed: int) -> Record:
 
 
 def files(lab: Lab, student: str) -> dict[str, str]:
-    """The files of a student's notebook."""
+    """The files of a student whose other answers are the solution's."""
     changed = sample_class.class_folder(lab.name) / student / "cells"
     answers = {name: answer.solution for name, answer in lab.answers.items()}
     for path in changed.glob("*") if changed.is_dir() else ():
