@@ -11,7 +11,7 @@ from autograder.core.results import Isolation
 from autograder.course.lab import load_lab
 from autograder.grading.job import Job
 from autograder.grading.own_runs import run_recorded
-from autograder.own_run import questions
+from autograder.own_run import questions, topic_questions
 from autograder.own_run.keys import key
 from autograder.own_run.questions import chosen
 from autograder.own_run.record import Record, StateChange
@@ -90,7 +90,7 @@ def test_nothing_is_asked_about_what_the_picture_cannot_show() -> None:
             StateChange(node="/robot", start="active", goal="deactivating", time=0.4),
         ),
     )
-    assert not list(questions.sent_while_active(record)), "a message within 15 ms of the end of the active state"
+    assert not list(topic_questions.sent_while_active(record)), "a message within 15 ms of the end of the active state"
     assert kinds(Record()) == set()
 
 
