@@ -16,6 +16,8 @@ from autograder.pictures import Endpoint, Picture, Run, Runs, Traffic
 from autograder.reasons import Reason
 from autograder.sandbox.inside.probe.events import Ran, Thing
 
+OUTSIDE = "callback outside your code"
+"""The name of a callback about which nothing else is known."""
 _GET_STATE = "/get_state"
 """The end of the name of the service that only a lifecycle node has."""
 _UNKNOWN = "(node not known yet)"
@@ -127,7 +129,7 @@ def _name(thing: Thing) -> str:
         return f"timer {thing.period:g} s"
     if thing.kind == "action_server":  # each of its runs is one feedback message
         return f"feedback of {thing.name}"
-    own = f"callback in {thing.line}" if thing.line else "callback outside your code"
+    own = f"callback in {thing.line}" if thing.line else OUTSIDE
     return f"{thing.kind} {thing.name}".strip() or own
 
 

@@ -29,7 +29,8 @@ def record(running: RunningLaunch, insides: Sequence[Inside]) -> Record:
         running: the launch, whose programs still run.
         insides: its programs as their probes show them.
     """
-    runs = _named_in_their_node([run for run in picture_data.runs(insides) if run.node])
+    known = [run for run in picture_data.runs(insides) if run.node and run.callback != picture_data.OUTSIDE]
+    runs = _named_in_their_node(known)
     things = [thing for inside in insides for thing in inside.things.values()]
     topics = sorted({thing.name for thing in things if thing.kind in ("publisher", "subscription") and thing.node})
     traffic = {topic: picture_data.traffic(insides, topic) for topic in topics if not topic.startswith("/rosout")}
@@ -73,4 +74,5 @@ def _moved(run: Run, zero: float) -> Run:
 
 def _within(row: Traffic, zero: float) -> Traffic:
     times = [round(time - zero, _DIGITS) for time in row.times if time - zero < SECONDS]
-    return Traffic(row.who, times)
+    since = None if row.since is None else round(row.since - zero, _DIGITS)
+    return Traffic(row.who, times, since if since is not None and 0 <= since < SECONDS else None)

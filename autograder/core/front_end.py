@@ -74,7 +74,7 @@ class FrontEnd(Protocol):
         scan: str,
         buttons: Mapping[str, Callable[[], object]],
     ) -> View:
-        """Start to show the world of a running launch below the running cell, with these topics and the lab's buttons."""
+        """Start to show the world of a running launch below the running cell, with these topics and buttons."""
 
 
 active: FrontEnd | None = None

@@ -54,17 +54,19 @@ def first_mismatch(offered: QoSProfile, requested: QoSProfile) -> str | None:
 
 def mismatch_between(offered: Policies, requested: Policies) -> str | None:
     """Do the same as `first_mismatch` for profiles that `describe` has put into words."""
-    if requested["reliability"] == "reliable" and offered["reliability"] == "best_effort":
-        return "reliability"
-    if requested["durability"] == "transient_local" and offered["durability"] == "volatile":
-        return "durability"
-    if _longer(offered["deadline"], requested["deadline"]):
-        return "deadline"
-    if requested["liveliness"] == "manual_by_topic" and offered["liveliness"] == "automatic":
-        return "liveliness"
-    if _longer(offered["lease"], requested["lease"]):
-        return "liveliness lease"
-    return None
+    return next(iter(mismatches(offered, requested)), None)
+
+
+def mismatches(offered: Policies, requested: Policies) -> list[str]:
+    """Return every policy in which a request is stricter than the offer, the one that is named first in front."""
+    stricter = {
+        "reliability": requested["reliability"] == "reliable" and offered["reliability"] == "best_effort",
+        "durability": requested["durability"] == "transient_local" and offered["durability"] == "volatile",
+        "deadline": _longer(offered["deadline"], requested["deadline"]),
+        "liveliness": requested["liveliness"] == "manual_by_topic" and offered["liveliness"] == "automatic",
+        "liveliness lease": _longer(offered["lease"], requested["lease"]),
+    }
+    return [policy for policy, found in stricter.items() if found]
 
 
 def _longer(offered: str | float | None, requested: str | float | None) -> bool:

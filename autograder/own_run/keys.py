@@ -6,9 +6,13 @@ from itertools import pairwise
 from typing import Any
 
 from autograder import pictures
+from autograder.graph.qos import mismatch_between, mismatches
+from autograder.own_run.moments import EDGE
 from autograder.own_run.question import Question
 from autograder.own_run.questions import NONE
 from autograder.own_run.record import Record
+from autograder.own_run.topic_questions import THEY_MATCH
+from autograder.pictures import Endpoint, Traffic
 
 
 def key(record: Record, question: Question) -> str:
@@ -59,6 +63,38 @@ def _sent_between(record: Record, topic: str, begin: float, end: float) -> int:
     return sum(begin < time < end for time in _times(record, topic))
 
 
+def _taken_between(record: Record, topic: str, who: str, begin: float, end: float) -> int:
+    return sum(begin < time < end for time in _row(record, topic, who).times)
+
+
+def _sent_before_start(record: Record, topic: str, who: str) -> int:
+    since = _row(record, topic, who).since
+    return sum(since is not None and time < since for time in _times(record, topic))
+
+
+def _first_taken(record: Record, topic: str, who: str) -> int:
+    first = _row(record, topic, who).times[0]
+    return sum(time < first + EDGE for time in _times(record, topic))
+
+
+def _row(record: Record, topic: str, who: str) -> Traffic:
+    return next(row for row in record.traffic[topic] if row.who == who)
+
+
+def _mismatch(record: Record, topic: str, publisher: int, subscription: int) -> str:
+    offer, request = _ends(record, topic, True)[publisher - 1], _ends(record, topic, False)[subscription - 1]
+    return mismatch_between(offer.policies, request.policies) or THEY_MATCH
+
+
+def _matching(record: Record, topic: str, publisher: int) -> int:
+    offer = _ends(record, topic, True)[publisher - 1]
+    return sum(not mismatches(offer.policies, request.policies) for request in _ends(record, topic, False))
+
+
+def _ends(record: Record, topic: str, publishes: bool) -> list[Endpoint]:
+    return [end for end in record.ends if end.topic == topic and end.publishes == publishes]
+
+
 def _longest_silence(record: Record, topic: str) -> int:
     times = _times(record, topic)
     gaps = [two - one for one, two in pairwise(times)]
@@ -80,5 +116,10 @@ _KEYS: dict[str, Any] = {
     "transitions": _transitions,
     "transition_under_way": _transition_under_way,
     "sent_between": _sent_between,
+    "taken_between": _taken_between,
+    "sent_before_start": _sent_before_start,
+    "first_taken": _first_taken,
+    "mismatch": _mismatch,
+    "matching": _matching,
     "longest_silence": _longest_silence,
 }

@@ -7,6 +7,7 @@ from typing import Literal
 from pydantic import BaseModel, ConfigDict
 
 from autograder import pictures
+from autograder.graph.qos import mismatch_between
 from autograder.own_run.record import SECONDS, Record
 from autograder.pictures import Picture
 
@@ -23,7 +24,7 @@ class Question(BaseModel):
     text: str
     choices: tuple[str, ...] = ()
     """The possible answers; empty if the answer is a whole number."""
-    view: Literal["timeline", "arrivals", "lifecycle"]
+    view: Literal["timeline", "arrivals", "lifecycle", "qos"]
     """The picture to look at."""
     subject: str
     """The full name of the node or topic of the picture. A timeline without it shows all nodes."""
@@ -34,6 +35,9 @@ class Question(BaseModel):
             rows = record.traffic[self.subject]
             last = max((time for row in rows for time in row.times), default=0.1)
             return pictures.arrivals(self.subject, rows, seconds=1.05 * last, start=0.0)
+        if self.view == "qos":
+            ends = [end for end in record.ends if end.topic == self.subject]
+            return pictures.qos(self.subject, ends, lambda one, other: mismatch_between(one.policies, other.policies))
         if self.view == "lifecycle":
             return pictures.lifecycle(self.subject, pictures.steps(record.steps(self.subject)))
         runs = record.callbacks[self.subject] if self.subject else pictures.Runs(record.runs)

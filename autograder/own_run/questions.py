@@ -11,21 +11,17 @@ from collections.abc import Callable, Iterator, Sequence
 from itertools import pairwise
 
 from autograder import pictures
+from autograder.own_run import topic_questions
+from autograder.own_run.moments import EDGE, SOME, countable
 from autograder.own_run.question import Question
 from autograder.own_run.record import SECONDS, Record
 from autograder.pictures import Run, Runs
 
-EDGE = 0.015
-"""Seconds by which things must be apart if a question is about which of them came first."""
 _LONG = 0.03
 """Seconds from which on a run of a callback is a bar in the picture and no stroke."""
 _WITH_NUMBER = 0.17
 """Seconds from which on a bar has room for the number of its thread, in a picture of 3 s."""
 NONE = "none of them"
-_SOME = 2
-"""A number of strokes or bars that somebody can guess; questions are about as many or more."""
-_COUNTABLE = 25
-"""The number of strokes or bars that somebody can count in a picture."""
 
 
 def _whole(runs: Runs) -> Runs:
@@ -39,11 +35,6 @@ def _long_callbacks(runs: Runs) -> list[str]:
 
 def _place(run: Run) -> str:
     return f"from {run.begin:.2f} s to {run.end:.2f} s"
-
-
-def _countable(times: Sequence[float]) -> bool:
-    """Whether somebody can count the strokes or bars of a picture at these times."""
-    return len(times) <= _COUNTABLE and all(two - one >= EDGE for one, two in pairwise(times))
 
 
 def under_way(record: Record) -> Iterator[Question]:
@@ -130,7 +121,7 @@ def began_during(record: Record) -> Iterator[Question]:
                 begins = [run.begin for run in runs.of(name)]
                 inside = [begin for begin in begins if during.begin < begin < during.end]
                 near = any(abs(begin - edge) < EDGE for begin in begins for edge in (during.begin, during.end))
-                if name == during.callback or near or len(inside) < _SOME or not _countable(inside):
+                if name == during.callback or near or len(inside) < SOME or not countable(inside):
                     continue
                 yield Question(
                     kind="began_during",
@@ -150,7 +141,7 @@ def longest_pause(record: Record) -> Iterator[Question]:
             pauses = sorted(((two - one), one) for one, two in pairwise(begins))
             if (
                 len(begins) < 4
-                or not _countable(begins)
+                or not countable(begins)
                 or pauses[-1][0] < max(1.15 * pauses[-2][0], pauses[-2][0] + EDGE)
             ):
                 continue
@@ -208,7 +199,7 @@ def longest_transition(record: Record) -> Iterator[Question]:
 def transitions(record: Record) -> Iterator[Question]:
     """Ask through how many transitions a lifecycle node went."""
     for node in sorted({change.node for change in record.changes}):
-        if len(pictures.steps(record.steps(node))) > _SOME:
+        if len(pictures.steps(record.steps(node))) > SOME:
             yield Question(
                 kind="transitions",
                 about={"node": node},
@@ -218,75 +209,9 @@ def transitions(record: Record) -> Iterator[Question]:
             )
 
 
-def sent_while_active(record: Record) -> Iterator[Question]:
-    """Ask how many messages a lifecycle node published on a topic while it was active."""
-    for topic, times, who in _sent(record):
-        for begin, end in record.active(who):
-            inside = [time for time in times if begin < time < end]
-            if (
-                end >= SECONDS
-                or not _countable(inside)
-                or any(abs(time - edge) < EDGE for time in times for edge in (begin, end))
-            ):
-                continue
-            yield Question(
-                kind="sent_between",
-                about={"topic": topic, "begin": begin, "end": end},
-                text=f"`{who}` was active from {begin:.2f} s to {end:.2f} s. How many messages did it publish on"
-                f" `{topic}` in this time?",
-                view="arrivals",
-                subject=topic,
-            )
-
-
-def sent_between(record: Record) -> Iterator[Question]:
-    """Ask how many messages of a topic were published in a short time."""
-    for topic, times, _ in _sent(record):
-        for twentieth in range(2, int(20 * max(times)) - 8) if len(times) > 3 else ():
-            begin, end = twentieth / 20, min(twentieth + 6 + 5 * (twentieth % 3), int(20 * max(times))) / 20
-            inside = [time for time in times if begin < time < end]
-            if (
-                not inside
-                or not _countable(inside)
-                or any(abs(time - edge) < EDGE for time in times for edge in (begin, end))
-            ):
-                continue
-            yield Question(
-                kind="sent_between",
-                about={"topic": topic, "begin": begin, "end": end},
-                text=f"How many messages were published on `{topic}` from {begin:.2f} s to {end:.2f} s?",
-                view="arrivals",
-                subject=topic,
-            )
-
-
-def longest_silence(record: Record) -> Iterator[Question]:
-    """Ask after which message of a topic the longest silence came."""
-    for topic, times, _ in _sent(record):
-        gaps = sorted((two - one for one, two in pairwise(times)), reverse=True)
-        if len(times) >= 4 and _countable(times) and gaps[0] > max(1.15 * gaps[1], gaps[1] + EDGE):
-            yield Question(
-                kind="longest_silence",
-                about={"topic": topic},
-                text=f"After which message on `{topic}` was the time until the next one the longest?"
-                " The first message is number 1.",
-                view="arrivals",
-                subject=topic,
-            )
-
-
-def _sent(record: Record) -> Iterator[tuple[str, list[float], str]]:
-    """Yield each topic that one node of the programs published, with the times of the messages and the node."""
-    for topic, rows in sorted(record.traffic.items()):
-        publishers = [row for row in rows if row.who.endswith(" publishes") and row.times]
-        nodes = {row.who.removesuffix(" publishes") for row in publishers}
-        if len(nodes) == 1:
-            yield topic, sorted(time for row in publishers for time in row.times), nodes.pop()
-
-
 KINDS: tuple[Callable[[Record], Iterator[Question]], ...] = (
     under_way, transition_under_way, waited_for, began_during, longest_pause, thread_of, longest_transition,
-    transitions, sent_while_active, sent_between, longest_silence,
+    transitions, *topic_questions.KINDS,
 )  # fmt: skip
 
 

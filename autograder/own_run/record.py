@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from autograder.graph.qos import POLICIES
 from autograder.pictures import Endpoint, Run, Runs, Traffic
 
 SECONDS = 3.0
@@ -46,13 +47,16 @@ class Record(BaseModel):
         """Refuse times that no launch can have: a program can tell its probe anything."""
         runs = (time for run in self.runs for time in (run.begin, run.end))
         sent = (time for rows in self.traffic.values() for row in rows for time in row.times)
-        for time in (*runs, *sent, *(change.time for change in self.changes)):
+        starts = (row.since for rows in self.traffic.values() for row in rows if row.since is not None)
+        for time in (*runs, *sent, *starts, *(change.time for change in self.changes)):
             if not 0 <= time <= LONGEST:
                 raise ValueError(f"{time} is no time of a launch.")
         if not all(0 <= run.period < float("inf") for run in self.runs):
             raise ValueError("a period is no time")
         if len({run.callback for run in self.runs}) > _MOST_CALLBACKS:
             raise ValueError("the record has too many callbacks")
+        if any(not end.action and end.policies.keys() != POLICIES for end in self.ends):
+            raise ValueError("an end of a topic has other policies than the graph shows")
         return self
 
     def by(self, grade_id: str) -> Record:

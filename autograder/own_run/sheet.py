@@ -103,6 +103,8 @@ def _needed(record: Record, question: Question) -> Record:
         kept["traffic"] = {question.subject: rows}
         nodes = {row.who.partition(" ")[0] for row in rows}
         kept["changes"] = tuple(change for change in record.changes if change.node in nodes)
+    elif question.view == "qos":
+        kept["ends"] = tuple(end for end in record.ends if end.topic == question.subject)
     else:
         kept["changes"] = tuple(change for change in record.changes if change.node == question.subject)
     return Record.model_validate(kept)

@@ -8,15 +8,21 @@ import json
 import random
 import zlib
 from collections.abc import Iterator
+from dataclasses import asdict
 from typing import Any
 
 import pytest
+import replay
+import sample_class
 
+from autograder.course.lab import load_lab
 from autograder.own_run.keys import key
 from autograder.own_run.record import Record
 from autograder.own_run.sheet import Asked, OwnRun
-from autograder.pictures import Run
+from autograder.pictures import Endpoint, Run
 
+LABS = ("lab2_executors", "lab4_lifecycle", "lab5_qos")
+"""Those with a part about one's own run."""
 RUNS = tuple(
     Run(name, begin + offset, begin + offset + 0.2, thread, f"exclusive group {thread}", "/robot", period=0.5)
     for begin in (0.0, 0.5, 1.0, 1.5)
@@ -109,3 +115,23 @@ def test_a_line_that_was_changed_by_hand_is_refused_or_can_be_marked() -> None:
         for one in own.named().values():
             key(one.record, one.question)
     assert used > 5
+
+
+def test_an_end_without_policies_is_refused() -> None:
+    ends = [asdict(Endpoint("/a", "/t", publishes, {})) for publishes in (True, False)]
+    about = {"topic": "/t", "publisher": 1}
+    question = {"kind": "matching", "about": about, "text": "", "view": "qos", "subject": "/t"}
+    with pytest.raises(ValueError, match="policies"):
+        OwnRun.read(packed(json.dumps({"asked": [{"record": {"ends": ends}, "question": question}]})))
+
+
+@pytest.mark.parametrize("lab_name", LABS)
+def test_the_line_of_each_solution_is_a_run_and_its_answers_are_right(lab_name: str) -> None:
+    table = load_lab(sample_class.ROOT, lab_name).answers["own_run"].solution
+    answers = dict(line.split(": ", 1) for line in table.splitlines() if ": " in line and not line.startswith("#"))
+    asked = OwnRun.read(answers["run"]).named()
+    assert len(asked) == 4
+    for name, one in asked.items():
+        right = key(one.record, one.question)
+        assert answers[name] == right == replay.answer(one.record, one.question), one.question.text
+        assert one.question.picture(one.record).svg.startswith("<svg")
