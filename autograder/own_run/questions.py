@@ -213,6 +213,8 @@ KINDS: tuple[Callable[[Record], Iterator[Question]], ...] = (
     under_way, transition_under_way, waited_for, began_during, longest_pause, thread_of, longest_transition,
     transitions, *topic_questions.KINDS,
 )  # fmt: skip
+LAST_KINDS = (topic_questions.sent_at_its_rate,)
+"""What is asked only if the other kinds do not find enough."""
 
 
 def chosen(records: Sequence[Record], seed: str, number: int) -> list[tuple[Record, Question]]:
@@ -226,12 +228,15 @@ def chosen(records: Sequence[Record], seed: str, number: int) -> list[tuple[Reco
     draw = random.Random(seed)
     kinds = draw.sample(KINDS, len(KINDS))
     found: list[tuple[Record, Question]] = []
-    for kind in kinds * number:  # another one of a kind only if there are not enough kinds
+    # Another one of a kind is asked only if there are not enough kinds.
+    for kind in [*kinds * number, *LAST_KINDS * number]:
+        if len(found) == number:
+            break
         possible = [(record, question) for record in records for question in kind(record)]
         so_far = [(record, question.subject) for record, question in found]
         fresh = [(record, question) for record, question in possible if (record, question.subject) not in so_far]
         texts = [question.text for _, question in found]
         possible = [pair for pair in fresh or possible if pair[1].text not in texts]
-        if possible and len(found) < number:
+        if possible:
             found.append(draw.choice(possible))
     return found

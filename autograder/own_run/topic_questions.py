@@ -34,10 +34,15 @@ def sent_while_active(record: Record) -> Iterator[Question]:
                 )
 
 
-def sent_between(record: Record) -> Iterator[Question]:
-    """Ask how many messages of a topic were published in a short time."""
+def sent_between(record: Record, surprising: bool = True) -> Iterator[Question]:
+    """Ask how many messages of a topic were published in a short time.
+
+    Args:
+        record: of a run.
+        surprising: only where the usual rate does not tell the number.
+    """
     for topic, times, _ in _sent(record):
-        for begin, end in _windows(times):
+        for begin, end in _windows(times, surprising):
             yield Question(
                 kind="sent_between",
                 about={"topic": topic, "begin": begin, "end": end},
@@ -51,7 +56,7 @@ def taken_between(record: Record) -> Iterator[Question]:
     """Ask how many messages a subscription took in a short time."""
     for topic, rows in sorted(record.traffic.items()):
         for row in _takers(rows):
-            for begin, end in _windows(row.times):
+            for begin, end in _windows(row.times, surprising=True):
                 yield Question(
                     kind="taken_between",
                     about={"topic": topic, "who": row.who, "begin": begin, "end": end},
@@ -62,15 +67,20 @@ def taken_between(record: Record) -> Iterator[Question]:
                 )
 
 
-def _windows(times: Sequence[float]) -> Iterator[tuple[float, float]]:
-    """Yield times from and to which somebody can count the messages, and whose number the usual rate does not tell."""
+def sent_at_its_rate(record: Record) -> Iterator[Question]:
+    """Ask how many messages of a topic were published in a short time, also where the usual rate tells the number."""
+    yield from sent_between(record, surprising=False)
+
+
+def _windows(times: Sequence[float], surprising: bool) -> Iterator[tuple[float, float]]:
+    """Yield times between which somebody can count the messages; if surprising, the usual rate does not tell how many."""
     last = int(20 * max(times, default=0.0))
     usual = statistics.median(two - one for one, two in pairwise(times)) if len(times) > 3 else 0.0
     for twentieth in range(2, last - 8) if len(times) > 3 else ():
         begin, end = twentieth / 20, min(twentieth + 6 + 5 * (twentieth % 3), last) / 20
         inside = [time for time in times if begin < time < end]
-        surprising = usual == 0.0 or abs((end - begin) / usual - len(inside)) > SOME
-        if inside and surprising and countable(inside) and apart(times, begin, end):
+        told = usual > 0.0 and abs((end - begin) / usual - len(inside)) <= SOME
+        if inside and not (surprising and told) and countable(inside) and apart(times, begin, end):
             yield begin, end
 
 
