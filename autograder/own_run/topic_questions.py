@@ -73,7 +73,7 @@ def sent_at_its_rate(record: Record) -> Iterator[Question]:
 
 
 def _windows(times: Sequence[float], surprising: bool) -> Iterator[tuple[float, float]]:
-    """Yield times between which somebody can count the messages; if surprising, the usual rate does not tell how many."""
+    """Yield times between which messages can be counted; if surprising, the usual rate does not tell how many."""
     last = int(20 * max(times, default=0.0))
     usual = statistics.median(two - one for one, two in pairwise(times)) if len(times) > 3 else 0.0
     for twentieth in range(2, last - 8) if len(times) > 3 else ():
