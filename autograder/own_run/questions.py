@@ -217,6 +217,12 @@ LAST_KINDS = (topic_questions.sent_at_its_rate,)
 """What is asked only if the other kinds do not find enough."""
 
 
+def possible(record: Record) -> Iterator[Question]:
+    """Yield every question that can be asked about a record."""
+    for kind in (*KINDS, *LAST_KINDS):
+        yield from kind(record)
+
+
 def chosen(records: Sequence[Record], seed: str, number: int) -> list[tuple[Record, Question]]:
     """Choose questions at random, as far as possible each of another kind and about another node or topic.
 
@@ -232,11 +238,11 @@ def chosen(records: Sequence[Record], seed: str, number: int) -> list[tuple[Reco
     for kind in [*kinds * number, *LAST_KINDS * number]:
         if len(found) == number:
             break
-        possible = [(record, question) for record in records for question in kind(record)]
+        pairs = [(record, question) for record in records for question in kind(record)]
         so_far = [(record, question.subject) for record, question in found]
-        fresh = [(record, question) for record, question in possible if (record, question.subject) not in so_far]
+        fresh = [(record, question) for record, question in pairs if (record, question.subject) not in so_far]
         texts = [question.text for _, question in found]
-        possible = [pair for pair in fresh or possible if pair[1].text not in texts]
-        if possible:
-            found.append(draw.choice(possible))
+        pairs = [pair for pair in fresh or pairs if pair[1].text not in texts]
+        if pairs:
+            found.append(draw.choice(pairs))
     return found

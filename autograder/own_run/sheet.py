@@ -15,7 +15,7 @@ from html import escape
 from pydantic import BaseModel, ConfigDict, Field
 
 from autograder.own_run.question import Question
-from autograder.own_run.questions import KINDS, LAST_KINDS, chosen
+from autograder.own_run.questions import chosen, possible
 from autograder.own_run.record import Record
 
 _MOST_BYTES = 200_000
@@ -113,5 +113,4 @@ def _needed(record: Record, question: Question) -> Record:
 def _can_be_asked(asked: Asked) -> bool:
     """Whether the kit would ask this question about this record. The words may be those of another version."""
     wanted = asked.question.model_copy(update={"text": ""})
-    questions = (question for kind in (*KINDS, *LAST_KINDS) for question in kind(asked.record))
-    return any(question.model_copy(update={"text": ""}) == wanted for question in questions)
+    return any(question.model_copy(update={"text": ""}) == wanted for question in possible(asked.record))
