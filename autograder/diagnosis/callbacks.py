@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from autograder.diagnosis.inside import Inside, read
+from autograder.diagnosis.inside import Inside, events_of
 from autograder.diagnosis.scene import Scene, first
 from autograder.diagnosis.traces import CRASHED, KNOWN_ERRORS, PARAMETER_NOT_DECLARED, PARAMETER_TYPE, quoted
 from autograder.reasons import Group, Kind, Reason
@@ -112,7 +112,7 @@ def failed_in_a_callback(scene: Scene) -> RunningProgram | None:
     executor of rclpy 7.1 looks for errors only at its next event.
     """
     for program in scene.programs:
-        for event in read(program.events()):
+        for event in events_of(program):
             if _outlived(event):
                 continue
             if isinstance(event, CallbackError) and event.kind != "lifecycle":
@@ -128,7 +128,7 @@ def called_from_outside(program: RunningProgram) -> tuple[str, float] | None:
     Must have seen: that such a callback was the first thing that went wrong. A timer's callback does not count, because
     nothing from outside triggers it.
     """
-    said = [event for event in read(program.events()) if not _outlived(event)]
+    said = [event for event in events_of(program) if not _outlived(event)]
     errors = [event for event in said if isinstance(event, CallbackError | BadReturn)]
     first = errors[0] if errors else None
     if not isinstance(first, CallbackError) or first.kind not in ("subscription", "service", "parameter"):

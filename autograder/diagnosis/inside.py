@@ -17,12 +17,14 @@ from autograder.graph.observer import Observer
 from autograder.sandbox.inside.probe.events import (
     Attached,
     Call,
+    CallbackError,
     Event,
     ExecutorSeen,
     NodeSeen,
     ParameterSeen,
     ProbeFailed,
     Thing,
+    ThreadError,
 )
 from autograder.sandbox.running_program import RunningProgram
 
@@ -43,6 +45,26 @@ def read(lines: Iterable[dict[str, Any]]) -> list[Event]:
     return found
 
 
+AFTER_SHUTDOWN = re.compile(
+    r"Context must be initialized|context is (invalid|not valid)|NotInitializedException|ExternalShutdownException"
+    r"|InvalidHandle|already called|'NoneType' object does not support the context manager"
+)
+"""The errors of rclpy in code that continues to use it after a shutdown."""
+
+
+def events_of(program: RunningProgram) -> list[Event]:
+    """Return what the probe of a program noted, without the errors that a signal from the check has caused.
+
+    A signal that asks the program to end shuts down rclpy at once (`signal_handler.cpp` of rclpy 7.1). A callback that
+    is just running then fails when it publishes, which is no mistake of the program's.
+    """
+    noted = read(program.events())
+    if not program.told_to_end:
+        return noted
+    errors = (CallbackError, ThreadError)
+    return [one for one in noted if not (isinstance(one, errors) and AFTER_SHUTDOWN.search(f"{one.type}: {one.text}"))]
+
+
 _T = TypeVar("_T")
 
 
@@ -61,7 +83,7 @@ class Inside:
         self.program = program
         self.name = program.name
         self.now = time.monotonic()
-        self.events: list[Event] = read(program.events())
+        self.events: list[Event] = events_of(program)
         self.attached = bool(self.all(Attached)) and not self.all(ProbeFailed)
         self.things: dict[int, Thing] = {thing.id: thing for thing in self.all(Thing)}
         self.executors: list[ExecutorSeen] = self.all(ExecutorSeen)

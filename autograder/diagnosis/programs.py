@@ -9,7 +9,7 @@ from autograder.arguments import params_file, remap_rules
 from autograder.core.processes import no_threads
 from autograder.diagnosis import callbacks
 from autograder.diagnosis.callbacks import MESSAGE_FIELD
-from autograder.diagnosis.inside import Inside
+from autograder.diagnosis.inside import AFTER_SHUTDOWN, Inside
 from autograder.diagnosis.scene import Scene
 from autograder.diagnosis.traces import CRASHED, last_traceback
 from autograder.reasons import Group, Kind, Reason
@@ -123,13 +123,6 @@ def _why_over(inside: Inside) -> str:
     )
 
 
-_AFTER_SHUTDOWN = re.compile(
-    r"Context must be initialized|context is (invalid|not valid)|NotInitializedException|ExternalShutdownException"
-    r"|InvalidHandle|already called|'NoneType' object does not support the context manager"
-)
-"""The errors of rclpy in code that continues to use it after a shutdown."""
-
-
 def shut_down_inside(scene: Scene) -> Reason | None:
     """Return why a program that called shutdown inside a callback did not end properly.
 
@@ -138,7 +131,7 @@ def shut_down_inside(scene: Scene) -> Reason | None:
     """
     for inside in scene.insides:
         error = last_traceback(inside.program.output(), inside.name)
-        if (inside.program.exit_status() or 0) >= 0 and not (error and _AFTER_SHUTDOWN.search(error.because)):
+        if (inside.program.exit_status() or 0) >= 0 and not (error and AFTER_SHUTDOWN.search(error.because)):
             continue  # it ended for another reason
         for call in inside.calls:
             if call.what == "shutdown" and call.in_callback:

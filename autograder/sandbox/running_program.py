@@ -101,6 +101,8 @@ class RunningProgram:
         """The process ID as this process sees it."""
         self.priority = Priority()
         self.began = time.monotonic()
+        self.told_to_end = False
+        """Whether it was sent a signal that asks a program to end, which shuts down rclpy while its callbacks run."""
         self._head = bytearray()
         self._tail = bytearray()
         self._written = 0
@@ -224,6 +226,7 @@ class RunningProgram:
         """Send the program a signal, if it is still running."""
         with self._changed, contextlib.suppress(ProcessLookupError):
             if self._status is None and self._handle >= 0:
+                self.told_to_end |= number in (signal.SIGINT, signal.SIGTERM)
                 signal.pidfd_send_signal(self._handle, number)
 
     def stop(self, grace: float = 1.0) -> None:

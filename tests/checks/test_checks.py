@@ -575,6 +575,35 @@ def test_an_answer_to_an_action_client_is_not_lost_by_chance(grade: Grade) -> No
     assert result.points == 2.0, result
 
 
+LAST_WORD_LATE = COUNTER.replace("import time\n", "import threading\nimport time\n").replace(
+    "        handle.succeed()\n",
+    """\
+        last = Fibonacci.Impl.FeedbackMessage(goal_id=handle.goal_id)
+        last.feedback.sequence = [*counted, len(counted)]
+        told = self.create_publisher(Fibonacci.Impl.FeedbackMessage, "count/_action/feedback", 10)
+        while told.get_subscription_count() == 0:
+            time.sleep(0.01)
+        threading.Timer(0.3, told.publish, [last]).start()
+        handle.succeed()
+""",
+)
+
+
+def test_feedback_that_comes_after_the_result_counts(grade: Grade) -> None:
+    result = grade(
+        """\
+        from test_msgs.action import Fibonacci
+        with launch("counter") as ros:
+            goal = ros.action("/count", Fibonacci).send_goal(Fibonacci.Goal(order=3))
+            goal.expect_result()
+            goal.expect_feedback(values=lambda told: len(told[-1].sequence) == 4 or "The last one is missing.")
+        ros.score(2)
+        """,
+        counter__py=LAST_WORD_LATE,
+    )
+    assert result.points == 2.0, result
+
+
 def test_an_action_is_followed_from_the_goal_to_its_end(grade: Grade) -> None:
     result = grade(
         """\
@@ -1163,6 +1192,46 @@ def test_one_run_of_a_program_is_killed_and_started_again_with_the_same_words(gr
         talker__py=TALKER,
     )
     assert result.points == 2.0, result
+
+
+WORKS_ON = """
+import time
+
+import rclpy
+from std_msgs.msg import String
+
+rclpy.init()
+node = rclpy.create_node("works_on")
+out = node.create_publisher(String, "done", 1)
+
+
+def work(message):
+    out.publish(message)
+    while rclpy.ok():
+        time.sleep(0.01)
+    out.publish(message)
+
+
+node.create_subscription(String, "work", work, 1)
+rclpy.spin(node)
+"""
+
+
+def test_a_program_that_the_check_ends_in_its_callback_is_not_blamed_for_it(grade: Grade) -> None:
+    result = grade(
+        """\
+        with launch("works_on", "talker", listen=[("/done", String)]) as ros:
+            ros.publisher("/work", String).publish(String(data="a lot"))
+            ros.topic("/done", String).expect_messages()
+            ros.program("works_on").stop()
+            ros.require("context is invalid" in ros.program("works_on").output(), "It failed when it was ended")
+            ros.topic("/nothing", String).expect_publisher(within=0.5)
+        ros.score(2)
+        """,
+        works_on__py=WORKS_ON,
+        talker__py=TALKER,
+    )
+    assert failure(result).code == "no-topic", result
 
 
 def test_what_still_runs_is_not_started_again(grade: Grade) -> None:

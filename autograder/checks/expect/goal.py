@@ -27,6 +27,9 @@ GOAL_FEEDBACK = Kind(
     "goal-feedback", "another number of feedback messages came; no reason was established", Group.STATES
 )
 
+_UNDER_WAY = 1.0
+"""Seconds for which feedback may still be under way when the result is there: they come by different ways."""
+
 _STEPS = 3
 """Feedback messages after which a server that has agreed to cancel must have ended the goal: 0.3 s at 10 Hz."""
 
@@ -225,7 +228,7 @@ class SentGoal(Meanwhile):
             return goal.result is not None or (most is None and len(goal.heard) >= least)
 
         self._wait(came, within)
-        self._observer.wait(lambda: len(goal.heard) >= least, 0.3)  # the last may be under way when the result is there
+        self._observer.wait(lambda: len(goal.heard) >= least, _UNDER_WAY)
         heard = goal.heard
         if len(heard) < least or (most is not None and len(heard) > most):
             reason = self._why_not_so_much_feedback(too_few=len(heard) < least)
@@ -248,8 +251,13 @@ class SentGoal(Meanwhile):
 
     def _say_what_they_should(self, values: Callable[[list[Any]], object], hint: str) -> None:
         goal = self.seen
-        wrong = objection(values(goal.feedback), "What the feedback says is not what was asked for.")
-        if wrong:
+
+        def wrong_now() -> str:
+            return objection(values(goal.feedback), "What the feedback says is not what was asked for.")
+
+        if goal.result is not None:
+            self._observer.wait(lambda: not wrong_now(), _UNDER_WAY)
+        if wrong := wrong_now():
             reason = diagnosis.why_wrong_feedback(self._scene(), goal.name) or CONTENT(wrong)
             self._fail(f"The feedback of `{goal.name}` says what it should", reason, observed=wrong, hint=hint)
 
