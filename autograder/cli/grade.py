@@ -171,13 +171,13 @@ def _show(run: ClassRun, paths: CoursePaths, lab: str, as_json: bool) -> None:
             whole = store.last(lab, result.student) or result
             print(",\n" if number else "[", whole.model_dump_json(), sep="", end="")
         print("]")
-        for sentence in (*left_out, *run.canaries):
+        for sentence in (*left_out, *map(plain, dict.fromkeys(run.shared_runs.values())), *run.canaries):
             print(sentence, file=sys.stderr)
         return
     screen = console()
     by_hand = {student: _by_hand(grade) for student, grade in run.by_student.items()}
     screen.print(class_view(run.results, by_hand, screen.width))
-    undecided = undecided_view(run.results)
+    undecided = undecided_view(run.results, list(dict.fromkeys(run.shared_runs.values())))
     if undecided is not None:
         screen.print()
         screen.print(undecided)
