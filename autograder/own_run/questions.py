@@ -173,6 +173,7 @@ def longest_pause(record: Record) -> Iterator[Question]:
             pauses = sorted(((two - one), one) for one, two in pairwise(begins))
             if (
                 len(begins) < 4
+                or pauses[-1][1] == begins[0]  # while the program starts, which can be told without the run
                 or not countable(begins)
                 or pauses[-1][0] < max(1.15 * pauses[-2][0], pauses[-2][0] + EDGE)
             ):
