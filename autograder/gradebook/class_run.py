@@ -25,7 +25,6 @@ from autograder.gradebook.renamed import move_renamed
 from autograder.grading.canaries import Canaries, known_answers
 from autograder.grading.class_runner import run_class
 from autograder.grading.runner import Settings
-from autograder.grading.shared_runs import shared_runs
 from autograder.grading.store import ResultStore
 from autograder.intake.collect import Collected, collect
 from autograder.intake.options import Accepted
@@ -150,8 +149,6 @@ class ClassRun:
     """Sentences about changes of the gradebook itself."""
     canaries: list[str] = field(default_factory=list)
     """Sentences about the known answers that ran with the class."""
-    shared_runs: dict[str, str] = field(default_factory=dict)
-    """A sentence about each student whose recorded run somebody else has handed in, too."""
     seconds: dict[str, float] = field(default_factory=dict)
     """How long the whole grading took (`all`), the runs (`running`), and nbgrader, mostly meanwhile (`recording`)."""
 
@@ -317,7 +314,6 @@ def _graded(root: Path, lab: Lab, source: Path, settings: Settings, intake: Inta
         by_student={grade.student: grade for grade in read_grades(root, lab.name)},
         told=recorder.told,
         canaries=canaries.told(root) if canaries is not None else [],
-        shared_runs=shared_runs(root, lab, results),
         seconds={
             "all": round(time.monotonic() - began, 2),
             "running": round(ran - began, 2),
