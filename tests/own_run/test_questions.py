@@ -126,6 +126,14 @@ def test_nothing_is_asked_about_what_the_picture_cannot_show() -> None:
     assert kinds(Record()) == set()
 
 
+@pytest.mark.parametrize("first", (0.0, 0.01, 0.02, 0.03, 0.0466))
+def test_messages_that_come_as_fast_as_the_windows_begin_can_be_asked_about(first: float) -> None:
+    times = [round(first + 0.05 * number, 4) for number in range(50)]
+    record = Record(traffic={"/data": (Traffic("/robot publishes", times),)})
+    asked = list(topic_questions.sent_at_its_rate(record))
+    assert asked and all(key(record, question) == replay.answer(record, question) for question in asked)
+
+
 def test_a_record_with_times_that_no_launch_has_is_refused() -> None:
     for time in (float("nan"), float("inf"), -1.0):
         with pytest.raises(ValidationError):
