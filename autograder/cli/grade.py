@@ -156,10 +156,14 @@ def _unread(results: Sequence[SubmissionResult]) -> list[str]:
 
 
 def _show(run: ClassRun, paths: CoursePaths, lab: str, as_json: bool) -> None:
+    from autograder.course.lab import load_lab
     from autograder.gradebook.settings import gradebook_place
+    from autograder.grading.shared_runs import shared_runs
     from autograder.grading.store import ResultStore
     from autograder.report.terminal import class_view, console, plain, undecided_view
 
+    students = [result.student for result in run.results]
+    shared = list(dict.fromkeys(shared_runs(paths.root, load_lab(paths.root, lab), students).values()))
     left_out = [plain(sentence) for sentence in (*run.told, *run.collected.notes, *run.collected.refused)]
     left_out += map(plain, _unread(run.results))
     left_out += [f"{plain(name)} is not in the gradebook: {plain(why)}" for name, why in run.unrecorded.items()]
@@ -171,13 +175,13 @@ def _show(run: ClassRun, paths: CoursePaths, lab: str, as_json: bool) -> None:
             whole = store.last(lab, result.student) or result
             print(",\n" if number else "[", whole.model_dump_json(), sep="", end="")
         print("]")
-        for sentence in (*left_out, *run.canaries):
+        for sentence in (*left_out, *map(plain, shared), *run.canaries):
             print(sentence, file=sys.stderr)
         return
     screen = console()
     by_hand = {student: _by_hand(grade) for student, grade in run.by_student.items()}
     screen.print(class_view(run.results, by_hand, screen.width))
-    undecided = undecided_view(run.results)
+    undecided = undecided_view(run.results, shared)
     if undecided is not None:
         screen.print()
         screen.print(undecided)

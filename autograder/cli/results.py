@@ -24,9 +24,11 @@ def report(course: CourseOption = None) -> None:
     """Write a page about the class for each lab, build/report/LAB.html, for instructors and not for students."""
     import datetime
 
+    from autograder.course.lab import lab_names, load_lab
     from autograder.course.paths import CoursePaths, course_root
     from autograder.gradebook.grades import class_entries
     from autograder.gradebook.renewal import renew_pages
+    from autograder.grading.shared_runs import shared_runs
     from autograder.report.class_page import write_class_page
 
     root = course_root(course)
@@ -36,7 +38,9 @@ def report(course: CourseOption = None) -> None:
         raise KitError("There are no results yet.", "Grade a class first: autograder grade LAB")
     for lab in sorted({entry.lab for entry in entries}):
         of_lab = [entry for entry in entries if entry.lab == lab]
-        print(write_class_page(CoursePaths(root).class_page(lab), of_lab, datetime.date.today()))
+        students = [entry.student for entry in of_lab]
+        shared = shared_runs(root, load_lab(root, lab), students) if lab in lab_names(root) else {}
+        print(write_class_page(CoursePaths(root).class_page(lab), of_lab, datetime.date.today(), shared))
 
 
 @app.command()

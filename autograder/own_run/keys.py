@@ -24,6 +24,11 @@ def _under_way(record: Record, node: str, time: float) -> int:
     return sum(run.begin <= time <= run.end for run in record.callbacks[node])
 
 
+def _on_thread(record: Record, node: str, thread: int, time: float) -> str:
+    runs = record.callbacks[node]
+    return next(run.callback for run in runs if run.thread == thread and run.begin <= time <= run.end)
+
+
 def _transition_under_way(record: Record, time: float) -> str:
     running = [run for run in record.runs if run.callback.startswith("on_") and run.begin <= time <= run.end]
     return f"{running[0].callback} of {running[0].node}" if running else NONE
@@ -108,6 +113,7 @@ def _times(record: Record, topic: str) -> list[float]:
 
 _KEYS: dict[str, Any] = {
     "under_way": _under_way,
+    "on_thread": _on_thread,
     "waited_for": _waited_for,
     "began_during": _began_during,
     "longest_pause": _longest_pause,

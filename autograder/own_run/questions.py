@@ -7,8 +7,9 @@ questions are about moments, numbers and orders of one run.
 from __future__ import annotations
 
 import random
+from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
-from itertools import pairwise
+from itertools import chain, pairwise
 
 from autograder import pictures
 from autograder.own_run import topic_questions
@@ -38,22 +39,51 @@ def _place(run: Run) -> str:
 
 
 def under_way(record: Record) -> Iterator[Question]:
-    """Ask how many callbacks ran at a moment."""
+    """Ask how many callbacks ran at a moment, where the numbers vary so much that none is the usual one."""
     for node, runs in record.callbacks.items():
-        last = max((run.end for run in _whole(runs)), default=0.0)
-        for hundredth in range(5, int(100 * last), 7) if len(_long_callbacks(runs)) > 2 else ():
-            time = hundredth / 100
-            near = [run for run in runs if run.begin - EDGE < time < run.end + EDGE]
-            if len(near) == 1 and hundredth % 4:
-                continue  # otherwise most answers would be that one was
-            if near and all(abs(edge - time) >= EDGE for run in near for edge in (run.begin, run.end)):
+        moments = defaultdict(list)
+        for time in _clear_moments(runs) if len(_long_callbacks(runs)) > 2 else ():
+            moments[sum(run.begin < time < run.end for run in runs)].append(time)
+        least = min(map(len, moments.values()), default=0)  # of each number, so that each is as often the answer
+        for time in sorted(chain(*(times[:least] for times in moments.values()))) if len(moments) > SOME else ():
+            yield Question(
+                kind="under_way",
+                about={"node": node, "time": time},
+                text=f"How many runs of callbacks of `{node}` were under way at {time:.2f} s?",
+                view="timeline",
+                subject=node,
+            )
+
+
+def on_thread(record: Record) -> Iterator[Question]:
+    """Ask which callback a thread ran at a moment, if each bar at this moment shows the number of its thread."""
+    for node, runs in record.callbacks.items():
+        first = [runs.of(name)[0] for name in runs.callbacks()]
+        for time in _clear_moments(runs) if len(runs.threads()) > 2 else ():
+            at_once = [run for run in runs if run.begin < time < run.end]
+            if len(at_once) <= SOME or any(run.end - run.begin < _WITH_NUMBER for run in at_once):
+                continue
+            if any(run in first for run in at_once):
+                continue  # the first runs are on threads 1, 2, 3 and so on
+            for run in at_once:
                 yield Question(
-                    kind="under_way",
-                    about={"node": node, "time": time},
-                    text=f"How many runs of callbacks of `{node}` were under way at {time:.2f} s?",
+                    kind="on_thread",
+                    about={"node": node, "thread": run.thread, "time": time},
+                    text=f"Which callback of `{node}` did thread {run.thread} run at {time:.2f} s?",
+                    choices=tuple(sorted(runs.callbacks())),
                     view="timeline",
                     subject=node,
                 )
+
+
+def _clear_moments(runs: Runs) -> Iterator[float]:
+    """Yield moments at which callbacks were under way, and it is beyond doubt which ones."""
+    last = max((run.end for run in _whole(runs)), default=0.0)
+    for hundredth in range(5, int(100 * last), 7):
+        time = hundredth / 100
+        near = [run for run in runs if run.begin - EDGE < time < run.end + EDGE]
+        if near and all(abs(edge - time) >= EDGE for run in near for edge in (run.begin, run.end)):
+            yield time
 
 
 def transition_under_way(record: Record) -> Iterator[Question]:
@@ -91,13 +121,15 @@ def _moments(runs: Runs) -> Iterator[float]:
 def waited_for(record: Record) -> Iterator[Question]:
     """Ask for which other callback a timer's callback had to wait that began late."""
     for node, runs in record.callbacks.items():
-        others = len(runs.callbacks()) - 1
-        for name in runs.callbacks() if others > 1 else ():
+        for name in runs.callbacks():
+            group = runs.of(name)[0].group
+            if len({run.callback for run in runs if run.group == group}) <= SOME:
+                continue  # the source tells which other one is in the group
             for one, two in pairwise(runs.of(name)):
                 late = two.begin - one.begin - one.period
                 held = [run for run in _whole(runs) if run.callback != name and run.end - run.begin >= _LONG]
                 held = [run for run in held if abs(two.begin - run.end) < EDGE and run.begin < two.begin - late / 2]
-                same = [run for run in held if (run.group == two.group and "exclusive" in run.group)]
+                same = [run for run in held if run.group == group and "exclusive" in group]
                 if one.period == 0 or late < max(0.4 * one.period, _LONG) or len(held) != 1 or len(same) != 1:
                     continue
                 yield Question(
@@ -141,6 +173,7 @@ def longest_pause(record: Record) -> Iterator[Question]:
             pauses = sorted(((two - one), one) for one, two in pairwise(begins))
             if (
                 len(begins) < 4
+                or pauses[-1][1] == begins[0]  # while the program starts, which can be told without the run
                 or not countable(begins)
                 or pauses[-1][0] < max(1.15 * pauses[-2][0], pauses[-2][0] + EDGE)
             ):
@@ -210,8 +243,8 @@ def transitions(record: Record) -> Iterator[Question]:
 
 
 KINDS: tuple[Callable[[Record], Iterator[Question]], ...] = (
-    under_way, transition_under_way, waited_for, began_during, longest_pause, thread_of, longest_transition,
-    transitions, *topic_questions.KINDS,
+    under_way, on_thread, transition_under_way, waited_for, began_during, longest_pause, thread_of,
+    longest_transition, transitions, *topic_questions.KINDS,
 )  # fmt: skip
 LAST_KINDS = (topic_questions.sent_at_its_rate,)
 """What is asked only if the other kinds do not find enough."""

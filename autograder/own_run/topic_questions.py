@@ -14,6 +14,8 @@ from autograder.pictures import Endpoint, Traffic
 
 THEY_MATCH = "they match"
 _POLICIES = ("reliability", "durability", "deadline", "liveliness", "liveliness lease")
+_LATER = (0.0, 0.02, 0.04)
+"""Seconds by which windows are moved, because otherwise messages every 50 ms might all lie at the edges of windows."""
 _LEAST_REQUESTS = 3
 """The number of subscriptions from which on it is a question how many of them match."""
 
@@ -76,8 +78,9 @@ def _windows(times: Sequence[float], surprising: bool) -> Iterator[tuple[float, 
     """Yield times between which messages can be counted; if surprising, the usual rate does not tell how many."""
     last = int(20 * max(times, default=0.0))
     usual = statistics.median(two - one for one, two in pairwise(times)) if len(times) > 3 else 0.0
-    for twentieth in range(2, last - 8) if len(times) > 3 else ():
-        begin, end = twentieth / 20, min(twentieth + 6 + 5 * (twentieth % 3), last) / 20
+    for twentieth, later in product(range(2, last - 8), _LATER) if len(times) > 3 else ():
+        begin = round(twentieth / 20 + later, 2)
+        end = round(min(twentieth + 6 + 5 * (twentieth % 3), last) / 20 + later, 2)
         inside = [time for time in times if begin < time < end]
         told = usual > 0.0 and abs((end - begin) / usual - len(inside)) <= SOME
         if inside and not (surprising and told) and countable(inside) and apart(times, begin, end):

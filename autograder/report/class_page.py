@@ -11,7 +11,7 @@ import hashlib
 import os
 import statistics
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import quote
@@ -56,13 +56,16 @@ def _together(persons: Sequence[_Person]) -> list[dict[str, object]]:
     ]
 
 
-def write_class_page(path: Path, entries: Sequence[Entry], written: datetime.date) -> Path:
+def write_class_page(
+    path: Path, entries: Sequence[Entry], written: datetime.date, remarks: Mapping[str, str] | None = None
+) -> Path:
     """Write the page of one lab and return its path.
 
     Args:
         path: the file for the page.
         entries: the lab's submissions.
         written: the date that is shown on the page.
+        remarks: a sentence about each student at whose work a person should look, beside the flags of the results.
     """
     scores = [earned(entry) for entry in entries]
     most = max((top(entry) for entry in entries), default=0.0)
@@ -79,7 +82,7 @@ def write_class_page(path: Path, entries: Sequence[Entry], written: datetime.dat
         lowest=points(min(scores)),
         highest=points(max(scores)),
         bars=_distribution(scores, most),
-        persons=_together(_persons(entries)),
+        persons=_together(_persons(entries, remarks or {})),
         checks=_checks(entries),
         best=_best(entries),
         students=[_student(entry, path) for entry in entries],
@@ -112,7 +115,7 @@ def _distribution(scores: Sequence[float], top: float) -> list[dict[str, object]
     return bars
 
 
-def _persons(entries: Sequence[Entry]) -> list[_Person]:
+def _persons(entries: Sequence[Entry], remarks: Mapping[str, str]) -> list[_Person]:
     found = []
     for entry in entries:
         for check in entry.result.checks:
@@ -129,7 +132,8 @@ def _persons(entries: Sequence[Entry]) -> list[_Person]:
         for cell in entry.grade.stale if entry.grade is not None else ():
             what = f"{cell.grade_id}: {points(cell.points or 0.0)} points by hand"
             found.append(_Person(entry.student, what, "The work has changed since you graded it, so look at it again."))
-        found += [_Person(entry.student, "look at this; the points stay", flag) for flag in entry.result.flags]
+        flags = [*entry.result.flags, *([remarks[entry.student]] if entry.student in remarks else [])]
+        found += [_Person(entry.student, "look at this; the points stay", flag) for flag in flags]
         if entry.grade is None:
             found.append(_Person(entry.student, "not in the gradebook", "Grade the class again."))
     return found

@@ -275,8 +275,13 @@ def _legend(checks: Sequence[CheckResult]) -> list[str]:
     return [f"{n}  {plain(c.title or c.grade_id)} ({c.max_points:g})" for n, c in enumerate(checks, start=1)]
 
 
-def undecided_view(results: Sequence[SubmissionResult]) -> RenderableType | None:
-    """Return the checks that an instructor has to decide or look at, with the reasons; None if there are none."""
+def undecided_view(results: Sequence[SubmissionResult], about_several: Sequence[str] = ()) -> RenderableType | None:
+    """Return what an instructor has to decide or look at, with the reasons; None if there is nothing.
+
+    Args:
+        results: the results of the class.
+        about_several: sentences about several students each, at whose work a person should look.
+    """
     lines = [Text(f"  {plain(line)}") for result in results for line in _undecided(result)]
     flagged = [Text(f"  {plain(result.student)}: {plain(flag)}") for result in results for flag in result.flags]
     found = []
@@ -285,6 +290,9 @@ def undecided_view(results: Sequence[SubmissionResult]) -> RenderableType | None
         found += [Text(head, "bold magenta"), *lines]
     if flagged:
         found += [Text("These checks keep their points, but a person should look at them:", "bold magenta"), *flagged]
+    if about_several:
+        head = "These students keep their points, but a person should talk to them:"
+        found += [Text(head, "bold magenta"), *(Text(f"  {plain(sentence)}") for sentence in about_several)]
     return Group(*found) if found else None
 
 

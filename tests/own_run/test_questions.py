@@ -77,6 +77,38 @@ def test_a_late_callback_waited_for_the_one_that_ended_when_it_began() -> None:
     assert not list(questions.waited_for(Record(runs=(*BEATS, in_another_group, other))))
 
 
+def at_once(*counts: int) -> Record:
+    """A record in which these numbers of callbacks are under way, one number after the other, on five threads."""
+    runs = [
+        Run(f"r{thread}", 0.4 * turn, 0.4 * turn + 0.3, 1 + (thread + turn) % 5, "reentrant group", "/robot")
+        for turn, count in enumerate(counts)
+        for thread in range(count)
+    ]
+    return Record(runs=tuple(runs))
+
+
+def test_how_many_ran_at_once_is_asked_only_if_no_number_is_the_usual_one() -> None:
+    assert not list(questions.under_way(at_once(4, 4, 1, 4, 4)))
+    record = at_once(3, 4, 4, 4, 5, 4)
+    numbers = [key(record, question) for question in questions.under_way(record)]
+    assert set(numbers) == {"3", "4", "5"} and len({numbers.count(number) for number in numbers}) == 1
+
+
+def test_which_callback_a_thread_ran_is_not_asked_about_the_first_runs() -> None:
+    record = at_once(4, 4, 2)
+    asked = list(questions.on_thread(record))
+    assert {question.about["thread"] for question in asked} == {2, 3, 4, 5}
+    assert all(0.4 < float(question.about["time"]) < 0.7 for question in asked)
+    for question in asked:
+        assert key(record, question) == replay.answer(record, question) in question.choices
+
+
+def test_what_a_callback_waited_for_is_not_asked_if_its_group_has_only_one_other() -> None:
+    slow = Run("slow", 0.12, 0.599, 1, GROUP, "/robot")
+    elsewhere = Run("plan", 0.75, 0.8, 1, "exclusive group", "/robot")
+    assert not list(questions.waited_for(Record(runs=(*BEATS, slow, elsewhere))))
+
+
 def test_nothing_is_asked_about_what_the_picture_cannot_show() -> None:
     during = Run("slow", 0.105, 0.55, 1, "exclusive group", "/robot")
     assert "began_during" not in {
@@ -92,6 +124,14 @@ def test_nothing_is_asked_about_what_the_picture_cannot_show() -> None:
     )
     assert not list(topic_questions.sent_while_active(record)), "a message within 15 ms of the end of the active state"
     assert kinds(Record()) == set()
+
+
+@pytest.mark.parametrize("first", (0.0, 0.01, 0.02, 0.03, 0.0466))
+def test_messages_that_come_as_fast_as_the_windows_begin_can_be_asked_about(first: float) -> None:
+    times = [round(first + 0.05 * number, 4) for number in range(50)]
+    record = Record(traffic={"/data": (Traffic("/robot publishes", times),)})
+    asked = list(topic_questions.sent_at_its_rate(record))
+    assert asked and all(key(record, question) == replay.answer(record, question) for question in asked)
 
 
 def test_a_record_with_times_that_no_launch_has_is_refused() -> None:

@@ -272,6 +272,7 @@ def test_what_contradicts_itself_is_shown_to_instructors_only() -> None:
     assert "One thread only." in text_of(submission_view(flagged, "instructor"))
     assert "One thread only." not in text_of(submission_view(flagged, "student"))
     assert "ann: One thread only." in text_of(undecided_view([flagged]))
+    assert "ann and bob share a run." in text_of(undecided_view([], ["ann and bob share a run."]))
 
 
 def test_what_to_repair_first_names_a_reason_once_with_every_task_that_it_costs() -> None:

@@ -125,6 +125,10 @@ def answer(record: Record, question: Question) -> str:
     if question.kind == "under_way":
         before = [m for m in moments if m.time <= about["time"]]
         return str(len([run for run in before[-1].running if run.node == node]))
+    if question.kind == "on_thread":
+        before = [m for m in moments if m.time <= about["time"]]
+        (run,) = [run for run in before[-1].running if run.node == node and run.thread == about["thread"]]
+        return run.callback
     if question.kind == "waited_for":
         ended = [m for m in of_node if m.what == "end" and m.run.end - m.run.begin > 0.02]
         return min(ended, key=lambda m: abs(m.time - about["time"])).run.callback
