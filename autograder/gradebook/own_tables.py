@@ -71,7 +71,7 @@ def make_indexes(connection: Connection) -> None:
     """Create the indexes that a gradebook does not have yet, so that a student costs the same in a large class.
 
     Without them, each question about one student reads the rows of the whole class: in a class of 10,000, recording a
-    student takes seven times as long as in a class of 10.
+    student takes more than three times as long as in a class of 10.
     """
     make_tables(connection)
     for table, columns in _INDEXES.items():
