@@ -33,7 +33,7 @@ _BINS = 10
 _FEWEST = 5
 """The number of students that is needed to compute a discrimination."""
 _MOST_ROWS = 500
-"""The number of students that the page shows at first. A browser needs many seconds to lay out thousands of rows."""
+"""The number of students that the page shows at first. A browser needs seconds to lay out thousands of rows."""
 SCRIPT = Path(__file__).with_name("templates") / "class.js"
 """The program in the page, which sorts and searches its tables."""
 

@@ -22,7 +22,7 @@ for (const button of document.querySelectorAll("th button")) {
 const search = document.getElementById("search");
 const students = document.getElementById("students");
 const all = document.getElementById("all");
-let most = Number(students.dataset.most);  // a browser needs many seconds to lay out thousands of rows
+let most = Number(students.dataset.most);  // a browser needs seconds to lay out thousands of rows
 function show() {
   const wanted = search.value.toLocaleLowerCase();
   let found = 0;
