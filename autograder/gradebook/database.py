@@ -12,6 +12,8 @@ from autograder.core.errors import KitError
 from autograder.course.paths import CoursePaths
 from autograder.gradebook.backup import BACKUPS, back_up
 from autograder.gradebook.own_courses import prepare_nbgrader
+from autograder.gradebook.own_tables import make_indexes
+from autograder.gradebook.queries import engine_of
 from autograder.gradebook.settings import gradebook_address, gradebook_file, gradebook_place
 
 
@@ -41,6 +43,7 @@ def make_usable(root: Path) -> None:
         _create(root)
         bring_up_to_date(root)
         name_course(root)
+        _add_indexes(root)
 
 
 @contextlib.contextmanager
@@ -110,6 +113,18 @@ def name_course(root: Path) -> None:
         if gradebook.db.get(Course, "") is None:
             gradebook.db.add(Course(id=""))
             gradebook.db.commit()
+
+
+def _add_indexes(root: Path) -> None:
+    from sqlalchemy import inspect
+
+    engine = engine_of(gradebook_address(root))
+    try:
+        with engine.begin() as connection:
+            if inspect(connection).has_table("grade"):
+                make_indexes(connection)
+    finally:
+        engine.dispose()
 
 
 def bring_up_to_date(root: Path) -> None:

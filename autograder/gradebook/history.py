@@ -37,7 +37,7 @@ def note_graded(connection: Connection, lab: Lab, student: str, notebook: Path) 
     state = state_after(own_tables.history(connection, lab.name, student).get(student, []))
     points, penalty = points_in(connection, lab.name, student)
     changed = {name: found for name, found in points.items() if found != state.points.get(name)}
-    recorded = own_tables.recorded(connection, lab.name).get(student, "")
+    recorded = own_tables.recorded(connection, lab.name, student).get(student, "")
     is_new = state.graded is None or state.graded.recorded != recorded
     if changed or penalty != state.penalty or is_new:
         entry = Entry(

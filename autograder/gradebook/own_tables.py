@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sqlalchemy import Column, Integer, MetaData, String, Table, Text, delete, insert, inspect, select, update
+from sqlalchemy import Column, Integer, MetaData, String, Table, Text, delete, insert, inspect, select, text, update
 from sqlalchemy.engine import Connection
 
 from autograder.core.history import Entry
@@ -52,11 +52,30 @@ _HISTORY = Table(
     Column("student", String(128), nullable=False),
     Column("entry", Text, nullable=False),
 )
+_INDEXES = {
+    "grade": "notebook_id",
+    "comment": "notebook_id",
+    "submitted_notebook": "assignment_id",
+    "submitted_assignment": "student_id",
+    _HISTORY.name: "lab, student",
+}
+"""The columns by which one student's rows are looked for, by table. nbgrader has no indexes for its own tables."""
 
 
 def make_tables(engine: Any) -> None:
     """Create the tables that a gradebook does not have yet."""
     _TABLES.create_all(engine)
+
+
+def make_indexes(connection: Connection) -> None:
+    """Create the indexes that a gradebook does not have yet, so that a student costs the same in a large class.
+
+    Without them, each question about one student reads the rows of the whole class: in a class of 10,000, recording a
+    student takes more than three times as long as in a class of 10.
+    """
+    make_tables(connection)
+    for table, columns in _INDEXES.items():
+        connection.execute(text(f"CREATE INDEX IF NOT EXISTS autograder_of_{table} ON {table} ({columns})"))
 
 
 def digest_of(*parts: object) -> str:
@@ -85,11 +104,14 @@ def _content(path: Path) -> bytes:
         return b""
 
 
-def recorded(connection: Connection, lab: str) -> dict[str, str]:
-    """Return the digests of what was recorded for a lab, by student."""
+def recorded(connection: Connection, lab: str, student: str | None = None) -> dict[str, str]:
+    """Return the digests of what was recorded for a lab, or for one of its submissions, by student."""
     if not inspect(connection).has_table(_RECORDED.name):
         return {}
-    rows = connection.execute(select(_RECORDED.c.student, _RECORDED.c.digest).where(_RECORDED.c.lab == lab))
+    of_student = [] if student is None else [_RECORDED.c.student == student]
+    rows = connection.execute(
+        select(_RECORDED.c.student, _RECORDED.c.digest).where(_RECORDED.c.lab == lab, *of_student)
+    )
     return {row.student: row.digest for row in rows}
 
 

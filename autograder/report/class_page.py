@@ -32,6 +32,8 @@ _BINS = 10
 """The number of bars in the distribution. All of them have the same width in points."""
 _FEWEST = 5
 """The number of students that is needed to compute a discrimination."""
+_MOST_ROWS = 500
+"""The number of students that the page shows at first. A browser needs seconds to lay out thousands of rows."""
 SCRIPT = Path(__file__).with_name("templates") / "class.js"
 """The program in the page, which sorts and searches its tables."""
 
@@ -76,6 +78,7 @@ def write_class_page(
         lab=entries[0].lab,
         written=f"{written.day} {written:%B %Y}",
         count=len(entries),
+        most_rows=_MOST_ROWS,
         top=points(most),
         mean=points(statistics.fmean(scores)),
         median=points(statistics.median(scores)),

@@ -340,6 +340,31 @@ def test_no_table_of_the_class_page_scrolls_sideways_at_1200_pixels(browser: Any
     window.close()
 
 
+def test_the_class_page_lays_out_only_some_of_thousands_until_they_are_searched_for(
+    browser: Any, tmp_path: Path
+) -> None:
+    def entry(student: str) -> Entry:
+        return Entry(student, "toy", SubmissionResult(student=student, lab="toy", digest="d", isolation=Isolation.FULL))
+
+    entries = [entry(f"s{number:04d}") for number in range(1200)]
+    page = write_class_page(tmp_path / "toy.html", entries, datetime.date(2026, 11, 22))
+    window = browser.new_page(viewport={"width": 390, "height": 800})  # where each row is a card
+    window.set_default_timeout(1000 * BROWSER_SECONDS)
+    window.goto(page.as_uri())
+    laid_out = "[...document.querySelectorAll('#students tbody tr')].filter(row => row.offsetHeight).length"
+    assert (window.inner_text("#shown"), window.evaluate(laid_out)) == ("500 of 1200 shown", 500)
+    window.click("#students th:nth-child(1) button")
+    window.click("#students th:nth-child(1) button")
+    assert window.locator("#students tbody tr").first.inner_text().startswith("s1199")
+    assert window.evaluate(laid_out) == 500
+    window.fill("#search", "s000")
+    assert (window.inner_text("#shown"), window.evaluate(laid_out)) == ("10 shown", 10)
+    window.fill("#search", "")
+    window.click("#all")
+    assert (window.inner_text("#shown"), window.evaluate(laid_out)) == ("1200 shown", 1200)
+    window.close()
+
+
 def test_all_pages_can_be_read_by_everybody_on_a_phone_and_on_paper(graded: Graded, browser: Any) -> None:
     axe = pytest.importorskip("axe_playwright_python.sync_playwright")
     page = graded.root / "build" / "report" / "toy.html"

@@ -16,15 +16,27 @@ for (const button of document.querySelectorAll("th button")) {
     body.append(...rows);
     for (const other of heading.parentElement.cells) other.removeAttribute("aria-sort");
     heading.setAttribute("aria-sort", up ? "ascending" : "descending");
+    if (body.parentElement === students && !all.hidden) show();
   });
 }
 const search = document.getElementById("search");
-search.addEventListener("input", () => {
+const students = document.getElementById("students");
+const all = document.getElementById("all");
+let most = Number(students.dataset.most);  // a browser needs seconds to lay out thousands of rows
+function show() {
   const wanted = search.value.toLocaleLowerCase();
-  let shown = 0;
-  for (const row of document.getElementById("students").tBodies[0].rows) {
-    row.hidden = !row.textContent.toLocaleLowerCase().includes(wanted);
-    shown += row.hidden ? 0 : 1;
+  let found = 0;
+  for (const row of students.tBodies[0].rows) {
+    const fits = row.textContent.toLocaleLowerCase().includes(wanted);
+    found += fits ? 1 : 0;
+    row.hidden = !fits || found > most;
   }
-  document.getElementById("shown").textContent = `${shown} shown`;
+  all.hidden = found <= most;
+  document.getElementById("shown").textContent = all.hidden ? `${found} shown` : `${most} of ${found} shown`;
+}
+search.addEventListener("input", show);
+all.addEventListener("click", () => {
+  most = Infinity;
+  show();
 });
+window.addEventListener("beforeprint", () => all.click());
