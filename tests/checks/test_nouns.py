@@ -71,7 +71,7 @@ def execute(goal):
     for number in range(goal.request.order):
         told.sequence = [*told.sequence, number]
         goal.publish_feedback(told)
-        time.sleep(0.1)
+        time.sleep(0.3 if goal.request.order == 60 and number < 4 else 0.1)  # held up at first
         if goal.is_cancel_requested:
             goal.canceled()
             return Fibonacci.Result(sequence=told.sequence)
@@ -203,6 +203,10 @@ LINES = {
         ("goal = ros.action('/count', Fibonacci).send_goal(Fibonacci.Goal(order=5), accepted=True)", ""),
         ("goal.expect_feedback(at_least=5, rate=10); goal.expect_result()", ""),
         ("goal.expect_feedback(exactly=9, within=1)", "goal-feedback"),
+        ("held_up = ros.action('/count', Fibonacci).send_goal(Fibonacci.Goal(order=60))", ""),
+        ("held_up.expect_feedback(at_least=5, rate=10)", ""),
+        ("held_up.expect_feedback(at_least=5, rate=40)", "rate"),
+        ("held_up.expect_canceled()", ""),
         ("goal.expect_messages_during(ros.topic('/ticks', Int64), at_least=2)", ""),
         ("goal.expect_messages_during(ros.topic('/said', String), within=1)", "paused"),
         ("goal.expect_result(status='aborted')", "goal-status"),
