@@ -69,7 +69,7 @@ wheel: setup-dev ## build the kit as a wheel, for courses elsewhere, into build/
 test: setup-dev ## run every test, including ruff and mypy
 	@$(RUN) python -m pytest -n 4 --dist loadfile --no-loadscope-reorder $(ARGS)
 
-test-all: setup-dev ## run every test, every check on every sample student, and every lab in a browser
+test-all: setup-dev ## run every test, every check on every sample student, every lab in a browser, and a real JupyterHub
 	@$(RUN) python -m pytest -n 4 --dist loadfile --no-loadscope-reorder --complete $(ARGS)
 
 lint: setup-dev ## check the code with ruff, its formatter, mypy --strict and import-linter

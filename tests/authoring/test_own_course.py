@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import re
 import shutil
 import subprocess
@@ -11,7 +10,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from linked import link_tree
+from own_environment import Environment
 from places import ROOT
 from typer.testing import CliRunner
 
@@ -24,48 +23,6 @@ from autograder.gradebook.own_courses import TEMPLATE, trust
 from autograder.gradebook.settings import gradebook_address, settings_of
 
 LAB = "lab2_talkers"
-
-
-class Environment:
-    """A virtual environment with the wheel in it and nothing of the checkout."""
-
-    def __init__(self, folder: Path) -> None:
-        source = folder / "source"
-        source.mkdir(parents=True)
-        for name in ("pyproject.toml", "README.md", "LICENSE"):
-            shutil.copy(ROOT / name, source)
-        shutil.copytree(ROOT / "autograder", source / "autograder", ignore=shutil.ignore_patterns("__pycache__"))
-        self.folder = folder / "venv"
-        here = ("--quiet", "--python", sys.executable)
-        self.uv("build", "--wheel", "--no-build-isolation", *here, "--out-dir", folder, source)
-        self.uv("venv", *here, self.folder)
-        # The dependencies come from this environment, as hard links: no network, and no second copy on the disk. The
-        # sandbox shows an environment's own folder, so a .pth file that leads here would not do.
-        for name in ("lib", "share"):  # ROS has its libraries beside Python's packages
-            link_tree(Path(sys.prefix, name), self.folder / name)
-        next(self.folder.glob("lib/python*/site-packages/autograder.pth")).unlink()
-        for program in ("alembic", "jupyter", "jupyter-nbconvert"):
-            text = Path(sys.prefix, "bin", program).read_text(encoding="utf-8")
-            script = self.folder / "bin" / program
-            script.write_text(text.replace(sys.prefix, str(self.folder)), encoding="utf-8")
-            script.chmod(0o755)
-        wheel = next(folder.glob("*.whl"))
-        self.uv("pip", "install", "--quiet", "--no-deps", "--python", self.folder / "bin" / "python", wheel)
-
-    def uv(self, *words: str | Path) -> None:
-        done = subprocess.run(["uv", *words], env=os.environ | {"UV_OFFLINE": "1"}, capture_output=True, text=True)
-        assert done.returncode == 0, done.stderr
-
-    def run(self, cwd: Path, *words: str | Path, status: int = 0) -> str:
-        """Run a command of this environment, and return all that it printed."""
-        program, *rest = words
-        environ = {name: os.environ[name] for name in ("HOME", "LANG") if name in os.environ}
-        done = subprocess.run(
-            [self.folder / "bin" / program, *rest],
-            cwd=cwd, env=environ | {"PATH": "/usr/bin:/bin"}, capture_output=True, text=True, check=False,
-        )  # fmt: skip
-        assert done.returncode == status, done.stdout + done.stderr
-        return done.stdout + done.stderr
 
 
 @pytest.fixture(scope="module")
