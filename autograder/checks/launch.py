@@ -185,8 +185,9 @@ class Launch(Ros):
         assert self._group is not None  # begun on entering
         prefixes = [f"{INSTALLED}/{package}" for package in self._packages]
         program = self._group.start(
-            launched.program, words, environment, cores=launched.cores, file=file, prefixes=prefixes
-        )
+            launched.program, words, environment, cores=launched.cores, file=file, prefixes=prefixes,
+            assume_success=launched.assume_success,
+        )  # fmt: skip
         self._running.programs.append((launched, program))
 
     def _miss(self, program: str) -> None:

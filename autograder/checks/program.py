@@ -37,6 +37,9 @@ class Program:
     """Words before `--ros-args`."""
     cores: int = 2
     """CPUs that the program may use: the same number on every machine that has them."""
+    assume_success: bool = False
+    """Whether a lifecycle callback that forgets to return a TransitionCallbackReturn succeeds all the same. This is for
+    checks of what a node does in its states, because another check holds that the callbacks return something."""
     environment: Mapping[str, str] = field(default_factory=dict)
     """Variables beside those that every program has. `ROS_DOMAIN_ID` puts it into another domain than the launch's."""
     warnings: Sequence[str] = ()

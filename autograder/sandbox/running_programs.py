@@ -268,7 +268,7 @@ class RunningPrograms:
 
     def start(
         self, program: str, args: Sequence[str] = (), env: Mapping[str, str] | None = None, cores: int = 2,
-        *, file: str = "", prefixes: Sequence[str] = (),
+        *, file: str = "", prefixes: Sequence[str] = (), assume_success: bool = False,
     ) -> RunningProgram:  # fmt: skip
         """Start a program of the folder as a new process.
 
@@ -279,6 +279,7 @@ class RunningPrograms:
             cores: the number of CPUs that the program sees.
             file: the path of the program in the folder; by default `program`.py.
             prefixes: the paths in the folder of installed ROS packages, whose modules the program can import.
+            assume_success: whether a lifecycle callback that returns no TransitionCallbackReturn succeeds.
 
         Raises:
             FileNotFoundError: the folder has no such program.
@@ -289,7 +290,8 @@ class RunningPrograms:
             raise FileNotFoundError(file)
         started = RunningProgram(program, self._limits, self.changed, self._pipes.catch_up)
         try:
-            known = self._request(started, file, list(args), {**(env or {}), **self._packages(prefixes)}, cores)
+            variables = {**(env or {}), **self._packages(prefixes)}
+            known = self._request(started, file, list(args), variables, cores, assume_success)
         except OSError:
             known = False
         if not known:
@@ -332,7 +334,9 @@ class RunningPrograms:
         """Return the variable by which ROS and the launcher find installed packages."""
         return {"AMENT_PREFIX_PATH": ":".join(f"{self._inside}/{one}" for one in prefixes)} if prefixes else {}
 
-    def _request(self, program: RunningProgram, file: str, args: list[str], env: dict[str, str], cores: int) -> bool:
+    def _request(
+        self, program: RunningProgram, file: str, args: list[str], env: dict[str, str], cores: int, assume_success: bool
+    ) -> bool:
         usable = sorted(os.sched_getaffinity(0))
         with self.changed:
             self._started += 1
@@ -347,6 +351,7 @@ class RunningPrograms:
             # The choice is random, because with the same two CPUs for all programs, the other CPUs would be idle.
             "cpus": sorted(random.sample(usable, min(cores, len(usable)))),
             "cores": cores,
+            "assume_success": assume_success,
         }
         theirs = self._pipes.open(program)
         try:

@@ -1395,3 +1395,17 @@ def test_a_node_that_goes_on_after_the_expected_transitions_fails(grade: Grade) 
     failed = failure(result)
     assert (failed.code, failed.expected) == ("transitions", "unconfigured to configuring, configuring to inactive")
     assert failed.observed.endswith("configuring to inactive, inactive to activating, activating to active")
+
+
+def test_a_forgotten_return_of_a_lifecycle_callback_counts_as_success_only_where_a_check_says_so(grade: Grade) -> None:
+    forgets = "class Camera(LifecycleNode):\n    def on_configure(self, state):\n        pass\n\n\nrclpy.init()"
+    program = CAMERA.replace("rclpy.init()", forgets).replace('LifecycleNode("camera")', 'Camera("camera")')
+    cell = """\
+        with launch(Program("camera"{assume})) as ros:
+            for label in ("configure", "activate"):
+                ros.lifecycle("/camera").transition(label)
+            ros.lifecycle("/camera").expect_state("active")
+        ros.score(2)
+        """
+    assert grade(cell.format(assume=", assume_success=True"), camera__py=program).points == 2
+    assert failure(grade(cell.format(assume=""), camera__py=program)).code == "lifecycle-return"

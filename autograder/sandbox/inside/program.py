@@ -115,7 +115,7 @@ def run(start: Start) -> None:
     main.__builtins__ = builtins  # type: ignore[attr-defined]
     sys.modules["__main__"] = main
     with contextlib.suppress(Exception):
-        attach.begin(_EVENTS, start.folder)
+        attach.begin(_EVENTS, start.folder, start.assume_success)
     for prefix in filter(None, os.environ.get("AMENT_PREFIX_PATH", "").split(":")):
         _use_package(prefix)
     with open(start.path, "rb") as file:

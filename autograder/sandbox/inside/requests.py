@@ -3,7 +3,7 @@
 To the launcher, with one end of another SOCK_SEQPACKET pair, on which the first process of the new launch answers:
     {"namespaces", "disk", "inodes", "limits", "filter", "program_filter"}
 To a first process, with the descriptors for output, events and stacks:
-    {"id", "path", "folder", "args", "env", "cpus", "cores"}
+    {"id", "path", "folder", "args", "env", "cpus", "cores", "assume_success"}
 From a first process: {"first": true} with its pidfd, {"ready": true} or {"broken": why}, {"started": id} with a pidfd,
     {"failed": id, "why"}, {"ended": id, "status"}.
 """
@@ -51,6 +51,7 @@ class Start:
         self.env: dict[str, str] = request["env"]
         self.cpus: list[int] = request["cpus"]
         self.cores: int = request["cores"]
+        self.assume_success: bool = request["assume_success"]
         self.limits = launch.limits
         self.filter = launch.program_filter
         # Whether the program's memory and settings in /proc are hidden from the other programs of the launch. Without

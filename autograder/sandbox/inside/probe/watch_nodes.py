@@ -223,6 +223,26 @@ def _wrap_callbacks(node_class: Any, moment: str) -> None:
     setattr(node_class, remove_name, remove_noted)
 
 
+class _ForgottenReturns:
+    """What becomes of a lifecycle callback that returns no TransitionCallbackReturn."""
+
+    succeed = False
+
+
+forgotten_returns = _ForgottenReturns()
+
+
+def _succeeds(callback: Callable[..., Any], returns: Any) -> Callable[..., Any]:
+    """Return a callback that succeeds where this one returns something else than a transition callback has to."""
+
+    @functools.wraps(callback)
+    def call(*args: Any, **kwargs: Any) -> Any:
+        result = callback(*args, **kwargs)
+        return result if isinstance(result, returns) else returns.SUCCESS
+
+    return call
+
+
 def watch_lifecycle(rclpy: Any) -> None:
     """Wrap the registration of transition callbacks, and the functions of lifecycle publishers."""
     mixin = rclpy.lifecycle.LifecycleNodeMixin
@@ -231,7 +251,11 @@ def watch_lifecycle(rclpy: Any) -> None:
     @functools.wraps(register)
     def register_noted(self: Any, state_id: int, callback: Any) -> Any:
         with quiet():
-            callback = noted("lifecycle", callback, node_name(self), rclpy.lifecycle.TransitionCallbackReturn)
+            returns = rclpy.lifecycle.TransitionCallbackReturn
+            must_return = None if forgotten_returns.succeed else returns
+            callback = noted("lifecycle", callback, node_name(self), must_return)
+            if forgotten_returns.succeed:
+                callback = _succeeds(callback, returns)
         return register(self, state_id, callback)
 
     setattr(mixin, rclpy_names.REGISTER_TRANSITION, register_noted)
