@@ -1212,7 +1212,7 @@ def work(message):
     out.publish(message)
 
 
-node.create_subscription(String, "work", work, 1)
+node.create_subscription(String, "job", work, 1)
 rclpy.spin(node)
 """
 
@@ -1221,7 +1221,7 @@ def test_a_program_that_the_check_ends_in_its_callback_is_not_blamed_for_it(grad
     result = grade(
         """\
         with launch("works_on", "talker", listen=[("/done", String)]) as ros:
-            ros.publisher("/work", String).publish(String(data="a lot"))
+            ros.publisher("/job", String).publish(String(data="a lot"))
             ros.topic("/done", String).expect_messages()
             ros.program("works_on").stop()
             ros.require("context is invalid" in ros.program("works_on").output(), "It failed when it was ended")
