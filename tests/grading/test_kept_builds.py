@@ -8,10 +8,11 @@ from pathlib import Path
 import pytest
 from ros_packages import package
 
-from autograder.core.results import Isolation
+from autograder.core.results import Isolation, Status
 from autograder.course.lab import Cell
 from autograder.grading import builds
 from autograder.grading.job import Job
+from autograder.grading.own_runs import run_recorded
 from autograder.sandbox.build import BuildRun
 from autograder.sandbox.isolation import preflight
 
@@ -98,3 +99,12 @@ execute_process(COMMAND sh -c "mkdir -p {store}; for f in {" ".join(kept)} new.j
     now = {path.name: path.read_text() for path in store.iterdir()}
     assert now.keys() >= kept.keys() and {name: now[name] for name in kept} == kept
     assert len(now) == len(kept) + 1 and "new.json" not in now
+
+
+def test_a_run_that_is_recorded_for_questions_has_its_builds(store: Path) -> None:
+    files = package("things", {"package.xml": PACKAGE_XML, "CMakeLists.txt": CMAKE})
+    source = 'from autograder.checks import build\nwith build("things") as package:\n    package.expect_built()'
+    cells = [Cell(grade_id="check", points=1, source=source)]
+    job = Job(student="ann", lab="lab", digest="0", isolation=Isolation.FULL, seed=1, files=files, cells=cells)
+    (check,), _ = run_recorded(job, ["check"])
+    assert check.status is Status.PASSED, check
