@@ -1,0 +1,6 @@
+"""Remove the notebook."""
+
+from _neighbour import wait, work
+
+(work / "lab.ipynb").unlink()
+wait()
