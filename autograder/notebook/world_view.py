@@ -87,7 +87,7 @@ class WorldView:
         self._sent = [0] * len(self._names)
         """The step up to which each car's trail has been sent."""
         self._marked = -math.inf
-        """The world's time up to which the marks of brakes and touches have been sent."""
+        """When the first step began whose marks of brakes and touches have not been sent, in the world's time."""
         self._whole = True
         self._news: list[str] = []
         self._told = _Told(running, self._world)
@@ -322,8 +322,8 @@ class WorldView:
 
 
 def _after(time: float, marks: deque[_Mark]) -> list[_Mark]:
-    """Return the last marks that were made after a time of the world."""
-    return list(islice(takewhile(lambda one: one.time > time, reversed(marks)), _MARKS))[::-1]
+    """Return the last marks of the step that begins at a time of the world, and of those after it."""
+    return list(islice(takewhile(lambda one: one.time >= time, reversed(marks)), _MARKS))[::-1]
 
 
 def name_of(described: Program) -> str:
