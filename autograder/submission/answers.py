@@ -153,22 +153,7 @@ def _take_cell(
         _compare(grade_id, copies, lab, submission)
         return
     if not copies:
-        because = f"The answer cell `{grade_id}` was deleted, so there is no answer to grade."
-        hint = f"Copy the cell from a fresh labs/{lab.name}/{lab.name}.ipynb."
-        if marked:
-            because = f"The answer cell `{grade_id}` is no longer a code cell, so there is no answer to grade."
-            hint = "Select the cell and make it a code cell again (key Y)."
-        elif grade_id in submission.merged:
-            into = submission.merged[grade_id]
-            because = (
-                f"The answer cell `{grade_id}` was merged into the cell `{into}`. A cell writes one file, which its"
-                " first line names."
-            )
-            hint = (
-                f"Copy both cells from a fresh labs/{lab.name}/{lab.name}.ipynb, and move each text, which begins with"
-                " such a line, into the cell of its own."
-            )
-        submission.problems.append(problem(f"the answer cell `{grade_id}` is there", MISSING_CELL(because, hint)))
+        submission.problems.append(_missing(grade_id, bool(marked), lab, submission))
         return
     try:
         # A text answer may have been split or started again. The person who reads it decides.
@@ -191,6 +176,26 @@ def _take_cell(
         )
         return
     submission.sources[grade_id] = source
+
+
+def _missing(grade_id: str, is_other_cell: bool, lab: Lab, submission: Submission) -> Outcome:
+    """Return a problem: no cell counts as this answer."""
+    because = f"The answer cell `{grade_id}` was deleted, so there is no answer to grade."
+    hint = f"Copy the cell from a fresh labs/{lab.name}/{lab.name}.ipynb."
+    if is_other_cell:
+        because = f"The answer cell `{grade_id}` is no longer a code cell, so there is no answer to grade."
+        hint = "Select the cell and make it a code cell again (key Y)."
+    elif grade_id in submission.merged:
+        into = submission.merged[grade_id]
+        because = (
+            f"The answer cell `{grade_id}` was merged into the cell `{into}`. A cell writes one file, which its"
+            " first line names."
+        )
+        hint = (
+            f"Copy both cells from a fresh labs/{lab.name}/{lab.name}.ipynb, and move each text, which begins with"
+            " such a line, into the cell of its own."
+        )
+    return problem(f"the answer cell `{grade_id}` is there", MISSING_CELL(because, hint))
 
 
 def _merged(found: dict[str, list[dict[str, Any]]], lab: Lab) -> dict[str, str]:
