@@ -1,15 +1,11 @@
-"""What the programs beside a notebook share. They are started with the notebook's folder and its user's home."""
+"""What the programs beside a notebook share. They are started with the notebook's folder."""
 
-import os
 import pathlib
 import re
-import socket
 import sys
-import tempfile
 import time
 
-work, home = map(pathlib.Path, sys.argv[1:])
-logs = pathlib.Path(tempfile.gettempdir()) / f"autograder-log-{os.getuid()}"
+work = pathlib.Path(sys.argv[1])
 
 
 def ready():
@@ -25,38 +21,9 @@ def wait():
 
 def domains():
     """The domains that launches on this machine have claimed."""
-    return sorted({int(number) for number in re.findall("@ros-domain-([0-9]+)", read("/proc/net/unix"))})
-
-
-def groups():
-    """The multicast groups in which somebody on this machine listens."""
-    found = re.findall("([0-9A-F]{8}):[0-9A-F]{4} 00000000", read("/proc/net/udp"))
-    return {name for one in found if (name := socket.inet_ntoa(bytes.fromhex(one)[::-1])).startswith("239.")}
-
-
-def read(path):
-    """Read a file of the system."""
-    return pathlib.Path(path).read_text()
-
-
-def shadow(*names):
-    """Lay modules beside the notebook that end whoever imports them."""
-    for name in names:
-        path = work / name
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text("raise SystemExit('a neighbour was here')\n")
-
-
-def garbage(addresses):
-    """Send what is no message to each port of the domains that are in use."""
-    ready()
-    out = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-    while True:
-        for domain in domains():
-            for port in (0, 1, 10, 11, 12, 13, 128, 129):
-                for address in addresses():
-                    out.sendto(b"RTPS" + os.urandom(200), (address, 7400 + 250 * domain + port))
-        time.sleep(0.002)
+    return sorted(
+        {int(number) for number in re.findall("@ros-domain-([0-9]+)", pathlib.Path("/proc/net/unix").read_text())}
+    )
 
 
 def join(name):

@@ -1,6 +1,0 @@
-"""Remove the notebook."""
-
-from _neighbour import wait, work
-
-(work / "lab.ipynb").unlink()
-wait()
