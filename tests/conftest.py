@@ -120,10 +120,19 @@ def _turn(item: pytest.Item) -> float:
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
-    """Give a worker a whole file at a time, and of the sample classes, which take longest of all, one lab."""
+    """Give a worker a whole file at a time, and of the sample classes, which take longest of all, one lab.
+
+    The public way, `--dist loadgroup`, adds the group to each test's name, which then cannot be given to pytest again.
+    """
     if config.getoption("dist") != "loadfile":
         return None
     scheduler = importlib.import_module("xdist.scheduler")
+
+    if not hasattr(scheduler.LoadFileScheduling, "_split_scope"):
+        raise pytest.UsageError(
+            "This pytest-xdist does not ask `_split_scope` to which group a test belongs. Install the version of"
+            " requirements-dev.lock, or give FilesAndLabs in tests/conftest.py the method that it asks now."
+        )
 
     class FilesAndLabs(scheduler.LoadFileScheduling):  # type: ignore[name-defined, misc]
         def _split_scope(self, nodeid: str) -> str:

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import itertools
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import yaml
@@ -150,6 +150,12 @@ def parse(text: str) -> Rule | None:
         if name.startswith(scheme):
             return Rule(text, prefix, name.removeprefix(scheme), right, kind)
     return Rule(text, prefix, name, right)
+
+
+def namespace_of(rules: Iterable[str]) -> str:
+    """Return the namespace in which a program is started, without a slash at the end; empty if no rule gives one."""
+    named = [rule.right for rule in map(parse, rules) if rule and rule.left == "__ns" and not rule.prefix]
+    return named[0].rstrip("/") if named else ""
 
 
 def _shape(text: str) -> str:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable
+from collections import Counter
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
@@ -51,6 +51,19 @@ class Banked(_Model):
     """The final points of each check, with what people decided, by grade_id."""
     explained: dict[str, Explained] = {}
     """Differences that somebody has explained, by grade_id."""
+
+
+@dataclass(frozen=True)
+class Compared:
+    """What today's checks make of the entries of a lab."""
+
+    entries: int
+    differences: list[Difference]
+    """Those that nobody has explained."""
+    never_decided: dict[str, int]
+    """Of checks that had no points in some entries when these were added: the number of those, by grade_id."""
+    untried: list[str]
+    """The checks that no entry has final points for, so that the bank says nothing about them."""
 
 
 @dataclass(frozen=True)
@@ -98,14 +111,13 @@ def add(root: Path, lab_name: str) -> tuple[int, int]:
     return new, len(students) - new
 
 
-def check(root: Path, lab_name: str, settings: Settings, done: Callable[[str], None]) -> list[Difference]:
-    """Run today's checks on every entry of a lab, and return the differences that nobody has explained.
+def check(root: Path, lab_name: str, settings: Settings) -> Compared:
+    """Run today's checks on every entry of a lab, and return what they make of it.
 
     Args:
         root: the course's folder.
         lab_name: the lab.
         settings: how the entries are run.
-        done: a function that is called with the name of each entry after it has run.
 
     Raises:
         KitError: an entry cannot be read.
@@ -116,10 +128,17 @@ def check(root: Path, lab_name: str, settings: Settings, done: Callable[[str], N
     with closing(Local(settings.at_once).run(jobs, lambda _: None)) as ran:
         for result in ran:
             found += _differences(result.student, entries[result.student], result)
-            done(result.student)
     stamp = {"state": _state(root, lab), "unexplained": len(found)}
     write_beside(CoursePaths(root).bank_checked(lab_name), json.dumps(stamp) + "\n")
-    return sorted(found, key=lambda one: (one.check, one.entry))
+    points = {cell.grade_id: [entry.points.get(cell.grade_id) for entry in entries.values()] for cell in lab.checks}
+    return Compared(
+        entries=len(entries),
+        differences=sorted(found, key=lambda one: (one.check, one.entry)),
+        never_decided=dict(
+            Counter(name for one in entries.values() for name, got in one.points.items() if got is None)
+        ),
+        untried=[name for name, before in points.items() if not any(one is not None for one in before)],
+    )
 
 
 def explain(root: Path, lab_name: str, difference: Difference, because: str) -> None:

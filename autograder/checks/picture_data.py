@@ -16,8 +16,8 @@ from autograder.pictures import Endpoint, Picture, Run, Runs, Traffic
 from autograder.reasons import Reason
 from autograder.sandbox.inside.probe.events import Ran, Thing
 
-OUTSIDE = "callback outside your code"
-"""The name of a callback about which nothing else is known."""
+_OUTSIDE = "not in your code"
+"""The name of a callback about which nothing else is known; short enough for the labels of a timeline."""
 _GET_STATE = "/get_state"
 """The end of the name of the service that only a lifecycle node has."""
 _UNKNOWN = "(node not known yet)"
@@ -101,13 +101,16 @@ def _runs_of(inside: Inside) -> list[Run]:
         on = numbers.setdefault(thread, len(numbers) + 1)
         over = (number, began, ended, thread) not in going_on
         group = _OF_KIND.get(thing.kind) or groups.get(thing.group_id, "")
-        found.append(Run(names[number], began, ended, on, group, thing.node or only, over, inside.name, thing.period))
+        known = bool(_name(thing))
+        found.append(
+            Run(names[number], began, ended, on, group, thing.node or only, over, inside.name, thing.period, known)
+        )
     return found
 
 
 def _names(inside: Inside) -> dict[int, str]:
     """A name for each callback: its function's, or what it belongs to; those of one name in one node are numbered."""
-    plain = {thing.id: (thing.node, _name(thing)) for thing in inside.things.values()}
+    plain = {thing.id: (thing.node, _name(thing) or _OUTSIDE) for thing in inside.things.values()}
     total, so_far = Counter(plain.values()), Counter[tuple[str, str]]()
     names = {}
     for number, name in plain.items():
@@ -122,6 +125,7 @@ the executor, whatever the server's group is. The probe sees no group of a callb
 
 
 def _name(thing: Thing) -> str:
+    """Return what a callback is called; empty if nothing is known about it."""
     function = re.match(r"(?:async )?def (\w+)", thing.code)
     if function:
         return function[1]
@@ -129,8 +133,7 @@ def _name(thing: Thing) -> str:
         return f"timer {thing.period:g} s"
     if thing.kind == "action_server":  # each of its runs is one feedback message
         return f"feedback of {thing.name}"
-    own = f"callback in {thing.line}" if thing.line else OUTSIDE
-    return f"{thing.kind} {thing.name}".strip() or own
+    return f"{thing.kind} {thing.name}".strip() or (f"callback in {thing.line}" if thing.line else "")
 
 
 def _groups(inside: Inside) -> dict[int, str]:

@@ -29,7 +29,7 @@ def record(running: RunningLaunch, insides: Sequence[Inside]) -> Record:
         running: the launch, whose programs still run.
         insides: its programs as their probes show them.
     """
-    known = [run for run in picture_data.runs(insides) if run.node and run.callback != picture_data.OUTSIDE]
+    known = [run for run in picture_data.runs(insides) if run.node and run.known]
     runs = _named_in_their_node(known)
     things = [thing for inside in insides for thing in inside.things.values()]
     topics = sorted({thing.name for thing in things if thing.kind in ("publisher", "subscription") and thing.node})

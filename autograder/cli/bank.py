@@ -26,7 +26,7 @@ def add_class(lab: LabArgument, course: CourseOption = None) -> None:
 
     root = course_root(course)
     new, known = add(root, lab)
-    print(f"Added {new} {'entry' if new == 1 else 'entries'} to {CoursePaths(root).bank(lab)}.")
+    print(f"Added {_entries(new)} to {CoursePaths(root).bank(lab)}.")
     if known:
         print(f"The answers of {count(known, 'student')} are there already, or cannot be read.")
 
@@ -53,12 +53,17 @@ def check_bank(
     settings = Settings(isolation=choose(isolation), jobs=jobs)
     bad = 0
     for name in names:
-        ran: list[str] = []
-        for one in check(root, name, settings, ran.append):
+        found = check(root, name, settings)
+        for one in found.differences:
             bad += 1
             points = f"{_number(one.before)} → {_number(one.now)}"
             print(plain(f"{name} {one.entry} {one.check}: {points}{f': {one.because}' if one.because else ''}"))
-        print(f"{name}: {len(ran)} entries", file=sys.stderr)
+        print(f"{name}: {_entries(found.entries)}", file=sys.stderr)
+        for check_id, times in found.never_decided.items():
+            why = "because it had no points when they were added"
+            print(plain(f"{name} {check_id}: not compared in {_entries(times)}, {why}."))
+        for check_id in found.untried:
+            print(plain(f"{name} {check_id}: no entry has points of it, so the bank says nothing about this check."))
     if bad:
         how = "autograder bank explain LAB ENTRY CHECK REASON --points NOW"
         print(f"{bad} unexplained. Correct the check, or say why it is right: {how}", file=sys.stderr)
@@ -84,6 +89,10 @@ def explain_difference(
     if not (CoursePaths(root).bank(lab) / f"{entry}.json").is_file():
         raise KitError(f"The bank of {lab} has no entry {entry!r}.", "`autograder bank check` lists the entries.")
     explain(root, lab, Difference(entry, check, None, now, ""), reason)
+
+
+def _entries(number: int) -> str:
+    return f"{number} {'entry' if number == 1 else 'entries'}"
 
 
 def _number(points: float | None) -> str:

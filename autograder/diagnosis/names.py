@@ -61,15 +61,11 @@ def _no_node_at_all(scene: Scene) -> Reason:
     )
 
 
-def _namespace(rules: Sequence[str]) -> str:
-    """Return the namespace in which a program was started, without a slash at the end."""
-    named = [rule.right for rule in map(remap_rules.parse, rules) if rule and rule.left == "__ns" and not rule.prefix]
-    return named[0].rstrip("/") if named else ""
-
-
 def _around(scene: Scene, name: str) -> list[Inside]:
     """Return the programs that were started in the innermost namespace of a name; all programs if there are none."""
-    started = [(_namespace(rules), inside) for inside, rules in zip(scene.insides, scene.rules, strict=False)]
+    started = [
+        (remap_rules.namespace_of(rules), inside) for inside, rules in zip(scene.insides, scene.rules, strict=False)
+    ]
     depth = max((len(space) for space, _ in started if name.startswith(f"{space}/")), default=-1)
     return [inside for space, inside in started if len(space) == depth and name.startswith(f"{space}/")] or (
         scene.insides

@@ -9,6 +9,7 @@ from pydantic import ValidationError
 
 from autograder.core.results import CheckResult
 from autograder.course.lab import Lab
+from autograder.grading.builds import with_interfaces
 from autograder.grading.job import Job
 from autograder.grading.runner import Settings, job_of
 from autograder.grading.supervisor import limit
@@ -35,7 +36,7 @@ def recorded(
 def run_recorded(job: Job, wanted: Collection[str]) -> tuple[list[CheckResult], list[Record]]:
     """Run some checks of a job as `recorded` does."""
     cells = [cell for cell in job.cells if cell.points is None or cell.grade_id in wanted]
-    job = job.model_copy(update={"cells": cells, "records": True})
+    job = with_interfaces(job.model_copy(update={"cells": cells, "records": True}), 1)
     seconds = limit(len(job.checks)) + job.build_seconds
     run = run_in_sandbox(["autograder.grading.worker"], job.model_dump_json().encode("utf-8"), job.isolation, seconds)
     checks, records = [], []

@@ -162,10 +162,11 @@ class Kernel:
         buttons: Mapping[str, Callable[[], object]],
     ) -> WorldView:
         """Begin to show the world of a launch, live, with the last messages of these topics and the lab's buttons."""
+        from autograder.notebook.world_extras import Extras
         from autograder.notebook.world_view import WorldView
 
         scored = lambda: self._in_cell and self.scored  # noqa: E731
-        return WorldView(running, lambda: self._in_cell, scored, listen, scan, buttons)
+        return WorldView(running, Extras(listen, scan, buttons), lambda: self._in_cell, scored)
 
     @property
     def number(self) -> int:

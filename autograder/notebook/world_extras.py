@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from rclpy.qos import qos_profile_sensor_data
@@ -16,6 +17,18 @@ from autograder.graph.observer import Observer
 
 _LASTS = 0.5
 """The seconds for which a scan is shown, if no other one comes."""
+
+
+@dataclass(frozen=True)
+class Extras:
+    """What a lab adds."""
+
+    listen: Sequence[tuple[str, type]]
+    """(topic, message class) of further topics to show beside the map."""
+    scan: str
+    """The topic of the rays that are shown, as seen from each car's namespace; empty for the world's own."""
+    buttons: Mapping[str, Callable[[], object]]
+    """What each of the lab's buttons does, by its words."""
 
 
 class Buttons:

@@ -6,6 +6,7 @@ const STEER = { ArrowUp: [0.5, 0], ArrowDown: [-0.4, 0], ArrowLeft: [0, 1.5], Ar
 const HERE_EVERY = 1000; // ms between two messages that say that somebody looks
 const STEER_EVERY = 100; // ms between two commands while a key is down
 const TRAIL_KEPT = 3000; // points of a trail
+const MARKS_KEPT = 1000; // brakes, and touches
 const NEWS_KEPT = 4; // sentences that stay visible
 
 function element(parent, name, attributes = {}, text = "") {
@@ -74,13 +75,14 @@ function drawRoom(box, room, cars) {
       const [x, y] = car.pose;
       rays[number].setAttribute("d", car.rays.map(([to, at]) => `M${x} ${y}L${to} ${at}`).join(""));
     });
-    brakes.replaceChildren();
+    if (message.whole) brakes.replaceChildren(), touches.replaceChildren(); // else only new marks come
     for (const [x, y] of message.brakes) rectangle(brakes, [x - 0.05, y - 0.05, 0.1, 0.1], { class: "aw-brake" });
-    touches.replaceChildren();
     for (const [x, y] of message.touches) {
-      element(touches, "circle", { cx: x, cy: y, r: 0.1, class: "aw-touch" });
-      element(touches, "path", { d: `M${x - 0.05} ${y - 0.05}l0.1 0.1m0 -0.1l-0.1 0.1`, class: "aw-touch" });
+      const mark = element(touches, "g");
+      element(mark, "circle", { cx: x, cy: y, r: 0.1, class: "aw-touch" });
+      element(mark, "path", { d: `M${x - 0.05} ${y - 0.05}l0.1 0.1m0 -0.1l-0.1 0.1`, class: "aw-touch" });
     }
+    for (const marks of [brakes, touches]) while (marks.children.length > MARKS_KEPT) marks.firstChild.remove();
   };
 }
 

@@ -15,22 +15,25 @@ import math
 import threading
 import time
 import uuid
-from collections.abc import Callable, Iterable, Mapping
-from itertools import islice
+from collections import deque
+from collections.abc import Callable
+from itertools import islice, takewhile
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from geometry_msgs.msg import Twist
 from rclpy.qos import QoSProfile
 
+from autograder.arguments.remap_rules import namespace_of
 from autograder.checks.message_text import in_words, set_fields, shorten
 from autograder.checks.program import Program
-from autograder.notebook.world_extras import Buttons, ShownScan
+from autograder.graph.names import full_name
+from autograder.notebook.world_extras import Buttons, Extras, ShownScan
 from autograder.world import RunningWorld
 from autograder.world import car as cars
 from autograder.world.drawing import blocks, drawn, still, thinned
 from autograder.world.room import BOX, WALL
-from autograder.world.simulation import RANGE_MAX, STANDS, Sample
+from autograder.world.simulation import RANGE_MAX, STANDS, Sample, Touch
 
 if TYPE_CHECKING:
     from autograder.checks.running_launch import RunningLaunch
@@ -47,6 +50,8 @@ _EVERY_RAY = 6
 """Of the lidar's rays, one in so many is shown."""
 _TRAIL, _APART = 3000, 0.03
 """The points of a trail that are sent to a page that begins to look, and the metres between two of them."""
+_MARKS = 200
+"""The marks of each kind that are shown of a car."""
 _PICTURE_EVERY = 10.0
 """The seconds after which the picture for a saved notebook is drawn again while a page looks."""
 _SEE_IT_LIVE = (
@@ -56,23 +61,22 @@ _SEE_IT_LIVE = (
 _RATES_OVER = 2.0
 """The seconds over which the rates of topics are counted."""
 
+_Mark = TypeVar("_Mark", Sample, Touch)
+
 
 class WorldView:
     """Shows one world and takes what a person does with it.
 
     Args:
         running: the launch, which has a world.
+        extras: what the lab adds to the view.
         busy: tells whether a cell runs, while which a page may not be heard.
         checking: tells whether it is a check, during which the lab's buttons do nothing.
-        listen: (topic, message class) of further topics to show beside the map.
-        scan: the topic of the rays that are shown, as seen from each car's namespace; by default the world's own.
-        buttons: what each of the lab's buttons does, by its words.
     """
 
     def __init__(
-        self, running: RunningLaunch, busy: Callable[[], bool], checking: Callable[[], bool],
-        listen: Iterable[tuple[str, type]], scan: str, buttons: Mapping[str, Callable[[], object]],
-    ) -> None:  # fmt: skip
+        self, running: RunningLaunch, extras: Extras, busy: Callable[[], bool], checking: Callable[[], bool]
+    ) -> None:
         """Begin to show it below the running cell."""
         assert running.world is not None
         self._running, self._busy = running, busy
@@ -82,14 +86,16 @@ class WorldView:
         self._heard = 0.0
         self._sent = [0] * len(self._names)
         """The step up to which each car's trail has been sent."""
+        self._marked = -math.inf
+        """When the first step began whose marks of brakes and touches have not been sent, in the world's time."""
         self._whole = True
         self._news: list[str] = []
         self._told = _Told(running, self._world)
-        self._rates = _Rates(self._world, [running.observer.record(*one) for one in listen])
-        self._buttons = Buttons(buttons, self._tell, checking)
+        self._rates = _Rates(self._world, [running.observer.record(*one) for one in extras.listen])
+        self._buttons = Buttons(extras.buttons, self._tell, checking)
         self._scans = {
-            name: ShownScan(running.observer, f"/{name}/{scan}" if name else f"/{scan}")
-            for name in (self._names if scan else ())
+            name: ShownScan(running.observer, f"/{name}/{extras.scan}" if name else f"/{extras.scan}")
+            for name in (self._names if extras.scan else ())
         }
         """The scans that are shown, by the car's namespace; empty for those of the world."""
         self._wheels: dict[str, Any] = {}
@@ -264,10 +270,11 @@ class WorldView:
         world = self._world.simulation
         with world.lock:
             shown = [self._car(number, name, whole) for number, name in enumerate(self._names)]
+            since, self._marked = -math.inf if whole else self._marked, world.time
             touches = [[round(one.x, 2), round(one.y, 2)] for record in world.records.values()
-                       for one in list(record.touches)[-50:]]  # fmt: skip
+                       for one in _after(since, record.touches)]  # fmt: skip
             brakes = [[round(one.pose.x, 2), round(one.pose.y, 2)] for record in world.records.values()
-                      for one in list(record.brakes)[-200:]]  # fmt: skip
+                      for one in _after(since, record.brakes)]  # fmt: skip
         return {
             "whole": whole,
             "cars": shown,
@@ -314,11 +321,15 @@ class WorldView:
         return list(zip(map(float, world.angles[::_EVERY_RAY]), metres, strict=True))
 
 
+def _after(time: float, marks: deque[_Mark]) -> list[_Mark]:
+    """Return the last marks of the step that begins at a time of the world, and of those after it."""
+    return list(islice(takewhile(lambda one: one.time >= time, reversed(marks)), _MARKS))[::-1]
+
+
 def name_of(described: Program) -> str:
     """Return what a program is called in the view: the full name of its node, as far as the launch gives it."""
-    space = next((rule for rule in described.all_rules() if rule.startswith("__ns:=")), "").removeprefix("__ns:=")
-    name = described.node_name() or described.program
-    return f"{space.rstrip('/')}/{name}" if space else name
+    space, name = namespace_of(described.all_rules()), described.node_name() or described.program
+    return full_name(space, name) if space else name
 
 
 def _state(car: cars.Car, missing: str) -> str:

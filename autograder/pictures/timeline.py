@@ -29,6 +29,8 @@ class Run:
     """The program in which it ran. Each program numbers its own threads."""
     period: float = 0.0
     """The period of the timer that it belongs to, in seconds; 0 if it does not belong to a timer."""
+    known: bool = True
+    """Whether its callback can be told from others: by its function, by what it belongs to, or by its line."""
 
 
 class Runs(Sequence[Run]):

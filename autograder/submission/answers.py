@@ -71,6 +71,8 @@ class Submission:
     files: dict[str, str] = field(default_factory=dict)
     """The text of every program and file that a cell names, by file name, including the lab's files."""
     problems: list[Outcome] = field(default_factory=list)
+    merged: dict[str, str] = field(default_factory=dict)
+    """Answers whose cell was merged into another answer's cell, with that one, both by grade_id."""
     digest: str = ""
     """SHA-256 over the answers, the student's other files, the problems, the lab and the kit."""
     readable: bool = True
@@ -114,6 +116,7 @@ def take_answers(cells: list[dict[str, Any]], lab: Lab, submission: Submission) 
                 ),
             )
         )
+    submission.merged = _merged(found, lab)
     for grade_id, original in released.items():
         _take_cell(grade_id, original, found.get(grade_id, []), lab, submission)
 
@@ -150,12 +153,7 @@ def _take_cell(
         _compare(grade_id, copies, lab, submission)
         return
     if not copies:
-        because = f"The answer cell `{grade_id}` was deleted, so there is no answer to grade."
-        hint = f"Copy the cell from a fresh labs/{lab.name}/{lab.name}.ipynb."
-        if marked:
-            because = f"The answer cell `{grade_id}` is no longer a code cell, so there is no answer to grade."
-            hint = "Select the cell and make it a code cell again (key Y)."
-        submission.problems.append(problem(f"the answer cell `{grade_id}` is there", MISSING_CELL(because, hint)))
+        submission.problems.append(_missing(grade_id, bool(marked), lab, submission))
         return
     try:
         # A text answer may have been split or started again. The person who reads it decides.
@@ -178,6 +176,44 @@ def _take_cell(
         )
         return
     submission.sources[grade_id] = source
+
+
+def _missing(grade_id: str, is_other_cell: bool, lab: Lab, submission: Submission) -> Outcome:
+    """Return a problem: no cell counts as this answer."""
+    because = f"The answer cell `{grade_id}` was deleted, so there is no answer to grade."
+    hint = f"Copy the cell from a fresh labs/{lab.name}/{lab.name}.ipynb."
+    if is_other_cell:
+        because = f"The answer cell `{grade_id}` is no longer a code cell, so there is no answer to grade."
+        hint = "Select the cell and make it a code cell again (key Y)."
+    elif grade_id in submission.merged:
+        into = submission.merged[grade_id]
+        because = (
+            f"The answer cell `{grade_id}` was merged into the cell `{into}`. A cell writes one file, which its"
+            " first line names."
+        )
+        hint = (
+            f"Copy both cells from a fresh labs/{lab.name}/{lab.name}.ipynb, and move each text, which begins with"
+            " such a line, into the cell of its own."
+        )
+    return problem(f"the answer cell `{grade_id}` is there", MISSING_CELL(because, hint))
+
+
+def _merged(found: dict[str, list[dict[str, Any]]], lab: Lab) -> dict[str, str]:
+    """Return the answers without a cell whose first line stands in another answer's cell, with that one."""
+    merged = {}
+    lines = {}
+    for grade_id in found.keys() & lab.answers.keys():
+        try:
+            lines[grade_id] = {line.rstrip() for cell in found[grade_id] for line in source_of(cell).splitlines()}
+        except ValueError:  # it is told of the cell itself
+            continue
+    for grade_id, answer in lab.answers.items():
+        if answer.file is not None and grade_id not in found:
+            first = f"%%{answer.file.magic} {answer.file.name}"
+            into = next((other for other in lab.answers if first in lines.get(other, ())), None)
+            if into is not None:
+                merged[grade_id] = into
+    return merged
 
 
 def _compare(grade_id: str, copies: list[dict[str, Any]], lab: Lab, submission: Submission) -> None:
@@ -230,10 +266,11 @@ def take_files(lab: Lab, submission: Submission) -> None:
         except BadNameError as error:
             submission.problems.append(problem(title, BAD_FILE_NAME(str(error), f"Begin the cell with `{wanted}`.")))
             continue
-        if file.file_name != answer.file.file_name:
+        was_merged = grade_id in submission.merged.values()  # and one sentence about it is enough
+        if file.file_name != answer.file.file_name and not was_merged:
             because = f"The cell `{grade_id}` names {file.file_name}; the lab asks for {answer.file.file_name}."
             submission.problems.append(problem(title, RENAMED_FILE(because, f"Begin the cell with `{wanted}`.")))
-        if file.file_name in owners:
+        if file.file_name in owners and not was_merged:
             because = (
                 f"The cells `{owners[file.file_name]}` and `{grade_id}` both write {file.file_name}; only the later"
                 " cell counts."

@@ -67,3 +67,12 @@ def test_a_release_waits_until_every_difference_is_explained(tmp_path: Path, mon
     for path in (root / "bank" / toy.LAB).glob("*.json"):
         assert run(root, "explain", toy.LAB, path.stem, "check_answers", "It has another name.")[0] == 0
     assert run(root, "check", toy.LAB, "--isolation", "none")[0] == 0
+
+    path.write_text(
+        path.read_text()
+        .replace('"check_talker":3.0', '"check_talker":null')
+        .replace('"check_talker": 3.0', '"check_talker": null')
+    )
+    status, said = run(root, "check", toy.LAB, "--isolation", "none")
+    assert status == 0 and "toy check_talker: not compared in 1 entry, because it had no points" in said
+    assert "toy check_table: no entry has points of it, so the bank says nothing about this check." in said

@@ -12,6 +12,7 @@ from autograder.core.results import Isolation
 from autograder.course.lab import Cell
 from autograder.grading import builds
 from autograder.grading.job import Job
+from autograder.grading.own_runs import run_recorded
 from autograder.sandbox.build import BuildRun
 from autograder.sandbox.isolation import preflight
 
@@ -98,3 +99,13 @@ execute_process(COMMAND sh -c "mkdir -p {store}; for f in {" ".join(kept)} new.j
     now = {path.name: path.read_text() for path in store.iterdir()}
     assert now.keys() >= kept.keys() and {name: now[name] for name in kept} == kept
     assert len(now) == len(kept) + 1 and "new.json" not in now
+
+
+def test_a_run_that_is_recorded_for_questions_is_built_as_at_grading(store: Path) -> None:
+    """A worker cannot reach the store."""
+    files = package("things", {"package.xml": PACKAGE_XML, "CMakeLists.txt": CMAKE})
+    source = 'from autograder.checks import build\nwith build("things") as package:\n    package.expect_built()'
+    cells = [Cell(grade_id="check", points=1, source=source)]
+    job = Job(student="ann", lab="lab", digest="0", isolation=Isolation.FULL, seed=1, files=files, cells=cells)
+    (check,), _ = run_recorded(job, ["check"])
+    assert check.grade_id == "check" and len(list(store.iterdir())) == 1

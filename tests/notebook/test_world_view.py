@@ -79,7 +79,9 @@ robot = launch("driver", world="room").start()
 robot.show(scan="seen", buttons={"Greet": lambda: "hello", "Break": lambda: 1 / 0})
 view, news = robot._running.view, []
 """
-PRESSED = """for name in ("Greet", "Break", "Nothing"):
+PRESSED = """view._over.set()  # the view's own thread would take some of the news
+view._thread.join()
+for name in ("Greet", "Break", "Nothing"):
     view._take({"do": "press", "name": name, "car": 0})
 robot.wait(lambda: news.extend(view._message()["news"]) or {"Greet: hello", "Break: division by zero"} <= set(news), 30)
 """
@@ -95,6 +97,24 @@ def test_a_lab_adds_buttons_and_shows_the_rays_that_a_program_publishes(notebook
     assert notebook.run('view._message()["cars"][0]["rays"]').result == "[]"
     assert notebook.run(PRESSED).result == "True"
     assert notebook.run(SEEN).result == "True"
+
+
+BRAKED = """view, marks = robot._running.view, []
+robot.wait(lambda: robot.car()._record.metres > 0.3, 60)
+view._kill("driver")
+robot.wait(lambda: marks.extend(view._message()["brakes"]) or marks, 60)
+again = view._message()["brakes"]
+view._whole = True
+robot.program("driver").restart()
+len(marks), again, view._message()["brakes"] == marks, robot.program("driver")._program.running()
+"""
+
+
+def test_a_mark_is_sent_once_and_a_page_that_begins_to_look_gets_all(notebook: Notebook) -> None:
+    notebook.run(DRIVER)
+    notebook.run(SHOWN)
+    shown = notebook.run(BRAKED)
+    assert shown.result == "(1, [], True, True)", shown
 
 
 def test_topics_that_are_asked_for_are_shown_with_their_last_message(notebook: Notebook) -> None:

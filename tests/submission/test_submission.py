@@ -17,7 +17,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from places import ROOT
 
-from autograder.course.cells import grade_id_of, parse
+from autograder.course.cells import grade_id_of, parse, source_of
 from autograder.course.lab import Lab, load_lab
 from autograder.submission.answers import OWN_FILES, Submission
 from autograder.submission.copies import told_of_copies
@@ -179,6 +179,19 @@ def test_defects_are_named_one_by_one(lab: Lab, tmp_path: Path) -> None:
     assert defect(say("talker", "%%node talkr\nx")) == ["renamed-file"]
     assert defect(say("talker", "%%node helper\nx")) == ["given-file"]
     assert defect(say("talker", "%%file answers.yaml\nx")) == ["renamed-file", "same-file"]
+
+
+@pytest.mark.parametrize("kept", ["talker", "answers"])
+def test_of_two_answers_that_were_merged_one_sentence_says_so(kept: str, lab: Lab, tmp_path: Path) -> None:
+    """JupyterLab gives the merged cell the mark of either, whichever was the active one."""
+    cells = solved(lab)
+    gone = {"talker": "answers", "answers": "talker"}[kept]
+    text = f"{source_of(by_id(cells, 'talker'))}\n\n{source_of(by_id(cells, 'answers'))}"
+    by_id(cells, kept)["source"] = text
+    submission = read(lab, tmp_path, [cell for cell in cells if grade_id_of(cell) != gone])
+    (problem,) = submission.problems
+    assert problem.code == "missing-cell" and f"`{gone}` was merged into the cell `{kept}`" in problem.because
+    assert "%%file answers.yaml" in submission.files["talker.py"]
 
 
 def test_of_copies_of_an_answer_the_last_one_counts_and_of_a_text_all(lab: Lab, tmp_path: Path) -> None:
