@@ -49,14 +49,15 @@ def copies_of(marked: Sequence[dict[str, Any]], file_name: str) -> list[dict[str
 
 
 def pieces_of(marked: Sequence[dict[str, Any]], file_name: str) -> list[dict[str, Any]]:
-    """Return the cells that were split off from an answer and name no file, so that they are left out.
+    """Return the code cells that were split off from an answer and name no file, so that they are left out.
 
     Args:
         marked: the cells with the answer's grading mark.
         file_name: the name of the answer's file; empty if the answer is not a file.
     """
     copies = copies_of(marked, file_name)
-    return [cell for cell in marked if copies and cell not in copies and not named_file(cell) and _is_written(cell)]
+    code = [cell for cell in marked if cell.get("cell_type") == "code" and cell not in copies]
+    return [cell for cell in code if copies and not named_file(cell) and _is_written(cell)]
 
 
 def _is_written(cell: dict[str, Any]) -> bool:

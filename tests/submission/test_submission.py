@@ -242,6 +242,12 @@ def test_the_piece_of_an_answer_that_was_split_off_is_told(lab: Lab, tmp_path: P
     assert codes(read(lab, tmp_path, cells)) == []
 
 
+def test_a_copy_of_an_answer_that_was_turned_into_text_is_no_piece_of_it(lab: Lab, tmp_path: Path) -> None:
+    cells = json.loads(json.dumps(solved(lab)))
+    cells.append({**by_id(cells, "talker"), "id": "old", "cell_type": "markdown"})
+    assert codes(read(lab, tmp_path, cells)) == []
+
+
 def test_the_labs_own_source_is_a_notebook_without_defects(lab: Lab, tmp_path: Path) -> None:
     assert "HIDDEN TESTS" in json.dumps(lab.raw)
     submission = read(lab, tmp_path, lab.raw["cells"])
