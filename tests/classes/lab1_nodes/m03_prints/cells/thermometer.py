@@ -11,7 +11,7 @@ class Thermometer(Node):
     def __init__(self):
         super().__init__("thermometer")
         self.publisher = self.create_publisher(Temperature, "temperature", 10)
-        self.create_timer(1.0, self.measure)
+        self.create_timer(2.0, self.measure)
 
     def measure(self):
         self.publisher.publish(Temperature(temperature=random.uniform(15, 35)))

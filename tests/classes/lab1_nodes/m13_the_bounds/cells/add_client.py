@@ -21,7 +21,7 @@ def ask(node):
         node.get_logger().error("no server")
         return 1
     future = node.client.call_async(BasicTypes.Request(int32_value=node.a, int64_value=node.b))
-    rclpy.spin_until_future_complete(node, future, timeout_sec=5.0)
+    rclpy.spin_until_future_complete(node, future, timeout_sec=7.0)
     if not future.done():
         node.get_logger().error("no answer")
         return 2

@@ -18,7 +18,7 @@ class Heartbeat(Node):
         self.heartbeat = self.create_publisher(Int64, "heartbeat", 10)
         self.activity = self.create_publisher(String, "activity", 10)
         period = self.get_parameter("heartbeat_period").value
-        self.first = True
+        self.first = 2
         self.create_timer(period, self.beat)
         self.create_timer(1.5 * self.work, self.slow)
 
@@ -28,9 +28,12 @@ class Heartbeat(Node):
 
     def slow(self):
         if self.first:
-            self.first = False
-            threading.Thread(target=self.slow, daemon=True).start()
-            return
+            self.first -= 1
+            threading.Thread(target=self.work_on, daemon=True).start()
+        else:
+            self.work_on()
+
+    def work_on(self):
         self.activity.publish(String(data="slow begin"))
         time.sleep(self.work)
         self.activity.publish(String(data="slow end"))
