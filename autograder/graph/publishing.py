@@ -40,21 +40,26 @@ class Stream:
         self._expect_heard = expect_heard
         self._publisher: Any = None
         self._timer: Any = None
+        self._on = False
 
     def start(self) -> None:
         """Start or resume sending. If no subscription matches, this is recorded as a failed outcome."""
         if self._publisher is None:
             self._publisher = self._observer.publisher(self._topic, type(self._message), self._qos)
         self._expect_heard(self._publisher.get_subscription_count)
+        self._on = True
         if self._timer is None:
-            self._timer = self._observer.node.create_timer(self._period, lambda: self._publisher.publish(self._message))
-        elif self._timer.is_canceled():
-            self._timer.reset()
+            self._timer = self._observer.node.create_timer(self._period, self._send)
 
     def stop(self) -> None:
         """Stop sending, but keep the publisher, so that it looks like that of a program that hangs."""
-        if self._timer is not None:
-            self._timer.cancel()
+        # The timer is not canceled: if it is just due, the executor's thread would still call it, and rclpy's
+        # `_take_timer` lets the error of a canceled timer end the spinning.
+        self._on = False
+
+    def _send(self) -> None:
+        if self._on:
+            self._publisher.publish(self._message)
 
 
 REPEAT = 0.1

@@ -38,6 +38,7 @@ from autograder.graph.domains import claim_domain
 from autograder.graph.names import nearest
 from autograder.graph.observer import Observer
 from autograder.graph.patience import Patience
+from autograder.graph.publishing import Stream
 from autograder.graph.qos import first_mismatch
 from autograder.graph.recording import Received
 from autograder.sandbox.environment import profile_environment
@@ -314,6 +315,25 @@ def test_a_message_that_comes_while_a_subscription_is_made_does_not_deafen_the_o
         return made
 
     monkeypatch.setattr(talking.node, "create_subscription", make_slowly)
+    assert talking.record("/numbers", Int64).wait_for(20, within=30)
+
+
+def test_a_stream_that_is_stopped_just_when_it_is_due_does_not_deafen_the_observer(
+    talking: Observer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    take, due, stopped = talking._executor._take_timer, threading.Event(), threading.Event()
+
+    def take_slowly(timer: object) -> object:
+        due.set()
+        assert stopped.wait(30)  # the thread that stops the stream is quicker than the observer's own
+        return take(timer)
+
+    monkeypatch.setattr(talking._executor, "_take_timer", take_slowly)
+    stream = Stream(talking, "/sent", Int64(), 100.0, QoSProfile(depth=1), lambda heard: None)
+    stream.start()
+    assert due.wait(30)
+    stream.stop()
+    stopped.set()
     assert talking.record("/numbers", Int64).wait_for(20, within=30)
 
 

@@ -10,7 +10,7 @@ class Talker(Node):
         super().__init__("talker")
         self.count = 0
         self.publisher = self.create_publisher(String, "chatter", 10)
-        self.create_timer(2.5, self.talk)
+        self.create_timer(1.5, self.talk)
 
     def talk(self):
         self.publisher.publish(String(data=f"hello {self.count}"))
