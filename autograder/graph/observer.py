@@ -131,7 +131,8 @@ class Observer:
         except ExternalShutdownException:
             pass  # caused by shutting down all contexts, as rclpy does at Ctrl-C
         except Exception as raised:
-            error = raised
+            if self._context.ok():  # otherwise it was about to wait when the context was shut down, which raises errors
+                error = raised
         # If the executor is shut down just as it begins to wait, it raises an error that does not matter.
         if not self._closing:
             self._error = error
