@@ -118,20 +118,25 @@ def run(
     here = [item for item in request.session.items if item.path == request.path and "run" in item.fixturenames]
     chosen = [item.callspec.params["table"] for item in here]
 
-    def mutated_page(table: Path) -> dict[str, bool]:
+    def mutated_page(table: Path, folder: Path) -> dict[str, bool]:
         changes = yaml.safe_load(table.read_text(encoding="utf-8"))
-        return held(mutated(cells_of(page_of(table)), changes), tmp_path_factory.mktemp(table.stem))
+        return held(mutated(cells_of(page_of(table)), changes), folder)
+
+    def new_folder(
+        table: Path,
+    ) -> Path:  # not in the pool: two threads that ask pytest for the first one disturb each other
+        return tmp_path_factory.mktemp(table.stem)
 
     with ThreadPoolExecutor(AT_ONCE) as pool:
         longest_first = sorted(chosen, key=lambda table: -len(cells_of(page_of(table))))
-        running = {table: pool.submit(mutated_page, table) for table in longest_first}
+        running = {table: pool.submit(mutated_page, table, new_folder(table)) for table in longest_first}
 
         def result(table: Path) -> dict[str, bool]:
             first = running[table].result()
             if not any(first.values()):
                 return first
             wait(running.values())  # a busy machine can make a statement true, as it can make one false
-            return mutated_page(table)
+            return mutated_page(table, new_folder(table))
 
         yield result
 
