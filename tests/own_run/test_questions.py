@@ -46,7 +46,7 @@ def recorded(lab_name: str) -> list[Record]:
 def test_of_real_runs_every_key_is_what_a_replay_of_the_run_shows(lab_name: str) -> None:
     records = recorded(lab_name)
     asked = [(record, question) for record in records for question in questions.possible(record)]
-    assert len({question.kind for _, question in asked}) >= 2
+    assert asked  # of how many kinds is the luck of a run; each kind has a test of its own
     for record, question in asked:
         assert key(record, question) == replay.answer(record, question), question
         assert not question.choices or key(record, question) in question.choices, question
