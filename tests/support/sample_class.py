@@ -18,8 +18,8 @@ from typing import Any
 import yaml
 from places import ROOT
 
-from autograder.course.cells import grade_id_of
-from autograder.course.lab import Lab, load_lab
+from autograder.course.cells import grade_id_of, source_of
+from autograder.course.lab import Cell, Lab, load_lab
 from autograder.course.paths import CoursePaths
 
 _LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
@@ -166,6 +166,12 @@ def outcomes(lab: Lab, student: str) -> set[str]:
         earned = {None: "undecided", 0: "nothing", cell.points: "full"}.get(told.points[cell.grade_id], "part")
         kinds |= {earned, f"{earned}, flagged"} if cell.grade_id in told.flagged else {earned}
     return kinds
+
+
+def recording_cell(lab: Lab) -> Cell:
+    """The cell with which a student records a run for questions about it, as a check that a worker can run."""
+    source = next(text for text in map(source_of, lab.released) if "ros.own_run(" in text)
+    return Cell(grade_id="record_own_run", points=1, source=source)
 
 
 def examples(lab: Lab) -> list[str]:

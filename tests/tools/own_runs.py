@@ -23,8 +23,7 @@ import replay
 import sample_class
 
 from autograder.core.results import Isolation
-from autograder.course.cells import source_of
-from autograder.course.lab import Cell, Lab, load_lab
+from autograder.course.lab import Lab, load_lab
 from autograder.grading.job import Job
 from autograder.grading.own_runs import run_recorded
 from autograder.own_run.keys import key
@@ -38,13 +37,12 @@ WANTED = 4
 
 def record(lab: Lab, student: str, seed: int) -> Record:
     """Run the cell that records a student's own run."""
-    source = next(text for text in map(source_of, lab.released) if "ros.own_run(" in text)
-    cell = Cell(grade_id="record_own_run", points=1, source=source)
+    cell = sample_class.recording_cell(lab)
     job = Job(
         student=student, lab=lab.name, digest="", isolation=Isolation.NONE, seed=seed, files=files(lab, student),
         cells=[*(cell for cell in lab.cells if cell.points is None), cell],
     )  # fmt: skip
-    checks, records = run_recorded(job, ["record_own_run"])
+    checks, records = run_recorded(job, [cell.grade_id])
     assert records, [outcome.because for check in checks for outcome in check.outcomes]
     return records[0]
 
