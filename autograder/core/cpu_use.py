@@ -118,18 +118,23 @@ def kept_waiting(before: dict[int, CpuUse], after: dict[int, CpuUse], share: flo
         share: the part of one CPU that all processes together may use; 1.0 if they may use a whole CPU or more. A
             program that computes all the time uses up the quota, and then every process waits.
     """
-    weight = {pid: 1 / share if pid != os.getpid() and use.computes() else 1.0 for pid, use in after.items()}
-    together = sum(weight[pid] * (use.own - (before[pid].own if pid in before else 0.0)) for pid, use in after.items())
-    # The CPU time of a process that has ended now belongs to its parent, including the time from before this period.
-    ended = sum(use.children for use in after.values()) - sum(before[pid].children for pid in before if pid in after)
-    known_before = sum(use.own + use.children for pid, use in before.items() if pid not in after)
-    together += max(0.0, ended - known_before) / share
+    together = _used_together(before, after, share)
     kept = {}
     for pid, use in after.items():
         known = before[pid].threads if pid in before else {}
         waits = [_since(known.get(thread), wait) for thread, wait in use.threads.items()]
         kept[pid] = max(0.0, *(waited - max(0.0, together - own) for waited, own in waits))
     return kept
+
+
+def _used_together(before: dict[int, CpuUse], after: dict[int, CpuUse], share: float) -> float:
+    """Return the seconds of CPU time that all processes used in a period; for `share` see `kept_waiting`."""
+    weight = {pid: 1 / share if pid != os.getpid() and use.computes() else 1.0 for pid, use in after.items()}
+    together = sum(weight[pid] * (use.own - (before[pid].own if pid in before else 0.0)) for pid, use in after.items())
+    # The CPU time of a process that has ended now belongs to its parent, including the time from before this period.
+    ended = sum(use.children for use in after.values()) - sum(before[pid].children for pid in before if pid in after)
+    known_before = sum(use.own + use.children for pid, use in before.items() if pid not in after)
+    return together + max(0.0, ended - known_before) / share
 
 
 def _since(before: CpuWait | None, after: CpuWait) -> tuple[float, float]:
@@ -163,17 +168,36 @@ def _with_open_waits(before: dict[int, CpuUse], after: dict[int, CpuUse]) -> dic
     return noted
 
 
+def stolen(stat: str = "/proc/stat") -> list[float]:
+    """Return for how many seconds each CPU of a virtual machine had work while its host ran something else.
+
+    The kernel counts this time as neither use nor wait of any process (`steal` in proc(5)). A machine of one's own has
+    none. The result is empty if it is not known.
+
+    Args:
+        stat: the file in which the kernel counts.
+    """
+    with contextlib.suppress(OSError, IndexError, ValueError):
+        lines = [line.split() for line in read_text(stat).splitlines() if line.startswith("cpu")]
+        return [int(fields[8]) / _TICKS for fields in lines if fields[0] != "cpu"]
+    return []
+
+
 class Withheld:
     """The time for which other programs kept the processes of a launch, and the process that watches it, from the CPUs.
 
     It is measured in short periods, so that CPU time that these processes used in one second is not subtracted from
     what other programs took in another second.
+
+    Args:
+        stat: the file in which the kernel counts what a host takes from its virtual machines (see `stolen`).
     """
 
-    def __init__(self) -> None:
+    def __init__(self, stat: str = "/proc/stat") -> None:
         """Start without any measurement."""
         self._share = min(1.0, cpus())
-        self._before: tuple[float, dict[int, CpuUse]] | None = None
+        self._stat = stat
+        self._before: tuple[float, dict[int, CpuUse], list[float]] | None = None
         self._pieces: list[tuple[float, float, float, float]] = []
         """For each period: its start, its end, the seconds that all processes lost, and the most that one lost."""
 
@@ -182,12 +206,19 @@ class Withheld:
         now = time.monotonic()
         if self._before is not None and now - self._before[0] < least:
             return
-        uses = cpu_uses()
+        uses, by_host = cpu_uses(), stolen(self._stat)
         if self._before is not None:
-            kept = kept_waiting(self._before[1], uses, self._share).values()
-            self._pieces.append((self._before[0], now, sum(kept), max(kept, default=0.0)))
-            uses = _with_open_waits(self._before[1], uses)
-        self._before = now, uses
+            began, before, by_host_before = self._before
+            kept = kept_waiting(before, uses, self._share).values()
+            taken = [after - earlier for after, earlier in zip(by_host, by_host_before, strict=False)]
+            # A host that lends its CPUs sparingly takes them from a program that computes all the time.
+            own = _used_together(before, uses, self._share) if any(taken) else 0.0
+            all_lost = min(now - began, max(0.0, sum(taken) - own))
+            one_lost = min(now - began, max(0.0, max(taken, default=0.0) - own))
+            # The kernel counts a stolen moment as a wait of the processes that are queued, but not of the one that ran.
+            self._pieces.append((began, now, sum(kept) + all_lost, max([one_lost, *kept])))
+            uses = _with_open_waits(before, uses)
+        self._before = now, uses, by_host
 
     def from_all(self, when: float) -> float:
         """Return by how many seconds a message may be late if it went through all the processes, one after another.

@@ -10,6 +10,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -32,7 +33,7 @@ from std_msgs.msg import Int64
 from autograder.checks.concurrency import Concurrency
 from autograder.checks.program import Program
 from autograder.core import cpu_use
-from autograder.core.cpu_use import CpuUse, CpuWait, Withheld, cpu_uses, kept_waiting
+from autograder.core.cpu_use import CpuUse, CpuWait, Withheld, cpu_uses, kept_waiting, stolen
 from autograder.core.errors import KitError
 from autograder.graph.domains import claim_domain
 from autograder.graph.names import nearest
@@ -244,6 +245,46 @@ def test_one_long_wait_counts_once(monkeypatch: pytest.MonkeyPatch) -> None:
     for _ in looks:
         withheld.measure()
     assert withheld.from_one(100.0) == pytest.approx(3.0)
+
+
+def by_a_host(stat: Path, monkeypatch: pytest.MonkeyPatch, used: float, taken: tuple[float, float]) -> Withheld:
+    """Return what is measured in a second in which a program ran for `used` s and a host took that much of two CPUs."""
+    clock, seen = iter([100.0, 101.0]), iter([{NODE: had(10.0, (5.0, 0.0))}, {NODE: had(11.0, (5.0 + used, 0.0))}])
+    monkeypatch.setattr(cpu_use.time, "monotonic", lambda: next(clock, 101.0))
+    monkeypatch.setattr(cpu_use, "cpu_uses", lambda: next(seen))
+    withheld = Withheld(str(stat))
+    for first, second in ((0.0, 0.0), taken):
+        ticks = [round(seconds * os.sysconf("SC_CLK_TCK")) for seconds in (first + second, 30 + first, 40 + second)]
+        stat.write_text(
+            "".join(
+                f"{cpu} 9 0 9 99 1 0 2 {stolen} 0 0\n"
+                for cpu, stolen in zip(("cpu", "cpu0", "cpu1"), ticks, strict=True)
+            )
+            + "intr 5 0 7\n"
+        )
+        withheld.measure()
+    return withheld
+
+
+def test_what_a_host_takes_from_its_machine_is_withheld(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """No program runs meanwhile, and the kernel of the machine counts this for none of them."""
+    withheld = by_a_host(tmp_path / "stat", monkeypatch, used=0.1, taken=(0.2, 0.5))
+    assert withheld.from_one(100.0) == pytest.approx(0.4)
+    assert withheld.from_all(100.0) == pytest.approx(0.6)
+    assert withheld.from_one(100.5) == pytest.approx(0.2)
+
+
+def test_a_program_that_only_computes_gains_nothing_by_what_its_host_takes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    withheld = by_a_host(tmp_path / "stat", monkeypatch, used=0.6, taken=(0.4, 0.0))
+    assert withheld.from_one(100.0) == withheld.from_all(100.0) == 0.0
+
+
+def test_a_machine_that_does_not_count_what_its_host_takes_lacks_nothing(tmp_path: Path) -> None:
+    (tmp_path / "short").write_text("cpu 1 2 3\ncpu0 1 2 3\n")
+    assert stolen(str(tmp_path / "short")) == stolen(str(tmp_path / "missing")) == []
+    assert all(seconds >= 0 for seconds in stolen())
 
 
 def test_what_a_program_had_before_its_end_counts_where_it_was_used() -> None:
