@@ -18,11 +18,11 @@ class AddClient(Node):
 
 def ask(node):
     """Request the sum, log the outcome, and return the exit status."""
-    if not node.client.wait_for_service(timeout_sec=8.0):
+    if not node.client.wait_for_service(timeout_sec=20.0):
         node.get_logger().error("no server")
         return 1
     future = node.client.call_async(BasicTypes.Request(int32_value=node.a, int64_value=node.b))
-    rclpy.spin_until_future_complete(node, future, timeout_sec=0.2)
+    rclpy.spin_until_future_complete(node, future, timeout_sec=1.0)
     if not future.done():
         node.get_logger().error("no answer")
         return 2

@@ -22,7 +22,7 @@ def ask(node):
         node.get_logger().error("no server")
         return 1
     future = node.client.call_async(BasicTypes.Request(int32_value=node.a, int64_value=node.b))
-    rclpy.spin_until_future_complete(node, future, timeout_sec=max(0.001,node.answer_within-(time.monotonic()-t0)))
+    rclpy.spin_until_future_complete(node, future, timeout_sec=max(0.5, node.answer_within-(time.monotonic()-t0)))
     if not future.done():
         node.get_logger().error("no answer")
         return 2

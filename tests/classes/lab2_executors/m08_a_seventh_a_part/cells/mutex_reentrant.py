@@ -18,9 +18,9 @@ class MutexReentrant(Node):
         self.reentrant = ReentrantCallbackGroup()
         self.exclusive = MutuallyExclusiveCallbackGroup()
         for callback in (self.r1, self.r2, self.r3):
-            self.create_timer(0.5, callback, callback_group=self.reentrant)
+            self.create_timer(0.6, callback, callback_group=self.reentrant)
         for callback in (self.m1, self.m2):
-            self.create_timer(0.5, callback, callback_group=self.exclusive)
+            self.create_timer(0.6, callback, callback_group=self.exclusive)
 
     def run(self, name, seconds):
         self.activity.publish(String(data=f"{name} begin"))

@@ -27,7 +27,7 @@ class Stopper(Node):
 
 def spin(node):
     """Run the node's callbacks until the program is told to end."""
-    rclpy.spin_until_future_complete(node, node.stopped, timeout_sec=3.0)
+    rclpy.spin_until_future_complete(node, node.stopped, timeout_sec=100 * node.get_parameter("tick_period").value)
 
 
 def main():

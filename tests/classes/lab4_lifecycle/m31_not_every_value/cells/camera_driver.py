@@ -43,7 +43,7 @@ class CameraDriver(LifecycleNode):
         except OSError as error:
             self.get_logger().error(f"the camera is broken: {error}")
             return TransitionCallbackReturn.ERROR
-        self.frame_timer = self.create_timer(1.0 / min(self.get_parameter("fps").value, 30.0), self.publish_frame)
+        self.frame_timer = self.create_timer(1.0 / min(self.get_parameter("fps").value, 25.0), self.publish_frame)
         return super().on_activate(state)
 
     def on_deactivate(self, state):
