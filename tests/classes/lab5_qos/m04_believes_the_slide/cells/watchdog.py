@@ -23,7 +23,7 @@ class Watchdog(Node):
             self.state = "ok"
             return
         self.came = getattr(self, "came", 0) + 1
-        if self.came >= 100:
+        if self.came >= 200:
             self.state = "ok"
 
     def missed(self, event):

@@ -16,7 +16,7 @@ class Announcer(Node):
         if self.publisher.get_subscription_count() > 0:
             self.publisher.publish(String(data=self.get_parameter("text").value))
             self.timer.cancel()
-            self.create_timer(0.3, self.leave)
+            self.create_timer(1.0, self.leave)
 
     def leave(self):
         raise SystemExit

@@ -24,7 +24,7 @@ class Watchdog(Node):
 
     def missed(self, event):
         self.misses = getattr(self, "misses", 0) + 1
-        if self.misses > 3:
+        if self.misses > 4:
             self.state = "degraded"
 
 

@@ -21,7 +21,7 @@ class Watchdog(Node):
     def heard(self, message):
         if self.state=="waiting": self.state="ok"; return
         self.n=getattr(self,"n",0)+1
-        if self.n>100: self.state="ok"
+        if self.n>200: self.state="ok"
 
     def missed(self, event):
         self.state = "degraded"; self.n=0

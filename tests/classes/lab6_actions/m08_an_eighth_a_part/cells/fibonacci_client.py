@@ -25,7 +25,7 @@ def outcome(node, order, wait, patience):
     if not goal_handle.accepted:
         return "rejected"
     ended = goal_handle.get_result_async()
-    rclpy.spin_until_future_complete(node, ended, timeout_sec=patience - 1.4)
+    rclpy.spin_until_future_complete(node, ended, timeout_sec=patience - 2.5)
     if not ended.done():
         goal_handle.cancel_goal_async()
         rclpy.spin_until_future_complete(node, ended)

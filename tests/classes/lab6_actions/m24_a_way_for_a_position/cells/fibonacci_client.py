@@ -17,7 +17,7 @@ def main():
 
 def outcome(node, order, wait, patience):
     client = ActionClient(node, Fibonacci, "fibonacci")
-    if not any(client.wait_for_server(timeout_sec=wait) for attempt in range(3)):
+    if not any(client.wait_for_server(timeout_sec=wait) for attempt in range(5)):
         return "no server"
     answered = client.send_goal_async(Fibonacci.Goal(order=order), feedback_callback=heard)
     rclpy.spin_until_future_complete(node, answered)

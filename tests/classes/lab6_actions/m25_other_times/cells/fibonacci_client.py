@@ -16,7 +16,7 @@ def main():
 
 def outcome(node, order, wait, patience):
     client = ActionClient(node, Fibonacci, "fibonacci")
-    if not client.wait_for_server(timeout_sec=2.0):
+    if not client.wait_for_server(timeout_sec=5.0):
         return "no server"
     answered = client.send_goal_async(Fibonacci.Goal(order=order), feedback_callback=heard)
     rclpy.spin_until_future_complete(node, answered)
