@@ -13,10 +13,12 @@ from autograder.checks.settling import Settling
 from autograder.core.front_end import View, Watcher
 from autograder.core.results import NodeLog
 from autograder.diagnosis import Scene
+from autograder.diagnosis.inside import read
 from autograder.graph.lifecycle import LifecycleClient
 from autograder.graph.observer import Observer
 from autograder.graph.services import OfferedService
 from autograder.reasons import Reason
+from autograder.sandbox.inside.probe.events import NodeSeen
 from autograder.sandbox.running_program import RunningProgram
 
 if TYPE_CHECKING:
@@ -128,6 +130,16 @@ class RunningLaunch:
         failed = [program for program in ended if program.exit_status() != 0]
         last = ended if len(ended) == len(self.programs) else []
         return next(iter(failed + last), None)
+
+    def gone_nodes(self) -> set[str]:
+        """The names of the nodes that only programs which have ended say they made.
+
+        The nodes of a program that was killed stay on the graph for a while, and cannot answer.
+        """
+        made: dict[bool, set[str]] = {True: set(), False: set()}
+        for _, program in self.programs:
+            made[program.running()] |= {event.name for event in read(program.events()) if isinstance(event, NodeSeen)}
+        return made[False] - made[True]
 
     def lifecycle_client(self, node: str) -> LifecycleClient:
         """Who asks this lifecycle node, and has recorded its changes since the first call of this."""

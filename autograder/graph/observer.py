@@ -250,10 +250,23 @@ class Observer:
         """Return the services of all nodes with their type names; the observer itself offers none."""
         found: dict[str, list[str]] = {}
         for name, namespace in self._names():
-            # A node may disappear between the two calls, which causes an RCLError; forged names may not be UTF-8.
-            with contextlib.suppress(RuntimeError, ValueError):
-                found.update(self.node.get_service_names_and_types_by_node(name, namespace))
+            found.update(self._services_of(name, namespace))
         return found
+
+    def services_of(self, node: str) -> dict[str, list[str]]:
+        """Return the services that a node offers with their type names.
+
+        Args:
+            node: the full name of the node.
+        """
+        namespace, _, name = node.rpartition("/")
+        return self._services_of(name, namespace or "/")
+
+    def _services_of(self, name: str, namespace: str) -> dict[str, list[str]]:
+        # A node may disappear after its name was read, which causes an RCLError; forged names may not be UTF-8.
+        with contextlib.suppress(RuntimeError, ValueError):
+            return dict(self.node.get_service_names_and_types_by_node(name, namespace))
+        return {}
 
     def clients(self, node: str) -> dict[str, list[str]]:
         """Return the services for which a node has clients, with the clients' types.
@@ -262,7 +275,7 @@ class Observer:
             node: the full name of the node.
         """
         namespace, _, name = node.rpartition("/")
-        with contextlib.suppress(RuntimeError, ValueError):  # as in `services`
+        with contextlib.suppress(RuntimeError, ValueError):  # as in `_services_of`
             return dict(self.node.get_client_names_and_types_by_node(name, namespace or "/"))
         return {}
 

@@ -4,14 +4,25 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from rcl_interfaces.srv import ListParameters
 from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.client import Client
 from rclpy.task import Future
+from type_description_interfaces.srv import GetTypeDescription
 
 from autograder.graph.observer import Observer
+
+_NO_TYPE = "RIHS01_" + 64 * "0"
+"""The hash of no type. If a hash is not of this form, rcl prints an error in the program that is asked."""
+_QUESTIONS: dict[str, tuple[type, Any]] = {
+    "list_parameters": (ListParameters, ListParameters.Request()),
+    "get_type_description": (GetTypeDescription, GetTypeDescription.Request(type_hash=_NO_TYPE)),
+}
+"""Services that a node has by default, with requests that change nothing. A program can switch off either of them."""
 
 
 @dataclass(frozen=True)
@@ -75,6 +86,44 @@ def call_all(
         ]
     finally:
         observer.node.destroy_client(client)
+
+
+def ask_nodes(
+    observer: Observer, nodes: Collection[str], within: float, give_up: Callable[[], bool] | None = None
+) -> bool:
+    """Ask all nodes a question at once, wait for the answers, and return whether every node has answered.
+
+    Each question has an end of its own, which is made after all ends that the observer had when this was called.
+
+    Args:
+        observer: the observer that asks.
+        nodes: the full names of the nodes. A node that has none of rclpy's own services cannot be asked.
+        within: the seconds to wait for the answers of all nodes together.
+        give_up: returns true if no answer can come any more, for example because a program has ended.
+    """
+    clients: dict[str, tuple[Client, Any]] = {}
+    """Of each node that can be asked, the client and the request."""
+    answers: dict[str, Future] = {}
+
+    def answered() -> bool:
+        for node in nodes:
+            if node not in clients:
+                offered = observer.services_of(node)
+                question = next((name for name in _QUESTIONS if f"{node}/{name}" in offered), None)
+                if question is not None:
+                    srv_type, request = _QUESTIONS[question]
+                    clients[node] = observer.node.create_client(srv_type, f"{node}/{question}"), request
+            elif node not in answers and clients[node][0].service_is_ready():
+                client, request = clients[node]
+                answers[node] = client.call_async(request)
+                answers[node].add_done_callback(lambda _: observer.notify())
+        return len(answers) == len(nodes) and all(answer.done() for answer in answers.values())
+
+    try:
+        return observer.wait(answered, within, give_up)
+    finally:
+        for client, _ in clients.values():
+            observer.node.destroy_client(client)
 
 
 class OfferedService:

@@ -5,11 +5,15 @@ from __future__ import annotations
 import textwrap
 import time
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 from graded_cell import TALKER, Grade, failure
 
 from autograder.checks import current
+from autograder.checks.program import Program
+from autograder.checks.running_launch import RunningLaunch
 from autograder.core.results import Status
 
 
@@ -1137,6 +1141,7 @@ time.sleep(1.5)  # it reads a large map first
 import rclpy
 from rcl_interfaces.srv import ListParameters
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 from std_msgs.msg import String
 
 
@@ -1146,7 +1151,8 @@ def told(request, response):
 
 
 rclpy.init()
-node = Node("latecomer", start_parameter_services=False)
+no_types = Parameter("start_type_description_service", value=False)
+node = Node("latecomer", start_parameter_services=False, parameter_overrides=[no_types])
 node.create_service(ListParameters, "~/list_parameters", told)
 out = node.create_publisher(String, "late", 1)
 node.create_subscription(String, "again", out.publish, 10)
@@ -1409,3 +1415,13 @@ def test_a_forgotten_return_of_a_lifecycle_callback_counts_as_success_only_where
         """
     assert grade(cell.format(assume=", assume_success=True"), camera__py=program).points == 2
     assert failure(grade(cell.format(assume=""), camera__py=program)).code == "lifecycle-return"
+
+
+def test_only_nodes_that_no_running_program_has_made_are_gone() -> None:
+    def program(running: bool, *names: str) -> Any:
+        events = [{"e": "node", "name": name} for name in names]
+        return Program("any"), SimpleNamespace(running=lambda: running, events=lambda: events)
+
+    running = RunningLaunch()
+    running.programs = [program(False, "/killed", "/started_again"), program(True, "/other", "/started_again")]
+    assert running.gone_nodes() == {"/killed"}

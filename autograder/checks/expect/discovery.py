@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
-import contextlib
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 
-from rcl_interfaces.srv import ListParameters
+from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from autograder.checks.expect.expectations import Noun
 from autograder.checks.settling import shows_all
 from autograder.diagnosis.inside import read
-from autograder.graph.services import ServiceMissing, call_all
+from autograder.graph.names import UNKNOWN_NODE, node_of
+from autograder.graph.services import ask_nodes
 from autograder.sandbox.inside.probe.events import Event, NodeSeen, ProbeFailed
 
 _ANSWERS_WITHIN = 3.0
 """Seconds in which a node answers that spins: callbacks of a second may run before it gets to the question."""
 MATCHES_WITHIN = 1.0
 """Seconds to wait for the check's recordings before it sends something that may be answered at once."""
+
+NAMED_WITHIN = 10.0
+"""Seconds that the word of which node an endpoint belongs to may be under way; what is lost is sent again after 3."""
 
 _ASKED = 16
 """So many nodes are asked at the most: a program may make any number of them."""
@@ -25,8 +28,8 @@ _ASKED = 16
 class Discovery(Noun):
     """The discovery between the nodes and the observer."""
 
-    def _settle(self, name: str) -> None:
-        """Wait for proof that a node which was just made also lives on: an answer from it.
+    def _settle(self, names: Collection[str]) -> None:
+        """Wait for proof that nodes which were just made also live on: an answer from each of them.
 
         A program that fails a few lines after it made its node shows the node for a moment. Whether the observer sees
         that moment is chance, and a verdict must not depend on it. A node that nobody spins cannot answer; for it a
@@ -35,16 +38,22 @@ class Discovery(Noun):
         The answer also says that the node knows all ends that the observer had when it asked: a program learns of
         them in the order in which they were made, and the question's own end is the last.
         """
-        self._running.met[name] = len(self._observer.recordings())
-        with contextlib.suppress(ServiceMissing):
-            call_all(
-                self._observer,
-                f"{name}/list_parameters",
-                ListParameters,
-                [ListParameters.Request()],
-                _ANSWERS_WITHIN,
-                lambda: self._running.gone_program() is not None,
-            )
+        self._running.met.update(dict.fromkeys(names, len(self._observer.recordings())))
+        ask_nodes(self._observer, names, _ANSWERS_WITHIN, lambda: self._running.gone_program() is not None)
+
+    def _settle_owners(self, ends: Callable[[], list[TopicEndpointInfo]], *, again: bool = True) -> None:
+        """Wait for an answer from each node that has one of these ends.
+
+        Args:
+            ends: returns the ends.
+            again: whether nodes are also asked that have been asked before.
+        """
+        # An endpoint comes to be on the graph before the name of its node does.
+        self._observer.wait(
+            lambda: all(end.node_name != UNKNOWN_NODE for end in ends()), NAMED_WITHIN, self._running.all_ended
+        )
+        owners = {node_of(end) for end in ends() if end.node_name != UNKNOWN_NODE}
+        self._settle(owners - self._running.gone_nodes() - (set() if again else self._running.met.keys()))
 
     def _meet(self, ready: Callable[[], object], within: float) -> None:
         """Wait until everything is heard that is set off by what the check sends next.
@@ -67,11 +76,8 @@ class Discovery(Noun):
         complete = self._all_begun()
         for _ in range(2):  # an answer may come from a program that has made more nodes before it
             self._observer.wait(self._hears_programs, MATCHES_WITHIN)
-            strangers = [
-                name for name in sorted(set(self._observer.nodes())) if self._running.met.get(name, 0) < recorded
-            ]
-            for name in strangers[:_ASKED]:
-                self._settle(name)
+            strangers = {name for name in self._observer.nodes() if self._running.met.get(name, 0) < recorded}
+            self._settle(sorted(strangers - self._running.gone_nodes())[:_ASKED])
         if complete:  # a program that comes up later is asked before what is sent then
             self._running.introduced = (recorded, started)
 

@@ -11,7 +11,7 @@ from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from autograder import diagnosis
 from autograder.checks import outcomes
-from autograder.checks.expect.discovery import Discovery
+from autograder.checks.expect.discovery import NAMED_WITHIN, Discovery
 from autograder.checks.settling import shows_all
 from autograder.diagnosis.names import WRONG_NODE
 from autograder.graph.names import UNKNOWN_NODE, node_of, type_name
@@ -92,8 +92,6 @@ class Ends(Discovery):
 
 _MADE_WITHIN = 2.0
 """Seconds in which what the programs say they made comes to be on the graph."""
-_NAMED_WITHIN = 10.0
-"""Seconds that the word of which node an endpoint belongs to may be under way; what is lost is sent again after 3."""
 _NAMELESS = "a node whose name is not known"
 
 
@@ -107,7 +105,7 @@ class Sources(Ends):
         if not received:
             return
         self._observer.wait(lambda: shows_all(self._observer, self._publishers_made(topic)), _MADE_WITHIN)
-        self._observer.wait(lambda: _NAMELESS not in self._nodes_publishing(topic, msg_type), _NAMED_WITHIN)
+        self._observer.wait(lambda: _NAMELESS not in self._nodes_publishing(topic, msg_type), NAMED_WITHIN)
         owners = self._nodes_publishing(topic, msg_type)
         named = ", ".join(f"{many} of {name}" if many > 1 else name for name, many in sorted(Counter(owners).items()))
         if len(owners) > publishers and not (

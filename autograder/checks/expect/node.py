@@ -68,7 +68,7 @@ class Node(Discovery):
                 observed=", ".join(self._observer.nodes()) or "no node",
                 hint=hint,
             )
-        self._settle(name)
+        self._settle([name])
         if name not in self._observer.nodes() or self._running.gone_program():
             # A program that dies takes its node off the graph first and prints its traceback after that.
             self._observer.wait(self._running.gone_program, SETTLE)

@@ -14,7 +14,6 @@ from autograder.checks.misuse import refuse_other_class
 from autograder.checks.running_launch import RunningLaunch
 from autograder.checks.scoring import asked
 from autograder.checks.waiting import waits_for
-from autograder.graph.names import node_of
 from autograder.graph.publishing import Stream
 
 RELIABLE_DEEP = 1000
@@ -126,5 +125,4 @@ class Publisher(Discovery):
         by answering a question: a program learns of the check's ends in the order in which they were made, and the
         question's own end is the last.
         """
-        for owner in {node_of(end) for end in self._observer.subscriptions(self.name)}:
-            self._settle(owner)
+        self._settle_owners(lambda: self._observer.subscriptions(self.name))

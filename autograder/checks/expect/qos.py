@@ -84,9 +84,7 @@ class Qos(Ends):
 
     def _all_there(self, topic: str, kind: End) -> None:
         """Wait until the constructors of these nodes have ended, because they may still create further endpoints."""
-        for owner in {node_of(end) for end in self._ends(topic, None, kind, "")}:
-            if owner not in self._running.met:
-                self._settle(owner)
+        self._settle_owners(lambda: self._ends(topic, None, kind, ""), again=False)
 
     @waits_for("both ends of `{name}`")
     def expect_match(self, *, within: float = WITHIN, hint: str = "") -> None:

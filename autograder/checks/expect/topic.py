@@ -21,7 +21,6 @@ from autograder.checks.misuse import Misuse, refuse_other_class
 from autograder.checks.running_launch import RunningLaunch
 from autograder.checks.waiting import waits_for
 from autograder.diagnosis.callbacks import MESSAGE_FIELD
-from autograder.graph.names import node_of
 from autograder.graph.recording import Received, Recording, quiet_profile
 from autograder.reasons import Group, Kind, Reason, kind_of_lab
 
@@ -433,8 +432,8 @@ class Topic(Sources):
         topic, msg_type = self.name, self._class
         recording = self._observer.record(topic, msg_type)
         self._observer.wait(self._hears_programs, MATCHES_WITHIN)  # nobody hears what was made a moment ago
-        for node in {node_of(end) for end in self._observer.publishers(topic)}:
-            self._settle(node)  # by its answer it has taken what was sent to it before, too
+        # By its answer, a node has taken what was sent to it before, too.
+        self._settle_owners(lambda: self._observer.publishers(topic))
         begins = time.time() + _UNDER_WAY
 
         def published() -> int:
