@@ -124,14 +124,15 @@ def test_the_nearest_name_is_the_one_that_was_meant(wanted: str, names: list[str
     )
 )
 def test_a_parameter_keeps_its_type_on_the_command_line(value: bool | int | float | str) -> None:
-    context = Context()
-    rclpy.init(args=Program("talker", parameters={"p": value}).arguments(), context=context, domain_id=99)
+    context, domain = Context(), claim_domain()
+    rclpy.init(args=Program("talker", parameters={"p": value}).arguments(), context=context, domain_id=domain.id)
     try:
         node = rclpy.create_node("talker", context=context, automatically_declare_parameters_from_overrides=True)
         read = node.get_parameter("p").value
         node.destroy_node()
     finally:
         context.try_shutdown()
+        domain.release()
     assert type(read) is type(value)
     assert read == value
 

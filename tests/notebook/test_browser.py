@@ -179,6 +179,10 @@ REPORTS = """() => [...document.querySelectorAll('.jp-RenderedHTMLCommon > div')
   };
 })"""
 
+# JupyterLab lays its panels out anew some time after the window has got another width.
+FITS = """width => window.innerWidth === width
+  && [...document.querySelectorAll('.jp-Notebook')].every(one => one.getBoundingClientRect().right <= width)"""
+
 
 def _brightness(colour: str) -> float:
     red, green, blue, *opacity = (float(part) for part in re.findall(r"[\d.]+", colour))
@@ -217,7 +221,7 @@ def test_reports_can_be_read_in_every_theme_and_in_a_narrow_window(
     assert "no cell of the saved notebook begins with" in shown[-1]["output"]
     for width in (1400, 600):
         page.set_viewport_size({"width": width, "height": 1600})
-        page.wait_for_timeout(500)
+        page.wait_for_function(FITS, arg=width)
         _picture(page, f"{name}-{width}")
         reports = page.evaluate(REPORTS)
         assert len(reports) == 3

@@ -49,7 +49,7 @@ def test_the_view_does_not_block_and_leaves_a_picture_with_the_trail(notebook: N
     notebook.run(DRIVER)
     shown = notebook.run(SHOWN)
     assert "A room of 6 m by 4 m with the place parking" in shown.text and "<img alt=" in shown.html, shown
-    driven = notebook.run("robot._running.observer.wait(lambda: robot.car()._record.metres > 0.3, 60)")
+    driven = notebook.run("robot._running.observer.wait(lambda: robot.car()._record.metres > 0.3, 150)")
     assert driven.result == "True"
     ended = notebook.run("robot.stop()")
     assert "update_display_data" in ended.types and "The car drove" in ended.text, ended
@@ -67,7 +67,7 @@ def test_a_button_kills_one_of_two_nodes_of_a_program_while_a_cell_runs(notebook
         1.0, notebook.tell_widget, (comm, {"do": "kill", "name": "/front/driver", "car": 0}, subshell)
     )
     press.start()
-    waits = "import time\nend = time.monotonic() + 60\nfront, rear = (one for _, one in robot._running.programs)\n"
+    waits = "import time\nend = time.monotonic() + 150\nfront, rear = (one for _, one in robot._running.programs)\n"
     waits += "while front.running() and time.monotonic() < end:\n    time.sleep(0.1)\nfront.running(), rear.running()"
     assert notebook.run(waits).result == "(False, True)"
     press.join()
@@ -83,11 +83,12 @@ PRESSED = """view._over.set()  # the view's own thread would take some of the ne
 view._thread.join()
 for name in ("Greet", "Break", "Nothing"):
     view._take({"do": "press", "name": name, "car": 0})
-robot.wait(lambda: news.extend(view._message()["news"]) or {"Greet: hello", "Break: division by zero"} <= set(news), 30)
+said = {"Greet: hello", "Break: division by zero"}
+robot.wait(lambda: news.extend(view._message()["news"]) or said <= set(news), 150)
 """
 SEEN = """scan = LaserScan(angle_increment=0.1, range_max=8.0, ranges=[1.0, float("inf")] * 90)
 sender = robot.publisher("/seen", LaserScan, qos_profile_sensor_data)
-robot.wait(lambda: sender.publish(scan) or view._message()["cars"][0]["rays"], 30)
+robot.wait(lambda: sender.publish(scan) or view._message()["cars"][0]["rays"], 150)
 """
 
 
@@ -100,16 +101,19 @@ def test_a_lab_adds_buttons_and_shows_the_rays_that_a_program_publishes(notebook
 
 
 BRAKED = """import time
-view, marks, end = robot._running.view, [], time.monotonic() + 60
-robot.wait(lambda: robot.car()._record.metres > 0.3, 60)
+view, world, record, marks = robot._running.view, robot._running.world.simulation, robot.car()._record, []
+robot.wait(lambda: record.metres > 0.3, 60)
 view._kill("driver")
-while not marks and time.monotonic() < end:  # `robot.wait` ends when every program has ended
+end = time.monotonic() + 60
+while world.time - world.driven[""].commanded < 1.0 and time.monotonic() < end:  # it brakes after 0.3 s
     time.sleep(0.05)
     marks.extend(view._message()["brakes"])
+marks.extend(view._message()["brakes"])
 again = view._message()["brakes"]
 view._whole = True
 robot.program("driver").restart()
-len(marks), again, view._message()["brakes"] == marks, robot.program("driver")._program.running()
+braked = [[round(one.pose.x, 2), round(one.pose.y, 2)] for one in record.brakes]  # more than once on a busy machine
+marks == braked != [], again, view._message()["brakes"] == braked, robot.program("driver")._program.running()
 """
 
 
@@ -117,13 +121,13 @@ def test_a_mark_is_sent_once_and_a_page_that_begins_to_look_gets_all(notebook: N
     notebook.run(DRIVER)
     notebook.run(SHOWN)
     shown = notebook.run(BRAKED)
-    assert shown.result == "(1, [], True, True)", shown
+    assert shown.result == "(True, [], True, True)", shown
 
 
 def test_topics_that_are_asked_for_are_shown_with_their_last_message(notebook: Notebook) -> None:
     notebook.run(DRIVER)
     notebook.run(TWO_SHOWN)
-    assert notebook.run("robot.topic('/rear/cmd_vel', Twist).listen().wait_for(1, within=60)").result == "True"
+    assert notebook.run("robot.topic('/rear/cmd_vel', Twist).listen().wait_for(1, within=150)").result == "True"
     seen = notebook.run(
         "shown = robot._running.view._message()\n{topic: said for topic, _, said in shown['rates'] if said}"
     )
@@ -217,7 +221,8 @@ def test_a_notebook_saved_while_a_robot_runs_shows_its_picture_in_another_kernel
         page, ran = run_all(window, address, "world")
         assert not any(cell["error"] for cell in ran)
         page.wait_for_selector(".aw-view")
-        assert page.locator("[class^='aw-still-'] img").count() == 1 and page.evaluate(SAVED_LIVE) == ""
+        _until(page, f"() => ({SAVED_LIVE})() === ''")
+        assert page.locator("[class^='aw-still-'] img").count() == 1
         page.keyboard.press("Control+s")
         _until(page, "() => !document.querySelector('.jp-mod-dirty')")
         deadline = time.monotonic() + START_SECONDS

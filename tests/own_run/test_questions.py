@@ -55,7 +55,8 @@ def test_of_real_runs_every_key_is_what_a_replay_of_the_run_shows(lab_name: str)
         assert len(set(question.choices)) == len(question.choices) != 1
     some = chosen(records, "any", 4)
     assert len(some) == 4
-    assert some == chosen(records, "any", 4) != chosen(records, "another", 4)
+    assert some == chosen(records, "any", 4)
+    assert any(chosen(records, str(seed), 4) != some for seed in range(20))  # of a short run two may be the same
     for record, question in some:
         assert question.picture(record).svg.startswith("<svg")
 

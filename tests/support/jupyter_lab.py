@@ -81,6 +81,15 @@ def kernel_is_idle(kernels: list[dict[str, Any]]) -> bool:
     return any(kernel["execution_state"] == "idle" and kernel["connections"] for kernel in kernels)
 
 
+def _wait_for_a_prompt(page: Any, seconds: float) -> None:
+    """Wait until a cell runs or has been run, or a dialog asks something, at most so many seconds."""
+    until = time.monotonic() + seconds
+    while time.monotonic() < until and not page.locator(".jp-Dialog").count():
+        if not all("[ ]" in prompt for prompt in page.evaluate(PROMPTS)):
+            return
+        page.wait_for_timeout(200)
+
+
 def run_all(window: Any, address: str, name: str) -> tuple[Any, list[dict[str, Any]]]:
     """Open a notebook, choose Run > Run All Cells, and give the page and its code cells once the last has been run."""
     page = window.new_page()
@@ -93,6 +102,8 @@ def run_all(window: Any, address: str, name: str) -> tuple[Any, list[dict[str, A
     page.wait_for_selector(".jp-Notebook-ExecutionIndicator[data-status='idle']", timeout=START_SECONDS * 1000)
     deadline = time.monotonic() + RUN_SECONDS
     # What is chosen while JupyterLab still connects to the kernel is not done; a dialog says so, or nothing does.
+    # Cells that are chosen twice run twice, so a busy machine is given longer each time.
+    patience = 2.0
     while all("[ ]" in prompt for prompt in page.evaluate(PROMPTS)):
         assert time.monotonic() < deadline, "Run All Cells runs no cell"
         if page.locator(".jp-Dialog").count():
@@ -100,7 +111,9 @@ def run_all(window: Any, address: str, name: str) -> tuple[Any, list[dict[str, A
         elif kernel_is_idle(kernels(page, address, name)):
             page.click("text=Run >> nth=0")
             page.click("text='Run All Cells'")
-        page.wait_for_timeout(2000)
+            _wait_for_a_prompt(page, patience)
+            patience *= 2
+        page.wait_for_timeout(500)
     while any("*" in prompt or "[ ]" in prompt for prompt in page.evaluate(PROMPTS)):
         assert time.monotonic() < deadline, [c for c in page.evaluate(CELLS) if not re.search(r"\d", c["prompt"])]
         page.wait_for_timeout(500)

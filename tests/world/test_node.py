@@ -21,8 +21,10 @@ from autograder.graph.domains import claim_domain
 from autograder.graph.observer import Observer
 from autograder.sandbox.environment import profile_environment
 from autograder.world import RunningWorld, Simulation, read_room
+from autograder.world.simulation import STEP
 
-WITHIN = 30.0
+WITHIN = 120.0
+"""Far beyond what anything here takes on a busy machine, in seconds."""
 
 
 @pytest.fixture
@@ -60,6 +62,7 @@ def test_a_node_drives_the_car_and_gets_what_its_sensors_measure(observer: Obser
     world = RunningWorld(Simulation(read_room("room")), observer.domain_id)
     try:
         heard: dict[type, list[object]] = {}
+        moving: list[object] = []
         for kind, topic in (
             (Odometry, "/odom"),
             (LaserScan, "/scan"),
@@ -70,16 +73,22 @@ def test_a_node_drives_the_car_and_gets_what_its_sensors_measure(observer: Obser
             observer.node.create_subscription(kind, topic, heard[kind].append, qos_profile_sensor_data)
         commands(observer, "/cmd_vel", 0.4, 0.2)
         assert observer.wait(lambda: all(heard.values()) and world.simulation.records[""].metres > 0.5, WITHIN)
-        assert observer.wait(lambda: heard[Odometry][-1].pose.pose.position.x > 1.2, WITHIN)
-        odometry, scan, image, battery = (heard[kind][-1] for kind in (Odometry, LaserScan, Image, BatteryState))
+
+        def at_speed() -> list[object]:  # a busy machine may be late with a command, and the car brakes meanwhile
+            one = heard[Odometry][-1]
+            return [one] if one.pose.pose.position.x > 1.2 and one.twist.twist.linear.x == pytest.approx(0.4) else []
+
+        assert observer.wait(lambda: moving.extend(at_speed()) or moving, WITHIN)
+        odometry = moving[0]
+        scan, image, battery = (heard[kind][-1] for kind in (LaserScan, Image, BatteryState))
         assert (odometry.header.frame_id, odometry.child_frame_id) == ("odom", "base_link")
-        assert odometry.twist.twist.linear.x == pytest.approx(0.4)
         assert 0 < odometry.pose.pose.orientation.z < 1
         assert scan.header.frame_id == "laser" and len(scan.ranges) == 180
         assert scan.angle_min == pytest.approx(-math.pi) and scan.angle_max == pytest.approx(math.pi * 178 / 180)
         assert (image.height, image.width, image.encoding, len(image.data)) == (48, 64, "rgb8", 64 * 48 * 3)
         assert 0.9 < battery.percentage <= 1.0 and battery.present
-        assert world.nodes[""].counts["cmd_vel"] > 5 and observer.nodes() == ["/car"]
+        assert world.nodes[""].counts["cmd_vel"] > 5
+        assert observer.wait(lambda: observer.nodes() == ["/car"], WITHIN)
     finally:
         world.close()
 
@@ -153,9 +162,8 @@ def test_a_world_that_is_paused_stands_still(observer: Observer) -> None:
     try:
         assert observer.wait(lambda: world.simulation.steps > 3, WITHIN)
         world.paused = True
-        passed: list[float] = []
-        began = time.monotonic()
-        observer.node.create_timer(0.1, lambda: passed.append(time.monotonic() - began))
+        passed: list[float] = []  # in the world's own thread, which may be in the middle of a step now
+        world.nodes[""].node.create_timer(STEP, lambda: passed.append(time.monotonic()))
         assert observer.wait(lambda: len(passed) > 1, WITHIN)
         before = world.simulation.steps
         assert observer.wait(lambda: len(passed) > 5, WITHIN) and world.simulation.steps == before
@@ -193,8 +201,9 @@ def test_a_patient_world_does_not_wait_for_a_program_that_sends_no_numbers(obser
         assert observer.wait(lambda: car.commanded >= 0, WITHIN)
         message.linear.x = math.nan
         observer.node.create_timer(0.05, lambda: publisher.publish(message))
-        commands, steps = world.simulation.records[""].commands, world.simulation.steps
-        assert observer.wait(lambda: world.simulation.steps > steps + 20, WITHIN)
-        assert world.simulation.records[""].commands > commands
+        record, before = world.simulation.records[""], world.simulation.records[""].commands
+        assert observer.wait(lambda: record.commands > before + 5, WITHIN)
+        steps, before = world.simulation.steps, record.commands
+        assert observer.wait(lambda: world.simulation.steps > steps + 20 and record.commands > before, WITHIN)
     finally:
         world.close()
