@@ -91,9 +91,8 @@ class Package:
             yield
         except _Replaced as error:
             current.check.workspace.build_reference(self.name)
-            current.check.findings.references.add(self.name)
-            title = f"A right `{self.name}` stands in for this one, which another check looks at"
-            outcomes.passed(title, observed=str(error))
+            current.check.findings.references[self.name] = str(error)
+            outcomes.passed(f"A right `{self.name}` stands in for this one", observed=str(error))
         finally:
             self._replaceable = False
 
@@ -316,7 +315,7 @@ def _difference(wanted: Mapping[str, str], have: Mapping[str, str]) -> str:
     """What is wrong with the fields of one part; empty if nothing is."""
     for name, kind in wanted.items():
         if name not in have:
-            near = nearest(name, have)
+            near = nearest(name, have.keys() - wanted.keys())
             return f"has no field `{name}`" + (f"; is `{near}` meant to be it?" if near else ".")
         if have[name] != kind:
             return f"has the field `{name}` as `{have[name]}`, not as `{kind}`."

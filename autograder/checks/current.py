@@ -71,8 +71,8 @@ class Findings:
         self.logs: list[NodeLog] = []
         self.varied: list[str] = []
         """The random values that the check drew."""
-        self.references: set[str] = set()
-        """Packages for which, in this check, the lab's own stand in."""
+        self.references: dict[str, str] = {}
+        """Packages for which, in this check, the lab's own stand in; each with the reason."""
         self.ranked: Ranked | None = None
         """What counts in the class's table of the best."""
         self.patience = Patience(self.alone)

@@ -46,11 +46,11 @@ WRONG = {
 }
 
 
-def results(files: Mapping[str, str], reference: Mapping[str, str]) -> dict[str, CheckResult]:
+def results(files: Mapping[str, str], reference: Mapping[str, str], counter: str = COUNTER) -> dict[str, CheckResult]:
     set_up = "from autograder.checks import build, launch\nfrom std_msgs.msg import Int64\n"
     cells = [Cell(grade_id=name, points=1, source=source) for name, source in CHECKS.items()]
     what: dict[str, Any] = {
-        "files": {"counter.py": COUNTER, **package("good_interfaces", files)},
+        "files": {"counter.py": counter, **package("good_interfaces", files)},
         "reference": reference,
         "cells": [Cell(grade_id="set_up", source=set_up), *cells],
     }
@@ -69,6 +69,15 @@ def test_a_right_package_stands_in_for_a_wrong_one_in_the_check_that_asks_for_it
     }, found
     told = [one for one in found["the nodes"].outcomes if "stands in" in one.title]
     assert [one.observed for one in told] == [found["the package"].outcomes[0].because]
+
+
+def test_a_program_that_uses_a_wrong_name_is_told_that_it_ran_with_a_right_package() -> None:
+    own = COUNTER.replace("Response(count=7).count", "Response(number=7).number")
+    first = results(WRONG["another name of a field"], package("good_interfaces", INTERFACES), own)[
+        "the nodes"
+    ].first_failure
+    assert first is not None and "number" in first.because, first
+    assert "ran with a right `good_interfaces`" in first.because and "no field `count`" in first.because, first
 
 
 def test_without_a_reference_the_wrong_package_is_the_reason() -> None:
