@@ -21,7 +21,7 @@ from autograder.graph.observer import Observer
 from autograder.graph.patience import Patience
 from autograder.graph.recording import Bag
 from autograder.own_run.record import Record
-from autograder.packages.workspace import SOURCES, Workspace
+from autograder.packages.workspace import INSTALLED, REFERENCE, SOURCES, Workspace
 from autograder.sandbox.build import BuildRun
 from autograder.sandbox.node_sandbox import NodeSandbox
 
@@ -71,6 +71,8 @@ class Findings:
         self.logs: list[NodeLog] = []
         self.varied: list[str] = []
         """The random values that the check drew."""
+        self.references: dict[str, str] = {}
+        """Packages for which, in this check, the lab's own stand in; each with the reason."""
         self.ranked: Ranked | None = None
         """What counts in the class's table of the best."""
         self.patience = Patience(self.alone)
@@ -118,6 +120,7 @@ class CurrentCheck:
         self._folder: Path | None = None
         self._answers: Mapping[str, bool] = {}
         self._built: Mapping[str, BuildRun] = {}
+        self._reference: Mapping[str, str] = {}
         self.isolation = Isolation.NONE
         self.random = random.Random()
         self._sandbox: NodeSandbox | None = None
@@ -134,6 +137,7 @@ class CurrentCheck:
         seed: int,
         answers: Mapping[str, bool] | None = None,
         built: Mapping[str, BuildRun] | None = None,
+        reference: Mapping[str, str] | None = None,
     ) -> None:
         """Set where the programs are and how they are isolated; the grading worker does this once.
 
@@ -143,11 +147,13 @@ class CurrentCheck:
             seed: of all values that vary from run to run.
             answers: the files that are answers, and of each whether its cell is still as students receive it.
             built: what builds of packages came to before, by the digest of what was built.
+            reference: the files of the lab's own packages, which may stand in for the student's.
         """
         self.close()
         self._folder, self.isolation, self.random = folder, isolation, random.Random(seed)
         self._answers = answers or {}
         self._built = built or {}
+        self._reference = reference or {}
 
     def vary_for(self, seed: str) -> None:
         """Draw the varying values for one check, so that they do not depend on which checks ran before."""
@@ -198,8 +204,12 @@ class CurrentCheck:
     def workspace(self) -> Workspace:
         """The packages that the student writes, and what has been built of them."""
         if self._workspace is None:
-            self._workspace = Workspace(self.folder.resolve(), self.isolation, self._built)
+            self._workspace = Workspace(self.folder.resolve(), self.isolation, self._built, self._reference)
         return self._workspace
+
+    def prefix(self, package: str) -> str:
+        """Return where programs find a package, below the folder of the programs."""
+        return f"{REFERENCE if package in self.findings.references else INSTALLED}/{package}"
 
     def use_package(self, name: str) -> None:
         """Note that the check uses the files of a package."""

@@ -30,7 +30,6 @@ from autograder.core.processes import no_threads
 from autograder.graph.domains import claim_domain
 from autograder.graph.observer import ForgedGraph, Observer
 from autograder.launch_files import remove_written
-from autograder.packages.workspace import INSTALLED
 from autograder.reasons import Reason, Refused
 from autograder.sandbox.environment import profile_environment, remove_logs
 from autograder.sandbox.running_programs import RunningPrograms
@@ -183,7 +182,7 @@ class Launch(Ros):
             return
         environment = {"ROS_DOMAIN_ID": str(self._observer.domain_id), **launched.environment, **profile_environment()}
         assert self._group is not None  # begun on entering
-        prefixes = [f"{INSTALLED}/{package}" for package in self._packages]
+        prefixes = [current.check.prefix(package) for package in self._packages]
         program = self._group.start(
             launched.program, words, environment, cores=launched.cores, file=file, prefixes=prefixes,
             assume_success=launched.assume_success,

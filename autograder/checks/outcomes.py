@@ -206,7 +206,11 @@ def failed_as_a_whole(
 
 
 def _failure(title: str, reason: Reason, expected: str = "", observed: str = "") -> Outcome:
-    return worded(Status.FAILED, title, expected, observed, reason.because, reason.hint, reason.kind.code)
+    because = reason.because
+    if not any(outcome.status is Status.FAILED for outcome in current.check.findings.outcomes):
+        for package, why in current.check.findings.references.items():
+            because += f" The programs ran with a right `{package}`, because the one that was handed in is wrong: {why}"
+    return worded(Status.FAILED, title, expected, observed, because, reason.hint, reason.kind.code)
 
 
 def unknown(title: str, because: str) -> None:

@@ -119,12 +119,14 @@ class Lab:
 
     @cached_property
     def digest(self) -> str:
-        """SHA-256 over what can change a result: the kit, the trusted cells, the given files and the answer cells."""
+        """SHA-256 over what can change a result: the kit, the trusted cells, the given files, the answer cells and the
+        reference packages."""
         parts = [
             kit_digest(),
             [cell.model_dump(exclude={"title"}) for cell in self.cells],
             sorted(self.given.items()),
             [[answer.grade_id, answer.blank] for answer in self.answers.values()],
+            sorted(self.reference.items()),
         ]
         return hashlib.sha256(json.dumps(parts).encode()).hexdigest()
 
@@ -132,6 +134,15 @@ class Lab:
     def source_digest(self) -> str:
         """SHA-256 over the lab's whole notebook, which the gradebook and the feedback depend on."""
         return hashlib.sha256(json.dumps(self.raw).encode()).hexdigest()
+
+    @cached_property
+    def reference(self) -> dict[str, str]:
+        """The files of the solution's packages of interfaces, by file name. A student's copy has none of them."""
+        solved = self.files_with({name: answer.solution for name, answer in self.answers.items()})
+        if solved == self.files_with({name: answer.blank for name, answer in self.answers.items()}):
+            return {}
+        folders = {name.removesuffix("CMakeLists.txt") for name in solved if name.endswith("/CMakeLists.txt")}
+        return {name: text for name, text in solved.items() if any(map(name.startswith, folders))}
 
     def files_with(self, sources: Mapping[str, str]) -> dict[str, str]:
         """Return the files of a submission by name: the lab's own files and those of the answers.

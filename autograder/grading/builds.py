@@ -48,7 +48,7 @@ _lock = threading.Lock()
 
 
 def with_interfaces(job: Job, at_once: int, stop: threading.Event | None = None) -> Job:
-    """Return the job with its packages of interfaces built.
+    """Return the job with its packages of interfaces built, those of the reference included.
 
     If this machine lacks the tools to build packages, return the job unchanged; its checks then report that.
 
@@ -63,7 +63,7 @@ def with_interfaces(job: Job, at_once: int, stop: threading.Event | None = None)
     packages = job.interfaces
     if not packages or missing_tools():
         return job
-    all_sources = [Sources(package=name, files=files, isolation=job.isolation) for name, files in packages.items()]
+    all_sources = [Sources(package=name, files=files, isolation=job.isolation) for name, files in packages]
     with ThreadPoolExecutor(at_once, thread_name_prefix="build") as pool:
         runs = pool.map(lambda sources: (sources.digest, _build(sources, stop)), all_sources)
         # If there is no result, the worker builds the package again and reports what happens.

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from pydantic import BaseModel, ConfigDict, Field
 
 from autograder.core.results import CheckResult, Isolation, Outcome, SubmissionResult
@@ -24,6 +26,15 @@ MOST_PACKAGES = 3
 """The number of packages of a submission for which the time limit is extended."""
 
 
+def _packages_of_interfaces(files: Mapping[str, str]) -> dict[str, dict[str, str]]:
+    found: dict[str, dict[str, str]] = {}
+    for name, text in files.items():
+        folder, _, path = name.removeprefix(f"{SOURCES}/").partition("/")
+        if f"{SOURCES}/{folder}/CMakeLists.txt" in files and f"{SOURCES}/{folder}/{path}" == name:
+            found.setdefault(folder, {})[path] = text
+    return found
+
+
 class Job(BaseModel):
     """Everything that the worker may know about a submission. It has no other input."""
 
@@ -39,6 +50,9 @@ class Job(BaseModel):
     """The text of the files that the `%%node` and `%%file` cells hold, by file name, such as `talker.py`."""
     answers: dict[str, bool] = Field(default_factory=dict)
     """For each file that is an answer, whether its cell is still as students receive it."""
+    reference: dict[str, str] = Field(default_factory=dict)
+    """The text of the files of the lab's own packages of interfaces, by file name. In a check of another answer, such a
+    package stands in for a wrong one of the student."""
     cells: list[Cell]
     built: dict[str, BuildRun] = Field(default_factory=dict)
     """Results of builds of the packages from before the worker started, by the digest of the package."""
@@ -57,19 +71,20 @@ class Job(BaseModel):
         return BUILD_SECONDS * min(len(packages), MOST_PACKAGES)
 
     @property
-    def interfaces(self) -> dict[str, dict[str, str]]:
-        """The files of each package of interfaces that a trusted cell mentions, by package and path in the package."""
-        found: dict[str, dict[str, str]] = {}
-        for name, text in self.files.items():
-            folder, _, path = name.removeprefix(f"{SOURCES}/").partition("/")
-            if f"{SOURCES}/{folder}/CMakeLists.txt" in self.files and f"{SOURCES}/{folder}/{path}" == name:
-                found.setdefault(folder, {})[path] = text
-        return {package: files for package, files in found.items() if any(package in c.source for c in self.cells)}
+    def interfaces(self) -> list[tuple[str, dict[str, str]]]:
+        """The packages of interfaces that a trusted cell mentions: their names, and their files by path in the package.
+
+        They are those of the student and those of the lab's reference.
+        """
+        found = [
+            package for files in (self.files, self.reference) for package in _packages_of_interfaces(files).items()
+        ]
+        return [(name, files) for name, files in found if any(name in cell.source for cell in self.cells)]
 
     def uses_interfaces(self, cell: Cell) -> bool:
         """Whether a check, or a cell that runs before all checks, mentions a package of interfaces."""
         seen = [cell, *(one for one in self.cells if one.points is None)]
-        return any(package in one.source for package in self.interfaces for one in seen)
+        return any(package in one.source for package, _ in self.interfaces for one in seen)
 
     @property
     def checks(self) -> list[Cell]:

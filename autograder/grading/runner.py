@@ -132,6 +132,7 @@ def job_of(submission: Submission, student: str, lab: Lab, settings: Settings) -
             for answer in lab.answers.values()
             if answer.file is not None
         },
+        reference=lab.reference,
         cells=list(lab.cells),
         problems=submission.problems,
     )

@@ -52,7 +52,7 @@ def run_job(job: Job, folder: Path, stacks: TextIO = sys.stderr) -> Iterator[Che
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         (folder / name).write_text(text, encoding="utf-8")
     current.check.findings.alone = job.alone
-    current.check.configure(folder, job.isolation, job.seed, job.answers, job.built)
+    current.check.configure(folder, job.isolation, job.seed, job.answers, job.built, job.reference)
     if job.files:
         _ = current.check.sandbox  # the sandbox starts while the set-up cells import their messages
     namespace: dict[str, Any] = {"__name__": "check_cells"}

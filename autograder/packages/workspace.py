@@ -13,8 +13,9 @@ from autograder.core.results import Isolation
 from autograder.packages.built import Built
 from autograder.packages.fair_build import build
 from autograder.sandbox.build import BuildRun
+from autograder.sandbox.scratch import Scratch
 
-SOURCES, INSTALLED = "src", "install"
+SOURCES, INSTALLED, REFERENCE = "src", "install", "reference"
 INSTALL = "Debian, Ubuntu: sudo apt-get install g++ cmake make python3-dev"
 """How to install the tools that build interfaces."""
 
@@ -26,11 +27,19 @@ class Workspace:
         folder: the folder that contains `src`.
         isolation: the isolation of builds, because the packages' build files run the student's code.
         known: the results of earlier builds, by the `digest_of` the package that was built.
+        reference: the text of the files of the lab's own packages, by path in `folder`. They are never written there.
     """
 
-    def __init__(self, folder: Path, isolation: Isolation, known: Mapping[str, BuildRun] | None = None) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        isolation: Isolation,
+        known: Mapping[str, BuildRun] | None = None,
+        reference: Mapping[str, str] | None = None,
+    ) -> None:
         """Begin with nothing installed."""
         self._known = known or {}
+        self._reference = reference or {}
         self._folder = folder
         self._isolation = isolation
         self._built: dict[str, tuple[str, Built]] = {}
@@ -56,13 +65,36 @@ class Workspace:
         known, built = self._built.get(package, ("", None))
         if built is None or known != digest:
             run = self._known.get(digest) or build(self._folder / SOURCES, package, self._isolation)
-            built = self._install(package, run)
+            built = self._install(package, run, INSTALLED)
             self._built[package] = (digest, built)
         return built
 
-    def _install(self, package: str, run: BuildRun) -> Built:
+    def has_reference(self, package: str) -> bool:
+        """Whether the lab's own package of this name is known here."""
+        return any(name.startswith(f"{SOURCES}/{package}/") for name in self._reference)
+
+    def build_reference(self, package: str) -> None:
+        """Build the lab's own package of this name, and install it in `reference`, beside what the student installs.
+
+        Raises:
+            KitError: this machine cannot build it.
+            OSError: the installed files cannot be written.
+        """
+        prefix = f"{SOURCES}/{package}/"
+        texts = {name.removeprefix(prefix): text for name, text in self._reference.items() if name.startswith(prefix)}
+        run = self._known.get(digest_of(package, {path: text.encode() for path, text in texts.items()}))
+        if run is None:
+            with Scratch() as scratch:
+                scratch.chmod(0o755)  # the sandbox runs as another user
+                write_files(scratch / package, texts)
+                run = build(scratch, package, self._isolation)
+        if run.status != 0:
+            raise KitError(f"The lab's own `{package}` cannot be built.", "Repair the solution of the lab.")
+        self._install(package, run, REFERENCE)
+
+    def _install(self, package: str, run: BuildRun, into: str) -> Built:
         """Write the files that a build has installed, in place of those of an earlier build."""
-        place = self._folder / INSTALLED / package
+        place = self._folder / into / package
         shutil.rmtree(place, ignore_errors=True)
         prefix = f"{package}/"
         installed = {path.removeprefix(prefix): data for path, data in run.installed.items() if path.startswith(prefix)}
@@ -70,6 +102,13 @@ class Workspace:
             (place / path).parent.mkdir(parents=True, exist_ok=True)
             (place / path).write_bytes(content)
         return Built(package, run.status, run.log, run.over, frozenset(installed), place)
+
+
+def write_files(folder: Path, texts: Mapping[str, str]) -> None:
+    """Write the files of a package, given as texts by their paths in the package."""
+    for path, text in texts.items():
+        (folder / path).parent.mkdir(parents=True, exist_ok=True)
+        (folder / path).write_text(text, encoding="utf-8")
 
 
 def missing_tools() -> list[str]:
