@@ -1,4 +1,8 @@
-"""A bank of past terms: anonymous answers with their final points, which today's kit and lab must still give.
+"""A bank of past terms: anonymous answers with their verdicts, which today's kit and lab must still give.
+
+A verdict is the final points of a check, and, if nobody changed these points by hand, the points of its parts, the
+reasons for which points were lost, and how many expectations held. Points alone would hide a check that takes points
+off for the wrong reason, or that no longer looks at something.
 
 Only programs and files are kept, without the names of students and without answers in words. A difference is either a
 mistake in today's check, or a mistake of the past that somebody explains. A lab is not released before that.
@@ -17,10 +21,11 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 
 from autograder.core.errors import KitError
 from autograder.core.files import write_beside
-from autograder.core.results import SubmissionResult
+from autograder.core.results import CheckResult, Part, Status, SubmissionResult
 from autograder.course.lab import Lab, load_lab
 from autograder.course.paths import CoursePaths
 from autograder.gradebook.grades import read_grades
+from autograder.grading.class_runner import run_jobs
 from autograder.grading.executors.local import Local
 from autograder.grading.runner import Settings, job_of
 from autograder.grading.store import ResultStore
@@ -32,11 +37,31 @@ class _Model(BaseModel):
     model_config = ConfigDict(extra="forbid")
 
 
-class Explained(_Model):
-    """Why a check gives other points today."""
+class Verdict(_Model):
+    """What a check says about an entry, without the sentences for the student."""
 
     points: float | None
-    """The points that it gives today."""
+    parts: list[Part] | None = None
+    """The parts with their titles and points; None if only the points are known or decided."""
+    codes: dict[str, str] | None = None
+    """The code of the first failure in each part, by the part's title; None as above."""
+    expectations: dict[str, int] | None = None
+    """How many expectations hold in each part that has all of its points, by the part's title; None as above. An answer
+    that is right shows by this that a check no longer looks at something."""
+
+    def is_covered_by(self, known: Verdict) -> bool:
+        """Return whether all that is known about the verdict of the past holds for this one as well."""
+        return (
+            known.points == self.points
+            and (known.parts is None or known.parts == self.parts)
+            and (known.codes is None or known.codes == self.codes)
+            and (known.expectations is None or known.expectations == self.expectations)
+        )
+
+
+class Explained(Verdict):
+    """A verdict of today that differs from the past, and why it is right."""
+
     because: str
 
 
@@ -49,8 +74,60 @@ class Banked(_Model):
     """The files of cells that the student added."""
     points: dict[str, float | None]
     """The final points of each check, with what people decided, by grade_id."""
+    verdicts: dict[str, Verdict] = {}
+    """The verdicts of the checks whose points nobody changed, by grade_id."""
     explained: dict[str, Explained] = {}
     """Differences that somebody has explained, by grade_id."""
+
+    def verdict(self, check: str) -> Verdict:
+        """Return what is known about the verdict of a check."""
+        return self.verdicts.get(check, Verdict(points=self.points[check]))
+
+
+class Difference(_Model):
+    """A check that says something else than in the past."""
+
+    entry: str
+    check: str
+    before: Verdict
+    now: Verdict
+    because: str
+    """The first reason that the check gives today; empty if it passes."""
+
+    @property
+    def changes(self) -> list[str]:
+        """What is different, in a few words each."""
+        before, now, found = self.before, self.now, []
+        if before.points != now.points:
+            found.append(f"{_number(before.points)} → {_number(now.points)}")
+        if before.parts is not None and now.parts is not None:
+            old, new = ({part.title: part for part in one} for one in (before.parts, now.parts))
+            found += [f"part `{title}` is gone" for title in old if title not in new]
+            found += [f"part `{title}` is new" for title in new if title not in old]
+            found += [
+                f"part `{title}` {_of(old[title])} → {_of(part)}"
+                for title, part in new.items()
+                if title in old and old[title] != part
+            ]
+        if before.codes is not None and now.codes is not None:
+            for part in dict.fromkeys([*before.codes, *now.codes]):
+                reasons = [f"`{codes[part]}`" if part in codes else "no reason" for codes in (before.codes, now.codes)]
+                where = f" of part `{part}`" if part else ""
+                if reasons[0] != reasons[1]:
+                    found.append(f"reason{where} {reasons[0]} → {reasons[1]}")
+        if before.expectations is not None and now.expectations is not None:
+            for part, number in before.expectations.items():
+                where = f" of part `{part}`" if part else ""
+                if now.expectations.get(part, number) != number:
+                    found.append(f"expectations{where} {number} → {now.expectations[part]}")
+        return found
+
+
+class _Stamp(_Model):
+    """With which version the bank was run, and what it found that nobody has explained."""
+
+    state: str
+    differences: list[Difference]
 
 
 @dataclass(frozen=True)
@@ -66,18 +143,6 @@ class Compared:
     """The checks that no entry has final points for, so that the bank says nothing about them."""
 
 
-@dataclass(frozen=True)
-class Difference:
-    """A check that gives other points than in the past."""
-
-    entry: str
-    check: str
-    before: float | None
-    now: float | None
-    because: str
-    """The first reason that the check gives today; empty if it passes."""
-
-
 def add(root: Path, lab_name: str) -> tuple[int, int]:
     """Add the graded class of a lab to the bank.
 
@@ -89,12 +154,12 @@ def add(root: Path, lab_name: str) -> tuple[int, int]:
     """
     lab, paths = load_lab(root, lab_name), CoursePaths(root)
     grades = {grade.student: grade for grade in read_grades(root, lab_name)}
-    students = [result.student for result in ResultStore(root).all(lab_name) if result.student in grades]
-    if not students:
+    results = {one.student: one for one in ResultStore(root).all(lab_name) if one.student in grades}
+    if not results:
         raise KitError(f"There are no grades of {lab_name}.", f"Grade a class first: autograder grade {lab_name}")
     new = 0
     checks = {cell.grade_id for cell in lab.checks}
-    for student in students:
+    for student, result in results.items():
         submission = read_submission(paths.submitted_notebook(student, lab_name), lab)
         if not submission.readable:
             continue
@@ -103,12 +168,15 @@ def add(root: Path, lab_name: str) -> tuple[int, int]:
         take_files(lab, of_answers)
         own = {name: text for name, text in submission.files.items() if name not in of_answers.files}
         points = {cell.grade_id: cell.points for cell in grades[student].cells if cell.grade_id in checks}
+        given = {one.grade_id: verdict(one) for one in result.checks}
+        verdicts = {name: one for name, one in given.items() if one.points == points.get(name)}
         name = hashlib.sha256(json.dumps([sources, sorted(own.items())]).encode()).hexdigest()[:12]
         path = paths.bank(lab_name) / f"{name}.json"
         if not path.is_file():
             new += 1
-            write_beside(path, Banked(sources=sources, own=own, points=points).model_dump_json(indent=1) + "\n")
-    return new, len(students) - new
+            banked = Banked(sources=sources, own=own, points=points, verdicts=verdicts)
+            write_beside(path, banked.model_dump_json(indent=1) + "\n")
+    return new, len(results) - new
 
 
 def check(root: Path, lab_name: str, settings: Settings) -> Compared:
@@ -125,15 +193,15 @@ def check(root: Path, lab_name: str, settings: Settings) -> Compared:
     lab, entries = load_lab(root, lab_name), _entries(root, lab_name)
     jobs = [job_of(_submission(entry, lab), name, lab, settings) for name, entry in entries.items()]
     found: list[Difference] = []
-    with closing(Local(settings.at_once).run(jobs, lambda _: None)) as ran:
+    with closing(run_jobs(Local(settings.at_once), jobs)) as ran:
         for result in ran:
-            found += _differences(result.student, entries[result.student], result)
-    stamp = {"state": _state(root, lab), "unexplained": len(found)}
-    write_beside(CoursePaths(root).bank_checked(lab_name), json.dumps(stamp) + "\n")
+            found += differences(result.student, entries[result.student], result)
+    found.sort(key=lambda one: (one.check, one.entry))
+    _write_stamp(root, lab, found)
     points = {cell.grade_id: [entry.points.get(cell.grade_id) for entry in entries.values()] for cell in lab.checks}
     return Compared(
         entries=len(entries),
-        differences=sorted(found, key=lambda one: (one.check, one.entry)),
+        differences=found,
         never_decided=dict(
             Counter(name for one in entries.values() for name, got in one.points.items() if got is None)
         ),
@@ -141,12 +209,39 @@ def check(root: Path, lab_name: str, settings: Settings) -> Compared:
     )
 
 
-def explain(root: Path, lab_name: str, difference: Difference, because: str) -> None:
-    """Record why an entry's check gives other points today."""
-    entry = _entries(root, lab_name)[difference.entry]
-    known = entry.explained | {difference.check: Explained(points=difference.now, because=because)}
-    path = CoursePaths(root).bank(lab_name) / f"{difference.entry}.json"
-    write_beside(path, entry.model_copy(update={"explained": known}).model_dump_json(indent=1) + "\n")
+def explain(root: Path, lab_name: str, entry: str, check_id: str, because: str) -> int:
+    """Record why a check says something else today, as the last run of the bank has found.
+
+    Args:
+        root: the course's folder.
+        lab_name: the lab.
+        entry: the entry; `all` for all entries in which the check differs.
+        check_id: the check.
+        because: the reason.
+
+    Returns:
+        The number of differences that are explained now.
+
+    Raises:
+        KitError: the last run found no such difference, or an entry cannot be read.
+    """
+    lab, stamp, entries = load_lab(root, lab_name), _read_stamp(root, lab_name), _entries(root, lab_name)
+    found = stamp.differences if stamp is not None else []
+    meant = [one for one in found if one.check == check_id and entry in (one.entry, "all") and one.entry in entries]
+    if not meant:
+        raise KitError(
+            f"The last `autograder bank check {lab_name}` found no difference of {check_id} in {entry!r}.",
+            f"Run it, and name an entry that it lists, or `all`: autograder bank check {lab_name}",
+        )
+    of_today = stamp is not None and stamp.state == _state(root, lab)
+    for one in meant:
+        banked = entries[one.entry]
+        known = banked.explained | {check_id: Explained(**one.now.model_dump(), because=because)}
+        path = CoursePaths(root).bank(lab_name) / f"{one.entry}.json"
+        write_beside(path, banked.model_copy(update={"explained": known}).model_dump_json(indent=1) + "\n")
+    if of_today:  # nothing but the explanations has changed, so nothing needs to run again
+        _write_stamp(root, lab, [one for one in found if one not in meant])
+    return len(meant)
 
 
 def refuse_unexplained(root: Path, lab: Lab) -> None:
@@ -159,15 +254,24 @@ def refuse_unexplained(root: Path, lab: Lab) -> None:
     if not any(paths.bank(lab.name).glob("*.json")):
         return
     again = f"Run: autograder bank check {lab.name}"
-    try:
-        stamp = json.loads(paths.bank_checked(lab.name).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        stamp = {}
-    if stamp.get("state") != _state(root, lab):
+    stamp = _read_stamp(root, lab.name)
+    if stamp is None or stamp.state != _state(root, lab):
         raise KitError(f"{lab.name} is not released: the bank of past terms was not run with today's version.", again)
-    if stamp["unexplained"]:
-        differ = "1 difference is" if stamp["unexplained"] == 1 else f"{stamp['unexplained']} differences are"
+    if stamp.differences:
+        differ = "1 difference is" if len(stamp.differences) == 1 else f"{len(stamp.differences)} differences are"
         raise KitError(f"{lab.name} is not released: {differ} unexplained in the bank of past terms.", again)
+
+
+def _read_stamp(root: Path, lab: str) -> _Stamp | None:
+    try:
+        return _Stamp.model_validate_json(CoursePaths(root).bank_checked(lab).read_bytes())
+    except (OSError, ValidationError):
+        return None  # it never ran, or another version of the kit wrote this
+
+
+def _write_stamp(root: Path, lab: Lab, found: list[Difference]) -> None:
+    stamp = _Stamp(state=_state(root, lab), differences=found)
+    write_beside(CoursePaths(root).bank_checked(lab.name), stamp.model_dump_json(indent=1) + "\n")
 
 
 def _state(root: Path, lab: Lab) -> str:
@@ -195,16 +299,37 @@ def _submission(entry: Banked, lab: Lab) -> Submission:
     return submission
 
 
-def _differences(name: str, entry: Banked, result: SubmissionResult) -> list[Difference]:
+def verdict(check: CheckResult) -> Verdict:
+    """Return what a check says about an entry, without the sentences."""
+    codes: dict[str, str] = {}
+    for one in check.outcomes:
+        if one.status in (Status.FAILED, Status.UNKNOWN):
+            codes.setdefault(one.part, one.code)
+    whole = {part.title for part in check.parts if part.points == part.max_points}
+    whole |= {""} if check.points == check.max_points else set()
+    held = Counter(one.part for one in check.outcomes if one.status is Status.PASSED and one.part in whole)
+    return Verdict(points=check.points, parts=check.parts, codes=codes, expectations=dict(held))
+
+
+def differences(name: str, entry: Banked, result: SubmissionResult) -> list[Difference]:
+    """Return the checks that say something else about an entry than in the past, without those that are explained."""
     found = []
     today = {one.grade_id: one for one in result.checks}
-    for check_id, before in entry.points.items():
-        one, known = today.get(check_id), entry.explained.get(check_id)
-        now = one.points if one is not None else None
-        if before is None or now == before or (known is not None and known.points == now):
+    for check_id, points in entry.points.items():
+        one, before, known = today.get(check_id), entry.verdict(check_id), entry.explained.get(check_id)
+        now = verdict(one) if one is not None else Verdict(points=None)
+        if points is None or now.is_covered_by(before) or (known is not None and now.is_covered_by(known)):
             continue  # nobody had decided, or somebody has explained it
         why = "It gives no result any more."
         if one is not None:
             why = one.first_failure.because if one.first_failure is not None else ""
-        found.append(Difference(name, check_id, before, now, why))
+        found.append(Difference(entry=name, check=check_id, before=before, now=now, because=why))
     return found
+
+
+def _number(points: float | None) -> str:
+    return "?" if points is None else f"{points:g}"
+
+
+def _of(part: Part) -> str:
+    return f"{part.points:g} of {part.max_points:g}"

@@ -56,8 +56,9 @@ def check_bank(
         found = check(root, name, settings)
         for one in found.differences:
             bad += 1
-            points = f"{_number(one.before)} → {_number(one.now)}"
-            print(plain(f"{name} {one.entry} {one.check}: {points}{f': {one.because}' if one.because else ''}"))
+            print(
+                plain(": ".join(filter(None, (f"{name} {one.entry} {one.check}", "; ".join(one.changes), one.because))))
+            )
         print(f"{name}: {_entries(found.entries)}", file=sys.stderr)
         for check_id, times in found.never_decided.items():
             why = "because it had no points when they were added"
@@ -65,7 +66,7 @@ def check_bank(
         for check_id in found.untried:
             print(plain(f"{name} {check_id}: no entry has points of it, so the bank says nothing about this check."))
     if bad:
-        how = "autograder bank explain LAB ENTRY CHECK REASON --points NOW"
+        how = "autograder bank explain LAB ENTRY CHECK REASON"
         print(f"{bad} unexplained. Correct the check, or say why it is right: {how}", file=sys.stderr)
     raise typer.Exit(1 if bad else 0)
 
@@ -73,27 +74,20 @@ def check_bank(
 @bank.command("explain")
 def explain_difference(
     lab: LabArgument,
-    entry: Annotated[str, typer.Argument(help="The entry, as `bank check` names it.")],
+    entry: Annotated[
+        str, typer.Argument(help="The entry, as `bank check` lists it; `all` for all entries in its list.")
+    ],
     check: Annotated[str, typer.Argument(help="The check, by its id.")],
-    reason: Annotated[str, typer.Argument(help="Why today's points are right.")],
-    now: Annotated[
-        float | None, typer.Option("--points", help="The points that the check gives today; default: no result.")
-    ] = None,
+    reason: Annotated[str, typer.Argument(help="Why today's verdict is right.")],
     course: CourseOption = None,
 ) -> None:
-    """Record why today's points of an entry are right. `bank check` lists the entry again if they change once more."""
-    from autograder.authoring.bank import Difference, explain
-    from autograder.course.paths import CoursePaths, course_root
+    """Record why today's verdict is right. `bank check` lists the entry again if its verdict changes once more."""
+    from autograder.authoring.bank import explain
+    from autograder.course.paths import course_root
+    from autograder.intake.words import count
 
-    root = course_root(course)
-    if not (CoursePaths(root).bank(lab) / f"{entry}.json").is_file():
-        raise KitError(f"The bank of {lab} has no entry {entry!r}.", "`autograder bank check` lists the entries.")
-    explain(root, lab, Difference(entry, check, None, now, ""), reason)
+    print(f"Explained {count(explain(course_root(course), lab, entry, check, reason), 'difference')}.")
 
 
 def _entries(number: int) -> str:
     return f"{number} {'entry' if number == 1 else 'entries'}"
-
-
-def _number(points: float | None) -> str:
-    return "?" if points is None else f"{points:g}"

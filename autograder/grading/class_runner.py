@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Generator, Mapping, Sequence
 from contextlib import closing
 from pathlib import Path
+from types import MappingProxyType
 
 from autograder.core.results import SubmissionResult
 from autograder.course.lab import Lab
@@ -63,8 +64,17 @@ def run_class(
         results[student] = told.without_pictures()
         on_result(told)
     mixed = canaries.among(jobs) if canaries is not None and stores.watched(jobs) else list(jobs.values())
+
+    def started(name: str) -> None:
+        if name in jobs:  # not a canary
+            on_start(name)
+
+    def keep(result: SubmissionResult) -> None:
+        if result.student in jobs:
+            stores.first.save(result)
+
     try:
-        with closing(_believed(executor, mixed, jobs, stores, on_start)) as ran:
+        with closing(run_jobs(executor, mixed, started, stores.first_results(mixed), keep)) as ran:
             for result in ran:
                 if canaries is not None and result.student not in jobs:
                     canaries.take(result)
@@ -96,25 +106,26 @@ def _without_running(student: str, path: Path, lab: Lab, settings: Settings, sto
     return result
 
 
-def _believed(
+def run_jobs(
     executor: executors.Executor,
     jobs: Sequence[Job],
-    students: Collection[str],
-    stores: _Stores,
-    on_start: Callable[[str], None],
+    started: Callable[[str], None] = lambda _: None,
+    first: Mapping[str, SubmissionResult] = MappingProxyType({}),
+    keep: Callable[[SubmissionResult], None] = lambda _: None,
 ) -> Generator[SubmissionResult]:
     """Run jobs, and yield the part of each result that can be trusted, because a result may come from another machine.
 
     Checks whose programs were kept from the CPUs by other processes are run again, alone, after all jobs have run.
-    Their first results are stored until then, so that an interrupted run does not lose them.
+
+    Args:
+        executor: runs the jobs.
+        jobs: the jobs.
+        started: a function that is called in any thread with the student of each job that starts to run.
+        first: by student, first results with checks that must be run again, from an interrupted run.
+        keep: a function that is called with each such first result, so that an interrupted run does not lose it.
     """
-
-    def started(name: str) -> None:
-        if name in students:
-            on_start(name)
-
     by_student = {job.student: job for job in jobs}
-    to_run_again = {job.student: first for job in jobs if (first := stores.first_result(job)) is not None}
+    to_run_again = dict(first)
     with closing(executor.run([job for job in jobs if job.student not in to_run_again], started)) as ran:
         for result in ran:
             job = by_student[result.student]
@@ -123,14 +134,13 @@ def _believed(
                 yield believed
                 continue
             to_run_again[job.student] = believed
-            if job.student in students:
-                stores.first.save(believed)
-    for student, first in to_run_again.items():
-        again = trusted_result.open_checks(by_student[student], first)
+            keep(believed)
+    for student, before in to_run_again.items():
+        again = trusted_result.open_checks(by_student[student], before)
         assert again is not None
         with closing(executor.run([again], started)) as ran:
             for result in ran:
-                yield trusted_result.settled(again, first, validated(result, again.checks))
+                yield trusted_result.settled(again, before, validated(result, again.checks))
 
 
 class _Stores:
@@ -172,18 +182,18 @@ class _Stores:
             self._apart.move(lab.name, student, self._counting)
         return result
 
-    def first_result(self, job: Job) -> SubmissionResult | None:
-        """Return the first result of a job if a run was interrupted before it ran the job's open checks again."""
-        settings = self._settings
-        result = self.first.fitting(self._lab, job.student, job.digest, settings.isolation, settings.seed)
-        if (
-            result is None
-            or settings.force
-            or lacks_a_result(result)
-            or trusted_result.open_checks(job, result) is None
-        ):
-            return None
-        return result
+    def first_results(self, jobs: Sequence[Job]) -> dict[str, SubmissionResult]:
+        """Return the first results, by student, if a run was interrupted before it ran their open checks again."""
+        lab, settings, found = self._lab, self._settings, {}
+        for job in jobs if not settings.force else ():
+            result = self.first.fitting(lab, job.student, job.digest, settings.isolation, settings.seed)
+            if (
+                result is not None
+                and not lacks_a_result(result)
+                and trusted_result.open_checks(job, result) is not None
+            ):
+                found[job.student] = result
+        return found
 
     def save(self, result: SubmissionResult) -> None:
         """Store a result of this run."""
