@@ -45,7 +45,7 @@ class Grade:
             return ""
         top = round(sum(cell.max_points for cell in self.waiting), 2)
         which = "1 answer is" if len(self.waiting) == 1 else f"{len(self.waiting)} answers are"
-        return f"{which} not graded yet, which can still give up to {top:g} points."
+        return f"{which} not graded yet, which can still give up to {top:g} point{'s' * (top != 1)}."
 
     @property
     def stale(self) -> list[CellGrade]:

@@ -124,4 +124,4 @@ def _give(root: Path, student: str, lab: Lab, check: str, points: float | None) 
             raise KitError(f"{check} gives 0 to {grade.max_score:g} points, not {given:g}.", "Name other points.")
         grade.manual_score, grade.needs_manual_grade = given, False
         gradebook.db.commit()
-    return f"{student} has {given:g} points for {check} now."
+    return f"{student} has {given:g} point{'s' * (given != 1)} for {check} now."

@@ -59,7 +59,11 @@ def _together(persons: Sequence[_Person]) -> list[dict[str, object]]:
 
 
 def write_class_page(
-    path: Path, entries: Sequence[Entry], written: datetime.date, remarks: Mapping[str, str] | None = None
+    path: Path,
+    entries: Sequence[Entry],
+    written: datetime.date,
+    remarks: Mapping[str, str] | None = None,
+    absent: Sequence[str] = (),
 ) -> Path:
     """Write the page of one lab and return its path.
 
@@ -68,6 +72,7 @@ def write_class_page(
         entries: the lab's submissions.
         written: the date that is shown on the page.
         remarks: a sentence about each student at whose work a person should look, beside the flags of the results.
+        absent: the students of the roster of whom nothing was graded.
     """
     scores = [earned(entry) for entry in entries]
     most = max((top(entry) for entry in entries), default=0.0)
@@ -78,6 +83,7 @@ def write_class_page(
         lab=entries[0].lab,
         written=f"{written.day} {written:%B %Y}",
         count=len(entries),
+        absent=", ".join(absent),
         most_rows=_MOST_ROWS,
         top=points(most),
         mean=points(statistics.fmean(scores)),
@@ -106,6 +112,10 @@ def top(entry: Entry) -> float:
     return entry.result.max_points if entry.grade is None else entry.grade.max_score
 
 
+def _counted(number: float) -> str:
+    return f"{points(number)} point{'s' * (number != 1)}"
+
+
 def _distribution(scores: Sequence[float], top: float) -> list[dict[str, object]]:
     counts = Counter(min(_BINS - 1, int(_BINS * score / top)) if top else 0 for score in scores)
     most = max(counts.values(), default=1)
@@ -125,15 +135,13 @@ def _persons(entries: Sequence[Entry], remarks: Mapping[str, str]) -> list[_Pers
             cell = next((c for c in entry.grade.cells if c.grade_id == check.grade_id), None) if entry.grade else None
             if check.status is Status.UNKNOWN and (cell is None or cell.points is None):
                 why = reason(check.first_failure) if check.first_failure else "The grader could not find out."
-                found.append(
-                    _Person(entry.student, f"{_title(check)}: decide about {points(check.max_points)} points", why)
-                )
+                found.append(_Person(entry.student, f"{_title(check)}: decide about {_counted(check.max_points)}", why))
         for cell in entry.grade.waiting if entry.grade is not None else ():
             if not cell.is_check:
-                what = f"{cell.grade_id}: {points(cell.max_points)} points"
+                what = f"{cell.grade_id}: {_counted(cell.max_points)}"
                 found.append(_Person(entry.student, what, "An answer in words, which nobody has graded yet."))
         for cell in entry.grade.stale if entry.grade is not None else ():
-            what = f"{cell.grade_id}: {points(cell.points or 0.0)} points by hand"
+            what = f"{cell.grade_id}: {_counted(cell.points or 0.0)} by hand"
             found.append(_Person(entry.student, what, "The work has changed since you graded it, so look at it again."))
         flags = [*entry.result.flags, *([remarks[entry.student]] if entry.student in remarks else [])]
         found += [_Person(entry.student, "look at this; the points stay", flag) for flag in flags]

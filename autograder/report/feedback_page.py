@@ -216,7 +216,8 @@ def _graded(cell: CellGrade, check: CheckResult | None, task: Task, decided: Dec
     if cell.is_check and check is None:
         remark = "The report of this check is no longer stored."
     elif cell.is_check and cell.by_hand:
-        remark = f"Your instructor has looked at this check and gives {_number(cell.points or 0.0)} points."
+        given = cell.points or 0.0
+        remark = f"Your instructor has looked at this check and gives {_number(given)} point{'s' * (given != 1)}."
     return _Graded(
         points=_points([cell]),
         verdict="not graded yet" if cell.points is None else look.value,
