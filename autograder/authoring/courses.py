@@ -34,6 +34,7 @@ _IGNORED = """\
 /build/
 /gradebook/
 /bank/
+/roster.csv
 /handed_in/
 /labs/*/nodes/
 /solutions/*/nodes/

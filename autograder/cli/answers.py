@@ -44,6 +44,10 @@ def mark(
     from autograder.gradebook.written_answers import mark as give
 
     root = course_root(course)
-    give(root, load_lab(root, lab), cell, points, students, comment)
+    before = give(root, load_lab(root, lab), cell, points, students, comment)
     renew_pages(root, lab)
-    print(f"{in_points(points)} for {cell}: {', '.join(students)}. Their feedback pages were renewed.")
+    pages = "Their feedback pages were renewed." if len(before) > 1 else "The feedback page was renewed."
+    print(f"{in_points(points)} for {cell}: {', '.join(before)}. {pages}")
+    for student, old in before.items():
+        if old is not None and old != points:
+            print(f"{student} had {old:g} before. `autograder explain {student} --lab {lab}` says who gave them.")

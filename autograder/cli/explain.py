@@ -39,6 +39,7 @@ def explain(
         screen.print(submission_view(result, "instructor", book))
         for path in pictures(result.checks, folder):
             print(path)
+        _in_gradebook(root, result)
         _history(root, result)
         screen.print("To see all evidence and messages of a check, name the check, such as: ", end="")
         screen.print(f"autograder explain {student} 1 --lab {result.lab}", markup=False)
@@ -77,6 +78,19 @@ def pictures(checks: list[CheckResult], folder: Path) -> list[Path]:
             written.append(folder / f"{_name(check)}_{number}.svg")
             write_beside(written[-1], picture.svg)
     return written
+
+
+def _in_gradebook(root: Path, result: SubmissionResult) -> None:
+    """Show the points of the whole submission if they are not those of its checks."""
+    from autograder.gradebook.grades import read_grades
+    from autograder.report.terminal import console
+
+    grade = next((one for one in read_grades(root, result.lab) if one.student == result.student), None)
+    if grade is None or (grade.earned, grade.max_score) == (result.points, result.max_points):
+        return
+    told = f"{grade.earned:g} of {grade.max_score:g} points, with what people and rules about lateness decided"
+    to_grade = f"; {len(grade.waiting)} to grade" if grade.waiting else ""
+    console().print(f"In the gradebook: {told}{to_grade}", markup=False)
 
 
 def _history(root: Path, result: SubmissionResult, check: str = "") -> None:

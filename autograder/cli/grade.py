@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections import Counter
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
@@ -190,6 +191,8 @@ def _show(run: ClassRun, paths: CoursePaths, lab: str, as_json: bool) -> None:
         screen.print(sentence, markup=False)
     for sentence in run.canaries:
         screen.print(sentence, markup=False)
+    for sentence in _to_grade(run, lab):
+        screen.print(sentence, markup=False)
     if any(check.run_again for result in run.results for check in result.checks):
         screen.print(_run_again(run.results))
     screen.print(_time(len(run.results), run.seconds))
@@ -211,6 +214,16 @@ def _by_hand(grade: Grade) -> str:
     parts += [f"{len(cells) - len(given)} to grade"] if len(given) < len(cells) else []
     parts += [f"{len(grade.stale)} to look at again"] if grade.stale else []
     return ", ".join(parts)
+
+
+def _to_grade(run: ClassRun, lab: str) -> list[str]:
+    """Say which answers in words nobody has graded yet, and which command shows them."""
+    cells = [cell.grade_id for grade in run.by_student.values() for cell in grade.waiting if not cell.is_check]
+    return [
+        f"{count} answer{'s' * (count != 1)} to `{cell}` wait{'s' * (count == 1)} for a person:"
+        f" autograder answers {lab} {cell}"
+        for cell, count in Counter(cells).items()
+    ]
 
 
 def _run_again(results: Sequence[SubmissionResult]) -> str:

@@ -26,7 +26,7 @@ def report(course: CourseOption = None) -> None:
 
     from autograder.course.lab import lab_names, load_lab
     from autograder.course.paths import CoursePaths, course_root
-    from autograder.gradebook.grades import class_entries
+    from autograder.gradebook.grades import class_entries, roster_lines
     from autograder.gradebook.renewal import renew_pages
     from autograder.grading.shared_runs import shared_runs
     from autograder.report.class_page import write_class_page
@@ -40,7 +40,8 @@ def report(course: CourseOption = None) -> None:
         of_lab = [entry for entry in entries if entry.lab == lab]
         students = [entry.student for entry in of_lab]
         shared = shared_runs(root, load_lab(root, lab), students) if lab in lab_names(root) else []
-        print(write_class_page(CoursePaths(root).class_page(lab), of_lab, datetime.date.today(), shared))
+        page, absent = CoursePaths(root).class_page(lab), sorted(roster_lines(root).keys() - set(students))
+        print(write_class_page(page, of_lab, datetime.date.today(), shared, absent))
 
 
 @app.command()
@@ -52,7 +53,7 @@ def term(course: CourseOption = None) -> None:
     from autograder.course.paths import CoursePaths, course_root
     from autograder.course.settings import read_settings
     from autograder.gradebook.appeals import waiting
-    from autograder.gradebook.grades import class_entries
+    from autograder.gradebook.grades import class_entries, roster_lines
     from autograder.gradebook.renewal import renew_pages
     from autograder.report.term_page import write_term_page
 
@@ -63,7 +64,8 @@ def term(course: CourseOption = None) -> None:
         raise KitError("There are no results yet.", "Grade a class first: autograder grade LAB")
     page, today = CoursePaths(root).term_page, datetime.date.today()
     appeals, damaged = waiting(root)
-    print(write_term_page(page, settings.title, entries, lab_names(root), settings.weights, appeals, today))
+    labs, roster = lab_names(root), roster_lines(root)
+    print(write_term_page(page, settings.title, entries, labs, settings.weights, appeals, today, roster))
     for sentence in damaged:
         print(sentence, file=sys.stderr)
 
@@ -85,8 +87,9 @@ def export(
     from autograder.core.files import write_beside
     from autograder.course.lab import load_lab
     from autograder.course.paths import course_root
-    from autograder.gradebook.grades import class_entries
+    from autograder.gradebook.grades import class_entries, roster_lines
     from autograder.gradebook.renewal import renew_pages
+    from autograder.report.terminal import plain  # students may have chosen their names themselves
 
     if form not in FORMATS:
         raise KitError(f"There is no format `{form}`.", f"Name one of: {', '.join(FORMATS)}.")
@@ -109,19 +112,23 @@ def export(
     else:
         raise KitError(f"The format `{form}` is a zip file.", "Name a file for it: --output FILE.zip")
     _say(made.left_out, entries)
+    absent = sorted(roster_lines(root).keys() - {entry.student for entry in entries})
+    if absent:
+        print(plain(f"In the roster, but nothing was graded: {', '.join(absent)}."), file=sys.stderr)
     raise typer.Exit(LEFT_OUT if made.left_out else 0)
 
 
 def _say(left_out: list[str], entries: list[Entry]) -> None:
-    from autograder.report.terminal import plain  # students may have chosen their names themselves
+    from autograder.report.terminal import plain
 
     waiting = sum(1 for entry in entries if entry.grade is not None and entry.grade.waiting)
     if waiting:
-        told = f"{waiting} of {len(entries)} submissions have answers that nobody has graded yet"
-        print(f"{told}; those count 0 until then.", file=sys.stderr)
+        where = f"There are some in {waiting} of {len(entries)} submissions."
+        print(f"Answers that nobody has graded yet count 0. {where}", file=sys.stderr)
     stale = sum(1 for entry in entries if entry.grade is not None and entry.grade.stale)
     if stale:
-        print(f"{stale} have points that were given by hand before the work changed.", file=sys.stderr)
+        where = f"{stale} of {len(entries)} submissions"
+        print(f"In {where}, the work has changed since a person gave points. Look at it again.", file=sys.stderr)
     for sentence in left_out:
         print(plain(sentence), file=sys.stderr)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
@@ -88,6 +88,15 @@ def write_grades(root: Path) -> Path:
     return path
 
 
+def roster_lines(root: Path) -> Mapping[str, Mapping[str, str]]:
+    """Return the lines of the course's roster, by student; empty if there is no roster.
+
+    Raises:
+        KitError: the roster cannot be read.
+    """
+    return read_roster(root / FILE_NAME).students if (root / FILE_NAME).is_file() else {}
+
+
 def class_entries(root: Path, lab: str | None = None) -> list[Entry]:
     """Return the submissions of a class, sorted by lab and student.
 
@@ -99,7 +108,7 @@ def class_entries(root: Path, lab: str | None = None) -> list[Entry]:
         KitError: the roster, the record of the class or the gradebook cannot be read.
     """
     paths = CoursePaths(root)
-    roster = read_roster(root / FILE_NAME).students if (root / FILE_NAME).is_file() else {}
+    roster = roster_lines(root)
     grades = {(grade.lab, grade.student): grade for grade in read_grades(root, lab or "")}
     results = ResultStore(root).all(lab)
     classes = {name: read_class(root, name) for name in {result.lab for result in results}}

@@ -45,8 +45,13 @@ def written_answers(root: Path, lab: Lab, cell: str) -> list[WrittenAnswer]:
     return found
 
 
-def mark(root: Path, lab: Lab, cell: str, points: float, students: Sequence[str], comment: str) -> None:
+def mark(
+    root: Path, lab: Lab, cell: str, points: float, students: Sequence[str], comment: str
+) -> dict[str, float | None]:
     """Give the answers of several students to a question the same points and comment, all of them or none.
+
+    Returns the points that each student had before, so that nobody overwrites another person's points unnoticed; None
+    if nobody had graded the answer.
 
     Args:
         root: the course's folder.
@@ -62,7 +67,8 @@ def mark(root: Path, lab: Lab, cell: str, points: float, students: Sequence[str]
     most = question(lab, cell).points or 0.0
     if not 0 <= points <= most:
         raise KitError(f"{cell} gives 0 to {most:g} points, not {points:g}.", "Name other points.")
-    strangers = sorted(set(students) - {answer.student for answer in written_answers(root, lab, cell)})
+    given = {answer.student: answer.grade.points for answer in written_answers(root, lab, cell)}
+    strangers = sorted(set(students) - set(given))
     if strangers:
         raise KitError(f"{', '.join(strangers)} handed in no answer to {cell}. Nobody got points.", "Check the names.")
     with only_one(CoursePaths(root).lock, "A grading"), open_api(root).gradebook as gradebook:
@@ -72,3 +78,4 @@ def mark(root: Path, lab: Lab, cell: str, points: float, students: Sequence[str]
             if comment:
                 gradebook.find_comment(cell, lab.name, lab.name, student).manual_comment = comment
         gradebook.db.commit()
+    return {student: given[student] for student in students}

@@ -109,7 +109,8 @@ def stop(
     raise KitError(
         f"{' '.join(open_ones.values())} The submissions were read as {how}{inside}, with"
         f" {count(len(students), 'student')}. Nothing was graded.",
-        f"Check the submissions and to whom they belong. If all is right, run the command again with {options}.",
+        f"Check the submissions and to whom they belong. If all is right, run the command again with {options};"
+        f" with make, write ARGS='{options}'.",
     )
 
 
@@ -366,7 +367,10 @@ def _handed_in(
         told = f"{chosen.claim.entry.name[:100]!r} of {who!r} counts"
         collected.unused.append(f"{claim.entry.name[:100]!r}, which {trouble} ({told})")
     if chosen.claim.late:
-        collected.notes.append(f"{who}: {reading.format.title} has marked it as late.")
+        collected.notes.append(
+            f"{who}: {reading.format.title} has marked it as late."
+            + ("" if chosen.claim.handed_in else " Its download has no time, so no points are taken for that.")
+        )
     return chosen, notebook
 
 

@@ -61,7 +61,11 @@ def _together(persons: Sequence[_Person]) -> list[dict[str, object]]:
 
 
 def write_class_page(
-    path: Path, entries: Sequence[Entry], written: datetime.date, shared: Sequence[Sequence[str]] = ()
+    path: Path,
+    entries: Sequence[Entry],
+    written: datetime.date,
+    shared: Sequence[Sequence[str]] = (),
+    absent: Sequence[str] = (),
 ) -> Path:
     """Write the page of one lab and return its path.
 
@@ -70,6 +74,7 @@ def write_class_page(
         entries: the lab's submissions.
         written: the date that is shown on the page.
         shared: groups of students who have handed in the same recorded run.
+        absent: the students of the roster of whom nothing was graded.
     """
     scores = [earned(entry) for entry in entries]
     most = max((top(entry) for entry in entries), default=0.0)
@@ -80,6 +85,7 @@ def write_class_page(
         lab=entries[0].lab,
         written=f"{written.day} {written:%B %Y}",
         count=len(entries),
+        absent=", ".join(absent),
         most_rows=_MOST_ROWS,
         top=points(most),
         mean=points(statistics.fmean(scores)),

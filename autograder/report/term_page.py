@@ -35,6 +35,10 @@ _LAST = 2
 """The number of labs, counted from the end, that show who falls behind."""
 
 
+Roster = Mapping[str, Mapping[str, str]]
+"""The lines of a roster, by the students' names in the gradebook."""
+
+
 @dataclass(frozen=True)
 class Appeal:
     """An appeal that waits for an answer."""
@@ -50,10 +54,13 @@ class Appeal:
 class _Term:
     """The submissions of a term by student and lab, and each student's share of the points."""
 
-    def __init__(self, entries: Sequence[Entry], labs: Sequence[str], weights: Mapping[str, float]) -> None:
-        self.by_student: dict[str, dict[str, Entry]] = {}
+    def __init__(
+        self, entries: Sequence[Entry], labs: Sequence[str], weights: Mapping[str, float], roster: Roster
+    ) -> None:
+        self.by_student: dict[str, dict[str, Entry]] = {student: {} for student in roster}
         for entry in entries:
             self.by_student.setdefault(entry.student, {})[entry.lab] = entry
+        self.roster = roster
         graded = {entry.lab for entry in entries}
         self.labs = [lab for lab in labs if lab in graded]
         self.weights = {lab: weights.get(lab, 1.0) for lab in self.labs}
@@ -62,6 +69,15 @@ class _Term:
         """Return the share of a lab's points that a student has; 0 if the student handed in nothing."""
         entry = self.by_student[student].get(lab)
         return earned(entry) / top(entry) if entry is not None and top(entry) else 0.0
+
+    def known(self, student: str) -> dict[str, str]:
+        """Return what the roster and the platforms say about a student, by heading."""
+        lines = [*(entry.known for entry in self.by_student[student].values()), self.roster.get(student, {})]
+        return {key: value for line in lines for key, value in line.items() if value}
+
+    def left(self, student: str) -> bool:
+        """Whether a student is no longer in the roster."""
+        return bool(self.roster) and student not in self.roster
 
     def total(self, student: str) -> float:
         """Return a student's weighted mean of all labs, in percent."""
@@ -77,6 +93,7 @@ def write_term_page(
     weights: Mapping[str, float],
     appeals: Sequence[Appeal],
     written: datetime.date,
+    roster: Roster,
 ) -> Path:
     """Write the page and return its path.
 
@@ -88,8 +105,10 @@ def write_term_page(
         weights: the weight of each lab; a lab that is not listed has the weight 1.
         appeals: the appeals that wait for an answer.
         written: the date that is shown on the page.
+        roster: the lines of the roster by student; empty if the course has none. Its students are on the page even if
+            nothing of theirs was ever graded.
     """
-    term = _Term(entries, labs, weights)
+    term = _Term(entries, labs, weights, roster)
     totals = [term.total(student) for student in term.by_student]
     script = SCRIPT.read_text(encoding="utf-8")
     page = render(
@@ -116,15 +135,18 @@ def _behind(term: _Term) -> list[dict[str, str]]:
     median = statistics.median(means.values())
     found = []
     for student, of_labs in sorted(term.by_student.items()):
-        if last[-1] not in of_labs:
-            why = f"nothing was handed in for {last[-1]}."
+        if not of_labs:
+            why = "nothing was graded in the whole term."
+        elif last[-1] not in of_labs:
+            if term.left(student):
+                continue
+            why = f"nothing was graded for {last[-1]}."
         elif means[student] < median / 2:
             both = " and ".join(last)
             why = f"{100 * means[student]:.0f} % of the points of {both}; the class's median is {100 * median:.0f} %."
         else:
             continue
-        name = next((entry.known["name"] for entry in of_labs.values() if entry.known.get("name")), "")
-        found.append({"student": student, "name": name, "why": why})
+        found.append({"student": student, "name": term.known(student).get("name", ""), "why": why})
     return found
 
 
@@ -162,11 +184,11 @@ def _student(student: str, term: _Term, page: Path) -> dict[str, object]:
                 "link": quote(os.path.relpath(feedback, page.parent)) if feedback is not None else "",
             }
         )
-    known = {key: value for entry in entries.values() for key, value in entry.known.items() if value}
+    known = term.known(student)
     return {
         "student": student,
         "name": known.get("name", ""),
-        "section": known.get("section", ""),
+        "section": "not in the roster" if term.left(student) else known.get("section", ""),
         "total": f"{term.total(student):.1f}",
         "waiting": sum(len(entry.grade.waiting) for entry in entries.values() if entry.grade is not None),
         "late": sum(entry.late or bool(entry.grade and entry.grade.penalty) for entry in entries.values()),

@@ -40,6 +40,9 @@ def test_a_group_gets_the_same_points_and_comment(tmp_path: Path, monkeypatch: p
         toy.hand_in(tmp_path / "class", student, load_lab(root, toy.LAB).clean_notebook(answers)["cells"])
     grade_class(root, toy.LAB, tmp_path / "class", Settings(Isolation.NONE, canaries=False))
 
+    def said(*arguments: str) -> str:
+        return " ".join(CliRunner().invoke(app, [*arguments, "--course", str(root)]).output.split())
+
     def run(*arguments: str) -> BaseException | None:
         return CliRunner().invoke(app, [*arguments, "--course", str(root)]).exception
 
@@ -51,6 +54,12 @@ def test_a_group_gets_the_same_points_and_comment(tmp_path: Path, monkeypatch: p
         assert isinstance(run("mark", toy.LAB, "why", *wrong), KitError)
     assert run("mark", toy.LAB, "why", "3", "ann", "bob", "--comment", "Well said.") is None
     assert {grade.student: grade.earned for grade in read_grades(root)} == {"ann": 8, "bob": 8, "cem": 5}
+    assert "In the gradebook: 8 of 9 points" in said("explain", "ann") and "1 to grade" in said("explain", "cem")
+    assert "ann had" not in said("mark", toy.LAB, "why", "3", "ann", "--comment", "Well said.")
+    told = said("mark", toy.LAB, "why", "1", "ann", "bob")  # a second grader, who did not see the points
+    assert told.startswith("1 point for why: ann, bob.") and "ann had 3 before." in told and "bob had 3 before." in told
+    assert "The feedback page was renewed." in said("mark", toy.LAB, "why", "3", "bob")
+    run("mark", toy.LAB, "why", "3", "ann")
     feedback = {name: CoursePaths(root).feedback_page(name, toy.LAB).read_text() for name in TEXTS}
     assert "Well said." in feedback["ann"] and "8 of 9 points" in feedback["bob"] and "so far" in feedback["cem"]
     run("answers", toy.LAB, "why")

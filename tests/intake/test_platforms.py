@@ -190,7 +190,7 @@ def test_what_was_replaced_late_or_no_notebook_is_said(tmp_path: Path) -> None:
     collected = collect(lay_out(PLATFORMS["canvas"][1], tmp_path, True), toy.LAB, tmp_path / "course")
     notes = "\n".join(collected.notes)
     assert "'doejane_LATE_12345_678950_toy-1.ipynb' replaces 'doejane_12345_678901_toy.ipynb'" in notes
-    assert "doejane: Canvas has marked it as late" in notes
+    assert "doejane: Canvas has marked it as late. Its download has no time, so no points are taken for that." in notes
     assert len(collected.refused) == 1 and "photo.png" in collected.refused[0]
 
 

@@ -44,14 +44,25 @@ def text(path: Path, heading: str) -> str:
 
 def test_the_page_says_who_needs_attention(tmp_path: Path) -> None:
     day = datetime.date(2026, 11, 26)
-    page = write_term_page(tmp_path / "t.html", "ROS 2", CLASS, ["one", "two", "three"], {"two": 3}, [], day)
+    page = write_term_page(tmp_path / "t.html", "ROS 2", CLASS, ["one", "two", "three"], {"two": 3}, [], day, {})
     behind = text(page, "Who falls behind")
-    assert "dan (Dan): nothing was handed in for two." in behind
+    assert "dan (Dan): nothing was graded for two." in behind
     assert "cem (Cem): 15 % of the points of one and two; the class's median is 65 %." in behind
     assert "ann" not in behind and "bob" not in behind
-    hard = text(page, "Checks that most fail")
+    hard = text(page, "Checks that most students fail")
     assert "two hard hard 20 % 3 The node is silent." in hard and "one hard" not in hard
     students = text(page, "All students")
     assert "ann Ann 70.0 % 0 0 10 of 10 6 of 10" in students  # (100 + 3 * 60) / 4
     assert "dan Dan 25.0 % 0 0 10 of 10 none" in students and "two, weight 3" in students
     assert "three" not in page.read_text() and text(page, "Appeals that wait for an answer").endswith("None.")
+
+
+def test_the_page_has_everybody_of_the_roster(tmp_path: Path) -> None:
+    roster = {name: {"id": name, "name": name.title(), "section": "A"} for name in ("ann", "bob", "cem", "eve")}
+    page = write_term_page(tmp_path / "t.html", "ROS 2", CLASS, ["one", "two"], {}, [], datetime.date.today(), roster)
+    behind, students = text(page, "Who falls behind"), text(page, "All students")
+    assert "eve (Eve): nothing was graded in the whole term." in behind and "dan" not in behind
+    assert "eve Eve A 0.0 % 0 0 none none" in students and "dan Dan not in the roster 50.0 %" in students
+    assert "5 students, 2 labs" in page.read_text()
+    one = write_term_page(tmp_path / "t.html", "ROS 2", CLASS[:1], ["one"], {}, [], datetime.date.today(), {})
+    assert "1 student, 1 lab, page of" in one.read_text()
