@@ -39,7 +39,11 @@ class Discovery(Noun):
         them in the order in which they were made, and the question's own end is the last.
         """
         self._running.met.update(dict.fromkeys(names, len(self._observer.recordings())))
-        ask_nodes(self._observer, names, _ANSWERS_WITHIN, lambda: self._running.gone_program() is not None)
+        ask_nodes(self._observer, names, _ANSWERS_WITHIN, self._has_failed)
+
+    def _has_failed(self) -> bool:
+        """Whether a program has ended that had to go on, so that the launch has failed whatever the others answer."""
+        return self._running.gone_program() is not None
 
     def _settle_owners(self, ends: Callable[[], list[TopicEndpointInfo]], *, again: bool = True) -> None:
         """Wait for an answer from each node that has one of these ends.
@@ -50,7 +54,7 @@ class Discovery(Noun):
         """
         # An endpoint comes to be on the graph before the name of its node does.
         self._observer.wait(
-            lambda: all(end.node_name != UNKNOWN_NODE for end in ends()), NAMED_WITHIN, self._running.all_ended
+            lambda: all(end.node_name != UNKNOWN_NODE for end in ends()), NAMED_WITHIN, self._has_failed
         )
         owners = {node_of(end) for end in ends() if end.node_name != UNKNOWN_NODE}
         self._settle(owners - self._running.gone_nodes() - (set() if again else self._running.met.keys()))
