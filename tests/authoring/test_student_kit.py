@@ -179,12 +179,12 @@ def the_book_is_served(kit: Path, tmp_path: Path) -> None:
         )  # fmt: skip
     try:
         address = address_of(server, tmp_path / "runtime", log)
-        with urllib.request.urlopen(f"{address}lectures/index.html?token=lab", timeout=60) as answer:
+        with urllib.request.urlopen(f"{address}lectures/index.html?token=lab", timeout=300) as answer:
             assert answer.read() == b"<h1>Lectures</h1>"
             assert "sandbox" not in answer.headers["Content-Security-Policy"]
         for path in ("lectures/index.html", "lectures/..%2Fkit/course.toml?token=lab"):
             try:
-                with urllib.request.urlopen(address + path, timeout=60) as answer:
+                with urllib.request.urlopen(address + path, timeout=300) as answer:
                     assert "login" in answer.url
             except urllib.error.HTTPError as error:
                 assert error.code in (403, 404)

@@ -608,7 +608,8 @@ def test_a_cell_that_only_looks_has_no_verdict_but_for_what_failed(notebook: Not
 
 def test_what_cannot_be_started_or_drawn_is_a_sentence_and_what_runs_goes_on(notebook: Notebook) -> None:
     write(notebook)
-    notebook.run('robot = launch("talker").start()\nrobot.wait(lambda: robot.graph.publishers("/chatter"), within=150)')
+    up = 'robot.graph.publishers("/chatter") and robot.graph.nodes() == ["/talker"]'
+    notebook.run(f'robot = launch("talker").start()\nrobot.wait(lambda: {up}, within=150)')
     for typo, sentence in (
         ('launch("taker").start()', "There is no `taker`"),
         ("robot.draw.qos()", 'qos: it is about one topic, such as ros.draw.qos("/chatter"). Topics here: "/chatter".'),

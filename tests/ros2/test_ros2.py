@@ -337,7 +337,7 @@ def test_what_a_shell_has_made_deaf_to_ctrl_c_goes_on(robot: Robot) -> None:
 
 
 def test_a_goal_that_is_interrupted_is_cancelled(robot: Robot) -> None:
-    sent = terminal(robot, "action", "send_goal", "/fibonacci", "test_msgs/action/Fibonacci", "{order: 40}")
+    sent = terminal(robot, "action", "send_goal", "/fibonacci", "test_msgs/action/Fibonacci", "{order: 100}")
     assert sent.stdout is not None
     while "accepted" not in (line := sent.stdout.readline()):
         assert line, "it ended"

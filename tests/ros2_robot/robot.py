@@ -70,7 +70,8 @@ class Demo(Node):
             if handle.is_cancel_requested:
                 handle.canceled()
                 return Fibonacci.Result()
-            feedback.sequence = [*feedback.sequence, feedback.sequence[-1] + feedback.sequence[-2]]
+            following = (feedback.sequence[-1] + feedback.sequence[-2]) % 2**31  # a long goal would not fit
+            feedback.sequence = [*feedback.sequence, following]
             handle.publish_feedback(feedback)
         handle.succeed()
         return Fibonacci.Result(sequence=feedback.sequence)

@@ -217,7 +217,7 @@ def test_looking_at_a_program_never_ends_it(local: NodeSandbox) -> None:
     )
     program = local.group().start("restless")
     _wait_for(program.output, 120)
-    looks = [program.stacks(10) for _ in range(80)]
+    looks = [program.stacks(120) for _ in range(80)]
     assert program.running()
     assert all('restless.py", line' in look for look in looks)
 
@@ -250,7 +250,7 @@ def test_a_program_that_only_computes_goes_on_behind_all_others() -> None:
         "with NodeSandbox(folder, Isolation.FULL) as sandbox, sandbox.group() as group:\n"
         "    rests, burns = group.start('rests'), group.start('burns')\n"
         "    begins = group.start('begins')\n"
-        "    end = time.monotonic() + 120\n"
+        "    end = time.monotonic() + 500\n"
         "    while (nice(burns) != {19} or not begins.output()) and time.monotonic() < end: time.sleep(0.1)\n"
         "    print(nice(burns), nice(rests), nice(begins), burns.running(), rests.running())\n"
     )
@@ -425,4 +425,4 @@ def _wait_for(look: Any, seconds: float) -> Any:
 def test_processes_that_make_their_folders_at_once_take_none_from_each_other() -> None:
     makes = "from autograder.sandbox.scratch import Scratch\nfor _ in range(300):\n    Scratch().remove()"
     makers = [subprocess.Popen([sys.executable, "-c", makes], stderr=subprocess.PIPE, text=True) for _ in range(6)]
-    assert [maker.communicate(timeout=120)[1] for maker in makers] == [""] * len(makers)
+    assert [maker.communicate(timeout=600)[1] for maker in makers] == [""] * len(makers)

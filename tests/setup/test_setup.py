@@ -152,12 +152,12 @@ def test_an_interrupted_environment_is_made_anew(tmp_path: Path) -> None:
     process = subprocess.Popen(
         [MAKE, "-C", folder, "setup"], env=ENVIRON, stderr=subprocess.PIPE, text=True, start_new_session=True
     )
-    deadline = time.monotonic() + 180
+    deadline = time.monotonic() + 600
     while not (folder / ".venv" / "pyvenv.cfg").exists():
         assert time.monotonic() < deadline
         time.sleep(0.01)
     os.killpg(process.pid, signal.SIGINT)
-    assert "The next run starts over" in process.communicate(timeout=180)[1]
+    assert "The next run starts over" in process.communicate(timeout=600)[1]
     assert process.returncode != 0
     (folder / ".venv" / "left-over").touch()
 

@@ -17,7 +17,7 @@ from places import ROOT
 
 def until(ready: Callable[[], object], what: str) -> None:
     """Wait until something is so; an AssertionError says what is not."""
-    deadline = time.monotonic() + 120
+    deadline = time.monotonic() + 600
     while not ready():
         assert time.monotonic() < deadline, what
         time.sleep(0.05)

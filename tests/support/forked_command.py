@@ -19,7 +19,7 @@ import tempfile
 from pathlib import Path
 from typing import Any, BinaryIO
 
-WITHIN = 180.0
+WITHIN = 600.0
 """Seconds: far beyond what a command takes on a busy machine."""
 
 

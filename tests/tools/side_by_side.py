@@ -140,8 +140,9 @@ async def run_notebook(path: Path, domains: int, only: str) -> None:
     recorder += f"; side_by_side.record({str(path.parent / 'seen.jsonl')!r}, {domains})"
     notebook.cells.insert(0, cell(recorder))
     client = NotebookClient(
-        notebook, timeout=None, allow_errors=True, kernel_name="python3", resources={"metadata": {"path": path.parent}}
-    )
+        notebook, timeout=None, startup_timeout=600, allow_errors=True, kernel_name="python3",
+        resources={"metadata": {"path": path.parent}},
+    )  # fmt: skip
     await client.async_execute(env={**os.environ, "JPY_SESSION_NAME": str(path)})
     wrong = []
     for one in notebook.cells:

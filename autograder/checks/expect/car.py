@@ -30,6 +30,8 @@ NOT_DRIVEN = Kind("not-driven", "the car got commands, but it did not drive as f
 
 NEARLY = 0.02
 """Metres that make no difference: a car that pushes against a wall still comes a little nearer to it."""
+_THERE = 0.05
+"""Metres within which a car is still at the same place."""
 STANDS_FOR = 0.25
 """Seconds for which a car must stand to have stopped: one that turns back passes through a speed of 0."""
 
@@ -252,7 +254,7 @@ class Car(Expectations):
 
     def _afterwards(self, sample: Sample) -> str:
         """Why it did not drive on, as far as the record shows that."""
-        touches = [touch for touch in self.touches() if abs(touch.time - sample.time) < 1.0]
+        touches = [touch for touch in self.touches() if self._is_there(touch, sample)]
         if touches:
             return f"There it touched {touches[-1].what}."
         last = self.trail()[-1]
@@ -262,6 +264,15 @@ class Car(Expectations):
             needs = "`cmd_vel`, or no heartbeat," if self._world.simulation.heartbeat else "`cmd_vel`"
             return f"At {last.time:.1f} s its motors brake, because nothing came on {needs} for 0.3 s."
         return ""
+
+    def _is_there(self, touch: Touch, sample: Sample) -> bool:
+        """Whether it touched something at about the time of a sample, or stayed where it did from the one to the other.
+
+        It stays if it crawls, if it pushes on, or if a busy machine lets its motors brake there.
+        """
+        begin, end = sorted((touch.time, sample.time))
+        between = [one.pose for one in self.trail() if begin <= one.time <= end]
+        return end - begin < 1.0 or all(math.dist(pose[:2], touch.pose[:2]) < _THERE for pose in between)
 
     def _fail_with(self, title: str, kind: Kind, text: str, sample: Sample, hint: str) -> NoReturn:
         """Fail with the place at which it went wrong; if no command came at all, with why none came."""
