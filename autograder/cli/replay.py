@@ -71,6 +71,9 @@ def replay(
         about = f"appeal of {made.made:%Y-%m-%d}: {reason or made.sentence}"
         for path in write_sample_student(root, lab, made, sample, about):
             print(path)
+    if not answered and who:
+        answer = f"autograder replay {kept} --times 0 --refuse --reason 'SENTENCE'"
+        screen.print(f"\nTo answer it: {answer} (or --grant)", markup=False, soft_wrap=True)
     if not answered:
         return
     if not who:

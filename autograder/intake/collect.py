@@ -43,7 +43,13 @@ class Gone:
     """The new names of students who are among the submissions under another name, by their old names."""
 
 
-def gone(source: Path, students: Sequence[Student], roster: Roster | None, before: Mapping[str, Taken]) -> Gone:
+def gone(
+    source: Path,
+    students: Sequence[Student],
+    roster: Roster | None,
+    before: Mapping[str, Taken],
+    known: Mapping[tuple[str, str], str],
+) -> Gone:
     """Return the students who are not among the submissions.
 
     A student who was taken in from another source counts only if that source held the same class, which is assumed if
@@ -54,6 +60,7 @@ def gone(source: Path, students: Sequence[Student], roster: Roster | None, befor
         students: the students whose work is in it.
         roster: the course's roster, if it has one.
         before: what was taken in before for this lab, by student.
+        known: the names in the gradebook of the persons who were taken in before, for this lab or for another.
     """
     here = {file_name(student.name) for student in students}
     place = str(source.resolve())
@@ -69,6 +76,10 @@ def gone(source: Path, students: Sequence[Student], roster: Roster | None, befor
     persons = {person(claim.owner): file_name(student.name) for student in students for claim in student.claims}
     persons.pop(None, None)
     renamed = {name: persons[who] for name, taken in missing.items() if (who := person(taken.owner)) in persons}
+    if roster is not None:  # it knows the number even if the platform of this lab does not tell it
+        new_ids = {old: file_name(new) for who, old in known.items() if (new := roster.holder(*who)) is not None}
+        listed = set(map(file_name, roster.students))
+        renamed |= {old: new for old, new in new_ids.items() if old not in listed}
     return Gone({name: taken for name, taken in missing.items() if name not in renamed}, renamed)
 
 
@@ -120,7 +131,8 @@ def _strangers(names: Sequence[str]) -> str:
 
 
 def _renamed(old: str, new: str) -> str:
-    return f"{old[:80]!r} of the last run has the same number on the platform as {new[:80]!r}, so they are one person."
+    same = f"has the same number on the platform as {new[:80]!r}, so they are one person."
+    return f"{old[:80]!r} of an earlier run {same}"
 
 
 def _missing(source: Path, lost: Sequence[str]) -> str:
@@ -237,8 +249,9 @@ def collect(
     own = source.resolve() == CoursePaths(root).submitted.resolve()
     reading = read_class(source, lab, format_name, _known(own, roster, before))
     recognised = reading.recognised
-    students = named(recognised.claims, roster, known_persons(root, lab))
-    missing = gone(source, students, roster, before)
+    persons = known_persons(root, lab)
+    students = named(recognised.claims, roster, persons)
+    missing = gone(source, students, roster, before, persons)
     stop(source, students, reading, missing, before, accepted)
     collected = Collected(_title(reading), reading.around, notes=[*reading.notes, *(roster.shared if roster else [])])
     others = [name for name in lab_names(root) if name != lab]

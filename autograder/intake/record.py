@@ -76,7 +76,7 @@ def known_persons(root: Path, lab: str) -> dict[tuple[str, str], str]:
     for name in (*others, lab):  # this lab's record comes last, so it takes precedence
         for student, taken in read_class(root, name).items():
             who = person(taken.owner)
-            if who is not None and (name == lab or who[0] not in _IN_EACH_LAB):
+            if who is not None and not taken.now and (name == lab or who[0] not in _IN_EACH_LAB):
                 known[who] = student
     return known
 
@@ -116,9 +116,11 @@ _PERSONS = Record(
 )
 
 
-def _remember_persons(root: Path, lab: str, taken: Mapping[str, Taken]) -> None:
+def _remember_persons(root: Path, lab: str, taken: Mapping[str, Taken], renamed: Mapping[str, str]) -> None:
     known = {(one.lab, one.kind, one.value): one for one in _PERSONS.read(CoursePaths(root).persons)}
     before = dict(known)
+    for key, before_now in before.items():
+        known[key] = before_now.model_copy(update={"name": renamed.get(before_now.name, before_now.name)})
     for name, one in taken.items():
         who = person(one.owner)
         if who is not None:
@@ -142,11 +144,11 @@ def keep_class(
         gone: the students who are no longer in the class.
         renamed: the new names of students whose names have changed, by their old names.
     """
-    _remember_persons(root, lab, taken)
+    _remember_persons(root, lab, taken, renamed)
     known = read_class(root, lab)
     for student in (*gone, *renamed):
         CoursePaths(root).feedback_page(student, lab).unlink(missing_ok=True)
-        left = gone.get(student) or known[student]
+        left = gone.get(student) or known.get(student) or Taken(source="")  # this lab may not have the old name
         known[student] = left.model_copy(update={"left": True, "now": renamed.get(student, "")})
     known.update(taken)
     _CLASS.write(CoursePaths(root).taken(lab), dict(sorted(known.items())))

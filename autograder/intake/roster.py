@@ -64,6 +64,11 @@ class Roster:
             if len(names) > 1
         ]
 
+    def holder(self, kind: str, value: str) -> str | None:
+        """Return the id of the only student who has a number or name on a platform; None if there is none."""
+        found = [student for student, line in self.students.items() if line.get(kind, "") == value]
+        return found[0] if len(found) == 1 else None
+
     def student(self, owner: Mapping[str, str]) -> str | None:
         """Return the id of the student that a platform's names belong to; None if there is no or more than one match.
 

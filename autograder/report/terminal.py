@@ -286,7 +286,10 @@ def undecided_view(results: Sequence[SubmissionResult], about_several: Sequence[
     flagged = [Text(f"  {plain(result.student)}: {plain(flag)}") for result in results for flag in result.flags]
     found = []
     if lines:
-        head = "The grader could not decide these checks. They wait for manual grading (--force runs them again):"
+        head = (
+            "The grader could not decide these checks. If the machine was busy, the same command runs them again;"
+            " otherwise decide about them in formgrader:"
+        )
         found += [Text(head, "bold magenta"), *lines]
     if flagged:
         found += [Text("These checks keep their points, but a person should look at them:", "bold magenta"), *flagged]

@@ -114,7 +114,8 @@ def test_a_refused_appeal_reaches_the_page_and_leaves_the_points(course: Course)
 def test_the_answers_say_whose_it_is_and_not_the_name_in_the_file(course: Course) -> None:
     made = course.appeal(course.class_ / "ann" / "toy.ipynb")
     course.file.write_text(json.dumps(made | {"student": "bob"}))
-    assert "student   ann\n" in course.run("replay", course.file, "--times", 0).output
+    shown = course.run("replay", course.file, "--times", 0).output
+    assert "student   ann\n" in shown and "--times 0 --refuse --reason 'SENTENCE' (or --grant)" in shown
     notebook = made["notebook"].replace("print('no')", "print('hello')")  # what would have been right
     course.file.write_text(json.dumps(made | {"notebook": notebook}))
     done = course.run("replay", course.file, "--times", 0, "--grant", "--reason", "So.")

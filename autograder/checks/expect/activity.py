@@ -192,7 +192,8 @@ class Activity(Meanwhile):
         Codes:
             `too-few-runs`, and what starves a callback or keeps a topic silent.
         """
-        title = f"{', '.join(names)} run, each at least {runs} times"
+        times = "once" if runs == 1 else f"{runs} times"
+        title = f"{', '.join(names)} run{'s' if len(names) == 1 else ', each'} at least {times}"
         self._wait_for_runs(names, runs, title, within, hint)
         outcomes.passed(title)
 

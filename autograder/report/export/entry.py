@@ -72,7 +72,10 @@ def scores(entries: Sequence[Entry], left_out: list[str]) -> list[tuple[Entry, s
         elif entry.stale:
             left_out.append(told_stale(entry))
         elif entry.grade.score is None:
-            left_out.append(f"{entry.student} has no score yet: a check waits for your verdict in formgrader.")
+            left_out.append(
+                f"{entry.student} has no score yet, because the grader could not decide a check: grade the lab again,"
+                " or decide in formgrader."
+            )
         else:
             found.append((entry, points(entry.grade.score), points(entry.grade.max_score)))
     return found
