@@ -63,7 +63,7 @@ def answers(
                 return (said.code if said else "") == case.says and (said is None or _told(case, said))
 
             for name in batch:
-                ros.wait(lambda: answered(name), 30.0)  # noqa: B023
+                ros.wait(lambda: answered(name), 120.0)  # noqa: B023
     yield found
     current.check.close()
 
@@ -120,8 +120,8 @@ def test_where_a_program_runs_twice_the_node_of_one_is_not_the_misplaced_node_of
     (tmp_path / "twin.py").write_text(LATE)
     current.check.configure(tmp_path, Isolation.NONE, 7)
     with launch(Program("twin", namespace="/first"), Program("twin", namespace="/late"), Program("twin")) as ros:
-        ros.wait(lambda: {"/first/twin", "/twin"} <= set(ros.graph.nodes()), 20.0)
-        ros.wait(lambda: all(inside.attached for inside in ros._running.scene().insides), 20.0)
+        ros.wait(lambda: {"/first/twin", "/twin"} <= set(ros.graph.nodes()), 120.0)
+        ros.wait(lambda: all(inside.attached for inside in ros._running.scene().insides), 120.0)
         scene = ros._running.scene()
         late, astray = [autograder.diagnosis.why_no_node(scene, f"/{where}/twin") for where in ("late", "astray")]
     current.check.close()
@@ -143,8 +143,8 @@ def test_a_node_that_lies_a_namespace_too_deep_is_found_beside_another_run_of_it
     right = Program("camera", namespace="/car", arguments_of_its_own=("right",))
     left = Program("camera", namespace="/car/car", arguments_of_its_own=("left",))  # two `push_ros_namespace`
     with launch(right, left) as ros:
-        ros.wait(lambda: {"/car/right", "/car/car/left"} <= set(ros.graph.nodes()), 30.0)
-        ros.wait(lambda: all(inside.nodes for inside in ros._running.scene().insides), 30.0)
+        ros.wait(lambda: {"/car/right", "/car/car/left"} <= set(ros.graph.nodes()), 120.0)
+        ros.wait(lambda: all(inside.nodes for inside in ros._running.scene().insides), 120.0)
         found = autograder.diagnosis.why_no_node(ros._running.scene(), "/car/left")
     current.check.close()
     assert found.code == "namespace" and "another namespace: `/car/car/left`." in found.because
