@@ -12,9 +12,10 @@ from typer.testing import CliRunner
 from autograder.authoring.release import release
 from autograder.cli.main import app
 from autograder.core.errors import KitError
-from autograder.core.results import Isolation
+from autograder.core.results import Isolation, Outcome, Part, Status, SubmissionResult
 from autograder.course.lab import load_lab
 from autograder.gradebook.class_run import grade_class
+from autograder.grading.job import Job
 from autograder.grading.runner import Settings
 
 
@@ -47,10 +48,13 @@ def test_a_release_waits_until_every_difference_is_explained(tmp_path: Path, mon
 
     status, said = run(root, "check", "--isolation", "none")
     entry = said.split()[1]
-    assert status == 1 and f"toy {entry} check_talker: 3 → 0: It says something else" in said
+    assert status == 1 and f"toy {entry} check_talker: 3 → 0: It says something else" in said  # no parts: by hand
     with pytest.raises(KitError, match="1 difference is unexplained in the bank of past terms"):
         release(root, toy.LAB)
-    assert run(root, "explain", toy.LAB, entry, "check_talker", "It was too lenient.", "--points", "0")[0] == 0
+    status, said = run(root, "explain", toy.LAB, entry, "check_answers", "It was too lenient.")
+    assert status == 2 and f"found no difference of check_answers in '{entry}'" in said
+    assert run(root, "explain", toy.LAB, entry, "check_talker", "It was too lenient.")[0] == 0
+    release(root, toy.LAB)
     assert run(root, "check", toy.LAB, "--isolation", "none")[0] == 0
     release(root, toy.LAB)
 
@@ -64,10 +68,11 @@ def test_a_release_waits_until_every_difference_is_explained(tmp_path: Path, mon
     assert status == 1 and said.count("check_answers: 2 → ?: It gives no result any more.") == 2
     with pytest.raises(KitError, match="2 differences are unexplained"):
         release(root, toy.LAB)
-    for path in (root / "bank" / toy.LAB).glob("*.json"):
-        assert run(root, "explain", toy.LAB, path.stem, "check_answers", "It has another name.")[0] == 0
+    status, said = run(root, "explain", toy.LAB, "all", "check_answers", "It has another name.")
+    assert (status, said) == (0, "Explained 2 differences.\n")
     assert run(root, "check", toy.LAB, "--isolation", "none")[0] == 0
 
+    path = root / "bank" / toy.LAB / f"{entry}.json"
     path.write_text(
         path.read_text()
         .replace('"check_talker":3.0', '"check_talker":null')
@@ -76,3 +81,36 @@ def test_a_release_waits_until_every_difference_is_explained(tmp_path: Path, mon
     status, said = run(root, "check", toy.LAB, "--isolation", "none")
     assert status == 0 and "toy check_talker: not compared in 1 entry, because it had no points" in said
     assert "toy check_table: no entry has points of it, so the bank says nothing about this check." in said
+
+
+def test_a_mistake_that_moves_points_between_parts_is_stopped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    parts = {"it starts": 1.0, "it says hello": 0.0}
+    outcomes = [Outcome(status=Status.FAILED, title="it speaks", code="silent", part="it says hello", because="No.")]
+
+    def judge(job: Job) -> SubmissionResult:
+        told = toy.judge(job)
+        of_parts = [Part(title=title, max_points=1.5, points=got) for title, got in parts.items()]
+        told.checks[0] = told.checks[0].model_copy(update={"points": 1.0, "parts": of_parts, "outcomes": outcomes})
+        return told
+
+    monkeypatch.setattr("autograder.grading.executors.local.run_in_worker", lambda job, *_: judge(job))
+    root = toy.make_course(tmp_path / "course")
+    toy.hand_in(tmp_path / "class", "ann", load_lab(root, toy.LAB).clean_notebook({})["cells"])
+    grade_class(root, toy.LAB, tmp_path / "class", Settings(Isolation.NONE, canaries=False))
+    assert run(root, "add", toy.LAB)[0] == 0
+    assert run(root, "check", "--isolation", "none")[0] == 0
+
+    parts |= {"it starts": 0.0, "it says hello": 1.0}
+    status, said = run(root, "check", "--isolation", "none")
+    assert status == 1 and "part `it starts` 1 of 1.5 → 0 of 1.5; part `it says hello` 0 of 1.5 → 1 of 1.5: No." in said
+    assert run(root, "explain", toy.LAB, "all", "check_talker", "Wrong in the past.")[0] == 0
+    assert run(root, "check", "--isolation", "none")[0] == 0
+
+    outcomes[0] = outcomes[0].model_copy(update={"code": "late"})
+    status, said = run(root, "check", "--isolation", "none")
+    assert status == 1 and "check_talker: reason of part `it says hello` `silent` → `late`: No." in said
+
+    outcomes[0] = outcomes[0].model_copy(update={"code": "silent"})
+    parts["it says good morning"] = parts.pop("it says hello")
+    status, said = run(root, "check", "--isolation", "none")
+    assert status == 1 and "part `it says hello` is gone; part `it says good morning` is new" in said

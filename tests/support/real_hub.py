@@ -28,6 +28,8 @@ LAB = "lab1_greeter"
 """The lab of a new course."""
 SECONDS = 300
 """Far beyond what a step takes on a busy machine."""
+OPENINGS = 5
+"""How often a person opens a notebook whose kernel does not come up."""
 PASSWORD = "hub-of-a-test"
 SERVER = "etc/jupyter/jupyter_server_config.d"
 """Where packages say which extensions of JupyterLab they bring."""
@@ -203,11 +205,16 @@ def end_all_of(uid: int) -> list[Path]:
     return found
 
 
+class LostKernel(Exception):
+    """A kernel that did not come up, or that has ended."""
+
+
 class Person:
     """A user of the hub with a server, through the addresses that JupyterLab in a browser asks as well."""
 
     def __init__(self, hub: Hub, name: str) -> None:
         self.hub, self.name = hub, name
+        self.lost_kernels = 0
         self.web = requests.Session()
         page = requests.get(f"{hub.address}/hub/login", timeout=SECONDS)
         token = re.search(r'name="_xsrf" value="([^"]+)"', page.text)
@@ -247,26 +254,44 @@ class Person:
         assert told["success"], told
 
     def open(self, path: str) -> None:
-        """Open a notebook, so that it has a kernel."""
+        """Open a notebook, so that it has a kernel. If the kernel does not come up, open it again, as a user would."""
         body = {"path": path, "type": "notebook", "name": path, "kernel": {"name": "python3"}}
-        self.kernel = self.ask("POST", "api/sessions", json=body)["kernel"]["id"]
+        for _ in range(OPENINGS):
+            session = self.ask("POST", "api/sessions", json=body)
+            self.kernel = session["kernel"]["id"]
+            try:
+                self.run("None")
+                return
+            except LostKernel:
+                self.lost_kernels += 1
+                self.web.delete(f"{self.hub.address}/user/{self.name}/api/sessions/{session['id']}", timeout=SECONDS)
+        raise AssertionError(f"the kernel of {self.name} did not come up {OPENINGS} times")
 
     def run(self, code: str) -> str:
-        """Run a cell in the open notebook's kernel, and return the text of its outputs."""
+        """Run a cell in the open notebook's kernel, and return the text of its outputs.
+
+        Raises:
+            LostKernel: the kernel has ended, also if the server starts it again.
+        """
         import websocket
 
         address = f"{self.hub.address}/user/{self.name}/api/kernels/{self.kernel}/channels"
         header = {"msg_id": os.urandom(8).hex(), "session": "test", "username": "", "msg_type": "execute_request"}
         content = {"code": code, "silent": False, "store_history": True, "allow_stdin": False, "stop_on_error": True}
         message = {"header": header, "parent_header": {}, "metadata": {}, "content": content, "channel": "shell"}
-        line = websocket.create_connection(
-            address.replace("http", "ws", 1), header=[f"Authorization: token {self.token}"], timeout=SECONDS
-        )
+        try:
+            line = websocket.create_connection(
+                address.replace("http", "ws", 1), header=[f"Authorization: token {self.token}"], timeout=SECONDS
+            )
+        except websocket.WebSocketBadStatusException as error:
+            raise LostKernel(self.name) from error
         told, ended = [], False
         try:
             line.send(json.dumps(message | {"buffers": []}))
             while not ended:
                 one = json.loads(line.recv())
+                if one["msg_type"] == "status" and one["content"]["execution_state"] in ("restarting", "dead"):
+                    raise LostKernel(self.name)
                 if one.get("parent_header", {}).get("msg_id") != header["msg_id"]:
                     continue
                 given = one["content"]
