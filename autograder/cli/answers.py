@@ -37,6 +37,7 @@ def mark(
     course: CourseOption = None,
 ) -> None:
     """Give the answers of several students the same points and comment, as formgrader would for each of them."""
+    from autograder.core.grades import in_points
     from autograder.course.lab import load_lab
     from autograder.course.paths import course_root
     from autograder.gradebook.renewal import renew_pages
@@ -45,4 +46,4 @@ def mark(
     root = course_root(course)
     give(root, load_lab(root, lab), cell, points, students, comment)
     renew_pages(root, lab)
-    print(f"{points:g} points for {cell}: {', '.join(students)}. Their feedback pages were renewed.")
+    print(f"{in_points(points)} for {cell}: {', '.join(students)}. Their feedback pages were renewed.")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from pathlib import Path
 from typing import Annotated
 
@@ -56,6 +57,8 @@ def appeal(
     with working(f"Running {cell.grade_id}"):
         made = make_appeal(notebook, student, found, cell, sentence, settings)
     console().print(check_view(made.seen, title=cell.title or cell.grade_id, book=read_book(root)))
-    path = output or Path(f"{found.name}_{cell.grade_id}{ENDING}")
-    write_beside(path, made.model_dump_json(indent=1) + "\n")
+    content = made.model_dump_json(indent=1) + "\n"
+    # An instructor saves the files of many students in one folder.
+    path = output or Path(f"{found.name}_{cell.grade_id}_{hashlib.sha256(content.encode()).hexdigest()[:8]}{ENDING}")
+    write_beside(path, content)
     print(f"Send this file to your instructor: {path}")

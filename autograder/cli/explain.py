@@ -92,6 +92,7 @@ def _history(root: Path, result: SubmissionResult, check: str = "") -> None:
 
 def _messages(root: Path, result: SubmissionResult, check: CheckResult, bag: Path) -> None:
     """Run the check again, write the messages that it received, and say whether its result is the same as before."""
+    from autograder.core.grades import in_points
     from autograder.course.lab import load_lab
     from autograder.course.paths import CoursePaths
     from autograder.grading.messages import received, write_mcap
@@ -110,7 +111,7 @@ def _messages(root: Path, result: SubmissionResult, check: CheckResult, bag: Pat
         again, messages = received(notebook, result.student, lab, settings, [check.grade_id])
     if [one.points for one in again] != [check.points]:
         now = again[0].points if again else None
-        screen.print(f"In this second run, the check gives {'no verdict' if now is None else f'{now:g} points'}.")
+        screen.print(f"In this second run, the check gives {'no verdict' if now is None else in_points(now)}.")
     if not messages:
         screen.print("The check received no messages.")
         return

@@ -158,12 +158,12 @@ def _unread(results: Sequence[SubmissionResult]) -> list[str]:
 def _show(run: ClassRun, paths: CoursePaths, lab: str, as_json: bool) -> None:
     from autograder.course.lab import load_lab
     from autograder.gradebook.settings import gradebook_place
-    from autograder.grading.shared_runs import shared_runs
+    from autograder.grading.shared_runs import shared_runs, told
     from autograder.grading.store import ResultStore
     from autograder.report.terminal import class_view, console, plain, undecided_view
 
     students = [result.student for result in run.results]
-    shared = list(dict.fromkeys(shared_runs(paths.root, load_lab(paths.root, lab), students).values()))
+    shared = [told(group) for group in shared_runs(paths.root, load_lab(paths.root, lab), students)]
     left_out = [plain(sentence) for sentence in (*run.told, *run.collected.notes, *run.collected.refused)]
     left_out += map(plain, _unread(run.results))
     left_out += [f"{plain(name)} is not in the gradebook: {plain(why)}" for name, why in run.unrecorded.items()]

@@ -172,7 +172,7 @@ def hub(
         )
     kit = shlex.quote(str(folder.resolve() / "ros2-labs"))
     print(f"\nNext, as root, with a Python that every user may run:\n  make -C {kit} setup PYTHON=/usr/bin/python3")
-    print(f"  {kit}/.venv/bin/python -m pip install jupyterhub jupyterhub-idle-culler")
+    print(f"  {kit}/.venv/bin/python -m pip install 'jupyterhub~=6.1' jupyterhub-idle-culler")
     print(f"  {kit}/.venv/bin/jupyterhub -f {shlex.quote(str(folder.resolve() / CONFIGURATION))}")
 
 

@@ -39,7 +39,7 @@ def report(course: CourseOption = None) -> None:
     for lab in sorted({entry.lab for entry in entries}):
         of_lab = [entry for entry in entries if entry.lab == lab]
         students = [entry.student for entry in of_lab]
-        shared = shared_runs(root, load_lab(root, lab), students) if lab in lab_names(root) else {}
+        shared = shared_runs(root, load_lab(root, lab), students) if lab in lab_names(root) else []
         print(write_class_page(CoursePaths(root).class_page(lab), of_lab, datetime.date.today(), shared))
 
 

@@ -5,6 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 
+def in_points(number: float) -> str:
+    """Return a number of points with its noun: `1 point`, `2.5 points`."""
+    return f"{round(number, 2):g} point{'s' * (number != 1)}"
+
+
 @dataclass(frozen=True)
 class CellGrade:
     """The points of one graded cell."""
@@ -43,9 +48,9 @@ class Grade:
         """A sentence about the cells that a person has yet to grade, for the student; empty if there are none."""
         if not self.waiting:
             return ""
-        top = round(sum(cell.max_points for cell in self.waiting), 2)
+        top = in_points(sum(cell.max_points for cell in self.waiting))
         which = "1 answer is" if len(self.waiting) == 1 else f"{len(self.waiting)} answers are"
-        return f"{which} not graded yet, which can still give up to {top:g} points."
+        return f"{which} not graded yet, which can still give up to {top}."
 
     @property
     def stale(self) -> list[CellGrade]:

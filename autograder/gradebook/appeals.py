@@ -8,6 +8,7 @@ from sqlalchemy import create_engine
 
 from autograder.core.errors import KitError
 from autograder.core.files import only_one, write_beside
+from autograder.core.grades import in_points
 from autograder.core.history import Decided, Decision
 from autograder.course.lab import Lab, load_lab
 from autograder.course.paths import CoursePaths
@@ -124,4 +125,4 @@ def _give(root: Path, student: str, lab: Lab, check: str, points: float | None) 
             raise KitError(f"{check} gives 0 to {grade.max_score:g} points, not {given:g}.", "Name other points.")
         grade.manual_score, grade.needs_manual_grade = given, False
         gradebook.db.commit()
-    return f"{student} has {given:g} points for {check} now."
+    return f"{student} has {in_points(given)} for {check} now."

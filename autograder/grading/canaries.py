@@ -22,6 +22,7 @@ import yaml
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
 from autograder.core.errors import KitError
+from autograder.core.grades import in_points
 from autograder.core.results import CheckResult, SubmissionResult
 from autograder.course.lab import Lab
 from autograder.course.paths import CoursePaths
@@ -190,7 +191,7 @@ def otherwise(known: KnownAnswers, lab: Lab, result: SubmissionResult, moment: s
         must, most = known.points[check.grade_id], full[check.grade_id]
         if check.points is None or (check.points < most if must is None else abs(check.points - must) < _SAME):
             continue
-        expected = f"fewer than {most:g} points" if must is None else f"{must:g} point{'s' * (must != 1)}"
+        expected = f"fewer than {most:g} points" if must is None else in_points(must)
         flips.append(Flip(moment, check.grade_id, must == most, expected, check))
     return flips
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 from collections import defaultdict
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from pathlib import Path
 
 from autograder.course.lab import Lab
@@ -23,8 +23,8 @@ _NAMED = 10
 """The number of students who are named in a sentence."""
 
 
-def shared_runs(root: Path, lab: Lab, students: Collection[str]) -> dict[str, str]:
-    """Return a sentence about each student of a class whose recorded run somebody else has handed in, too.
+def shared_runs(root: Path, lab: Lab, students: Collection[str]) -> list[list[str]]:
+    """Return groups of students of a class who have handed in a part of the same recorded run.
 
     Args:
         root: the course's folder, which holds the submitted notebooks.
@@ -32,14 +32,17 @@ def shared_runs(root: Path, lab: Lab, students: Collection[str]) -> dict[str, st
         students: the students of the class.
     """
     if not any("expect_own_run(" in check.source for check in lab.checks):
-        return {}
+        return []
     paths = {student: CoursePaths(root).submitted_notebook(student, lab.name) for student in students}
     sources = {student: read_submission(path, lab).sources for student, path in paths.items() if path.is_file()}
-    return {
-        student: f"{_named(group)} have handed in the same recorded run."
-        for group in with_the_same_run({student: answers.values() for student, answers in sources.items()})
-        for student in group
-    }
+    return with_the_same_run({student: answers.values() for student, answers in sources.items()})
+
+
+def told(group: Sequence[str]) -> str:
+    """Return a sentence about students who share a run."""
+    most = _NAMED if len(group) > _NAMED else len(group) - 1
+    last = f"{len(group) - most} more" if len(group) > _NAMED else group[-1]
+    return f"{', '.join(group[:most])} and {last} have handed in the same recorded run."
 
 
 def with_the_same_run(answers: Mapping[str, Iterable[str]]) -> list[list[str]]:
@@ -71,10 +74,3 @@ def _times(text: str) -> set[tuple[float, ...]]:
 def _of(record: Record) -> tuple[float, ...]:
     sent = (time for rows in record.traffic.values() for row in rows for time in row.times)
     return tuple(sorted([*(run.begin for run in record.runs), *sent, *(change.time for change in record.changes)]))
-
-
-def _named(students: list[str]) -> str:
-    more = len(students) - _NAMED
-    if more > 0:
-        return f"{', '.join(students[:_NAMED])} and {more} more"
-    return f"{', '.join(students[:-1])} and {students[-1]}"

@@ -23,6 +23,7 @@ from typing import Any, TextIO
 from autograder.checks import current, outcomes, unusable
 from autograder.checks.misuse import place_of
 from autograder.checks.scoring import Score
+from autograder.core.grades import in_points
 from autograder.core.results import CellResult, CheckResult, NodeLog, Status
 from autograder.course.lab import Cell
 from autograder.grading.job import CELL_CPU_SECONDS, CELL_SECONDS, STUCK_SECONDS, Job
@@ -83,7 +84,7 @@ def _check_result(cell: Cell, value: object, error: str) -> CheckResult:
     if isinstance(value, Score) and not error and value.result.max_points == cell.points:
         found = value.result
     else:
-        because = error or f"The check cell did not end in a score of {cell.points:g} points."
+        because = error or f"The check cell did not end in a score of {in_points(cell.points or 0.0)}."
         found_out = [
             *current.check.findings.outcomes,
             outcomes.worded(Status.UNKNOWN, code=outcomes.GRADER.code, title="The check itself broke", because=because),

@@ -11,7 +11,7 @@ import hashlib
 import os
 import statistics
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import quote
@@ -19,6 +19,7 @@ from urllib.parse import quote
 from markupsafe import Markup
 
 from autograder.core.files import write_beside
+from autograder.core.grades import in_points
 from autograder.core.history import told
 from autograder.core.results import CheckResult, Ranked, Status
 from autograder.report import words
@@ -30,6 +31,7 @@ from autograder.report.words import Verdict
 
 _BINS = 10
 """The number of bars in the distribution. All of them have the same width in points."""
+_LOOK = "look at this; the points stay"
 _FEWEST = 5
 """The number of students that is needed to compute a discrimination."""
 _MOST_ROWS = 500
@@ -59,7 +61,7 @@ def _together(persons: Sequence[_Person]) -> list[dict[str, object]]:
 
 
 def write_class_page(
-    path: Path, entries: Sequence[Entry], written: datetime.date, remarks: Mapping[str, str] | None = None
+    path: Path, entries: Sequence[Entry], written: datetime.date, shared: Sequence[Sequence[str]] = ()
 ) -> Path:
     """Write the page of one lab and return its path.
 
@@ -67,7 +69,7 @@ def write_class_page(
         path: the file for the page.
         entries: the lab's submissions.
         written: the date that is shown on the page.
-        remarks: a sentence about each student at whose work a person should look, beside the flags of the results.
+        shared: groups of students who have handed in the same recorded run.
     """
     scores = [earned(entry) for entry in entries]
     most = max((top(entry) for entry in entries), default=0.0)
@@ -85,7 +87,7 @@ def write_class_page(
         lowest=points(min(scores)),
         highest=points(max(scores)),
         bars=_distribution(scores, most),
-        persons=_together(_persons(entries, remarks or {})),
+        persons=[*_together(_persons(entries)), *map(_shared, shared)],
         checks=_checks(entries),
         best=_best(entries),
         students=[_student(entry, path) for entry in entries],
@@ -118,7 +120,12 @@ def _distribution(scores: Sequence[float], top: float) -> list[dict[str, object]
     return bars
 
 
-def _persons(entries: Sequence[Entry], remarks: Mapping[str, str]) -> list[_Person]:
+def _shared(students: Sequence[str]) -> dict[str, object]:
+    why = "They have handed in the same recorded run."
+    return {"what": _LOOK, "why": why, "count": len(students), "students": ", ".join(students)}
+
+
+def _persons(entries: Sequence[Entry]) -> list[_Person]:
     found = []
     for entry in entries:
         for check in entry.result.checks:
@@ -126,17 +133,16 @@ def _persons(entries: Sequence[Entry], remarks: Mapping[str, str]) -> list[_Pers
             if check.status is Status.UNKNOWN and (cell is None or cell.points is None):
                 why = reason(check.first_failure) if check.first_failure else "The grader could not find out."
                 found.append(
-                    _Person(entry.student, f"{_title(check)}: decide about {points(check.max_points)} points", why)
+                    _Person(entry.student, f"{_title(check)}: decide about {in_points(check.max_points)}", why)
                 )
         for cell in entry.grade.waiting if entry.grade is not None else ():
             if not cell.is_check:
-                what = f"{cell.grade_id}: {points(cell.max_points)} points"
+                what = f"{cell.grade_id}: {in_points(cell.max_points)}"
                 found.append(_Person(entry.student, what, "An answer in words, which nobody has graded yet."))
         for cell in entry.grade.stale if entry.grade is not None else ():
-            what = f"{cell.grade_id}: {points(cell.points or 0.0)} points by hand"
+            what = f"{cell.grade_id}: {in_points(cell.points or 0.0)} by hand"
             found.append(_Person(entry.student, what, "The work has changed since you graded it, so look at it again."))
-        flags = [*entry.result.flags, *([remarks[entry.student]] if entry.student in remarks else [])]
-        found += [_Person(entry.student, "look at this; the points stay", flag) for flag in flags]
+        found += [_Person(entry.student, _LOOK, flag) for flag in entry.result.flags]
         if entry.grade is None:
             found.append(_Person(entry.student, "not in the gradebook", "Grade the class again."))
     return found

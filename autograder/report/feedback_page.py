@@ -11,7 +11,7 @@ from types import MappingProxyType
 
 from markupsafe import Markup
 
-from autograder.core.grades import CellGrade, Grade
+from autograder.core.grades import CellGrade, Grade, in_points
 from autograder.core.history import Decided, Event
 from autograder.core.results import CheckResult, SubmissionResult
 from autograder.core.version import VERSION
@@ -216,7 +216,7 @@ def _graded(cell: CellGrade, check: CheckResult | None, task: Task, decided: Dec
     if cell.is_check and check is None:
         remark = "The report of this check is no longer stored."
     elif cell.is_check and cell.by_hand:
-        remark = f"Your instructor has looked at this check and gives {_number(cell.points or 0.0)} points."
+        remark = f"Your instructor has looked at this check and gives {in_points(cell.points or 0.0)}."
     return _Graded(
         points=_points([cell]),
         verdict="not graded yet" if cell.points is None else look.value,

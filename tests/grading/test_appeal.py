@@ -94,6 +94,15 @@ def test_an_appeal_is_replayed_granted_and_becomes_a_sample_student(course: Cour
     assert SENTENCE not in course.paths.term_page.read_text()
 
 
+def test_appeals_of_one_check_have_different_file_names(course: Course, monkeypatch: pytest.MonkeyPatch) -> None:
+    for student in ("ann", "bob"):
+        monkeypatch.chdir(course.class_ / student)  # a student's kit calls this folder the same for everybody
+        said = course.run("appeal", "toy.ipynb", "check_talker", SENTENCE, "--name", "toy").output
+        assert "toy_check_talker_" in said
+    names = [path.name for path in course.class_.glob("*/*.appeal.json")]
+    assert len(names) == 2 and len(set(names)) == 2
+
+
 def test_a_refused_appeal_reaches_the_page_and_leaves_the_points(course: Course) -> None:
     course.appeal(course.class_ / "ann" / "toy.ipynb")
     done = course.run("replay", course.file, "--times", 0, "--refuse", "--reason", "It said nothing.")

@@ -255,6 +255,15 @@ def test_the_class_page_shows_what_needs_a_person(graded: Graded) -> None:
         assert f'href="../feedback/{student}/toy/toy.html"' in text
 
 
+def test_one_point_is_one_point(tmp_path: Path) -> None:
+    unknown = [Outcome(status=Status.UNKNOWN, title="It drives", because="The machine was too busy.")]
+    checks = [CheckResult(grade_id=f"check_{most}", max_points=most, outcomes=unknown) for most in (1, 2.5)]
+    result = SubmissionResult(student="ann", lab="toy", digest="d", isolation=Isolation.FULL, checks=checks)
+    entries = [Entry("ann", "toy", result)]
+    text = write_class_page(tmp_path / "toy.html", entries, datetime.date(2026, 11, 22)).read_text()
+    assert "decide about 1 point<" in text and "decide about 2.5 points<" in text
+
+
 def test_the_class_page_has_a_table_of_the_best_for_a_check_that_ranks(tmp_path: Path) -> None:
     def entry(student: str, seconds: float, points: float) -> Entry:
         ranked = Ranked(value=seconds, unit="seconds", figures={"touches": 2 - points})

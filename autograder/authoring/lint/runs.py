@@ -11,6 +11,7 @@ from concurrent.futures import ThreadPoolExecutor
 from autograder.authoring.lint.static import Finding
 from autograder.authoring.mutation.mutants import handed_in, mutants, reached
 from autograder.authoring.mutation.rules import Mutant
+from autograder.core.grades import in_points
 from autograder.core.results import Isolation, SubmissionResult
 from autograder.course.lab import Cell, Lab
 from autograder.grading.canaries import KnownAnswers, otherwise
@@ -58,7 +59,7 @@ def _solution(result: SubmissionResult) -> Iterator[Finding]:
 def _blank(result: SubmissionResult) -> Iterator[Finding]:
     for check in result.checks:
         if check.points != 0:
-            points = "no verdict" if check.points is None else f"{check.points:g} points"
+            points = "no verdict" if check.points is None else in_points(check.points)
             yield Finding(check.grade_id, f"the notebook as students receive it gets {points}.")
 
 

@@ -20,6 +20,7 @@ from autograder.checks.building import Package
 from autograder.checks.launch import Launch
 from autograder.checks.nouns import noun_given
 from autograder.core.errors import KitError
+from autograder.core.grades import in_points
 from autograder.course.cells import (
     FOR_CHECKS,
     MARK,
@@ -322,7 +323,7 @@ def _score(tree: ast.Module, points: float) -> Iterator[str]:
     except (ValueError, TypeError, IndexError):
         return  # the points are computed when the check runs, which shows whether they are right
     if abs(total - points) > 1e-6:
-        yield f"line {call.lineno}: its score gives {total:g} points, but its metadata {points:g}."
+        yield f"line {call.lineno}: its score gives {in_points(total)}, but its metadata {points:g}."
     yield from _part_titles(tree, told if isinstance(told, dict) else {}, call.lineno)
 
 
