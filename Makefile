@@ -3,6 +3,7 @@ LAB ?= lab2_executors
 SUBMISSIONS ?=
 NB ?=
 N ?= 20
+USERS ?= 30
 PYTHON ?=
 ARGS ?=
 
@@ -20,7 +21,7 @@ echo "No Python was found. The kit needs Python 3.11 to 3.14." >&2; \
 echo "What to do: sudo apt-get install python3 python3-venv   or name one: make PYTHON=/path/to/python3.12" >&2; exit 2
 endef
 
-.PHONY: help setup setup-dev doctor grade check submit test test-all lint jupyter lectures pdf release wheel soak machines margins mutants bank kilted bench lock clean distclean
+.PHONY: help setup setup-dev doctor grade check submit test test-all lint jupyter lectures pdf release wheel soak machines margins mutants bank hub kilted bench lock clean distclean
 
 help: ## show this list
 	@echo 'make TARGET [LAB=$(LAB)] [PYTHON=python3.12] [ARGS="more options"]'; echo
@@ -92,6 +93,9 @@ mutants: setup-dev ## change LAB's solution by rule, one change at a time, and g
 
 bank: setup-dev ## run today's checks on the answers of past terms (folder bank), and list every difference
 	@$(RUN) autograder bank check $(if $(filter command line,$(origin LAB)),$(LAB)) $(ARGS)
+
+hub: setup-dev ## take USERS=30 students at once through a lab on a real JupyterHub, and print a table (as root)
+	@$(RUN) python tests/tools/whole_class.py --users $(USERS) $(ARGS)
 
 kilted: setup-dev ## run the book's measured statements and the labs' solutions on ROS 2 Kilted, and print what differs
 	@$(RUN) python tests/tools/kilted.py $(ARGS)

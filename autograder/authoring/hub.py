@@ -15,13 +15,8 @@ from autograder.setup.places import KIT_FOLDER
 
 CONFIGURATION = "jupyterhub_config.py"
 _TEMPLATE = Path(__file__).with_name("templates") / "jupyterhub_config.template"
-# Without the first setting, terminals are login shells, in which /etc/profile sets another PATH. Without the second
-# one, kernels of several users that start at the same time may choose the same TCP ports and do not come up. With it,
-# they have sockets in the file system, whose names are different for each kernel.
-_EVERYBODY = {
-    "ServerApp": {"terminado_settings": {"shell_command": ["/bin/bash"]}},
-    "KernelManager": {"transport": "ipc"},
-}
+# Without this setting, terminals are login shells, in which /etc/profile sets another PATH.
+_TERMINALS = {"ServerApp": {"terminado_settings": {"shell_command": ["/bin/bash"]}}}
 _ASSIGNMENT_LIST = {"ServerApp": {"jpserver_extensions": {"nbgrader.server_extensions.assignment_list": True}}}
 # A student's kit switches off all of nbgrader. On a hub, students have the list of assignments.
 _ONLY_ASSIGNMENT_LIST = {
@@ -68,7 +63,7 @@ def write_hub(root: Path, book: Path | None, folder: Path) -> list[str]:
     settings = folder / "settings"
     for name, content in {
         "nbgrader_config.json": exchange,
-        "jupyter_server_config.json": _EVERYBODY,
+        "jupyter_server_config.json": _TERMINALS,
         "students/jupyter_server_config.json": _ASSIGNMENT_LIST,
         "students/labconfig/page_config.json": _ONLY_ASSIGNMENT_LIST,
     }.items():
