@@ -1,7 +1,8 @@
 """A bank of past terms: anonymous answers with their verdicts, which today's kit and lab must still give.
 
-A verdict is the final points of a check, and, if nobody changed these points by hand, the points of its parts and the
-reasons for which points were lost. Points alone would hide a check that takes its points off for the wrong reason.
+A verdict is the final points of a check, and, if nobody changed these points by hand, the points of its parts, the
+reasons for which points were lost, and how many expectations held. Points alone would hide a check that takes points off
+for the wrong reason, or that no longer looks at something.
 
 Only programs and files are kept, without the names of students and without answers in words. A difference is either a
 mistake in today's check, or a mistake of the past that somebody explains. A lab is not released before that.
@@ -44,11 +45,18 @@ class Verdict(_Model):
     """The parts with their titles and points; None if only the points are known or decided."""
     codes: dict[str, str] | None = None
     """The code of the first failure in each part, by the part's title; None as above."""
+    expectations: dict[str, int] | None = None
+    """How many expectations hold in each part that has all of its points, by the part's title; None as above. An answer
+    that is right shows by this that a check no longer looks at something."""
 
     def is_covered_by(self, known: Verdict) -> bool:
         """Return whether all that is known about the verdict of the past holds for this one as well."""
-        same_parts = known.parts is None or known.parts == self.parts
-        return known.points == self.points and same_parts and (known.codes is None or known.codes == self.codes)
+        return (
+            known.points == self.points
+            and (known.parts is None or known.parts == self.parts)
+            and (known.codes is None or known.codes == self.codes)
+            and (known.expectations is None or known.expectations == self.expectations)
+        )
 
 
 class Explained(Verdict):
@@ -107,6 +115,11 @@ class Difference(_Model):
                 where = f" of part `{part}`" if part else ""
                 if reasons[0] != reasons[1]:
                     found.append(f"reason{where} {reasons[0]} → {reasons[1]}")
+        if before.expectations is not None and now.expectations is not None:
+            for part, number in before.expectations.items():
+                where = f" of part `{part}`" if part else ""
+                if now.expectations.get(part, number) != number:
+                    found.append(f"expectations{where} {number} → {now.expectations[part]}")
         return found
 
 
@@ -292,7 +305,10 @@ def verdict(check: CheckResult) -> Verdict:
     for one in check.outcomes:
         if one.status in (Status.FAILED, Status.UNKNOWN):
             codes.setdefault(one.part, one.code)
-    return Verdict(points=check.points, parts=check.parts, codes=codes)
+    whole = {part.title for part in check.parts if part.points == part.max_points}
+    whole |= {""} if check.points == check.max_points else set()
+    held = Counter(one.part for one in check.outcomes if one.status is Status.PASSED and one.part in whole)
+    return Verdict(points=check.points, parts=check.parts, codes=codes, expectations=dict(held))
 
 
 def differences(name: str, entry: Banked, result: SubmissionResult) -> list[Difference]:

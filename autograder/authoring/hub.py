@@ -14,6 +14,8 @@ from autograder.core.files import write_beside
 from autograder.setup.places import KIT_FOLDER
 
 CONFIGURATION = "jupyterhub_config.py"
+_LONGEST = 40
+"""The most characters of the folder's path. It begins the paths of the kernels' sockets, which can have 107."""
 _TEMPLATE = Path(__file__).with_name("templates") / "jupyterhub_config.template"
 # Without this setting, terminals are login shells, in which /etc/profile sets another PATH.
 _TERMINALS = {"ServerApp": {"terminado_settings": {"shell_command": ["/bin/bash"]}}}
@@ -42,7 +44,8 @@ def write_hub(root: Path, book: Path | None, folder: Path) -> list[str]:
         folder: the folder to write. Its name is the course's name in nbgrader's exchange.
 
     Raises:
-        KitError: the caller is not root, the course belongs to root, or the students' kit cannot be written.
+        KitError: the caller is not root, the course belongs to root, the folder's path is too long, or the students'
+            kit cannot be written.
         OSError: the folder cannot be written.
     """
     if os.getuid() != 0:
@@ -53,8 +56,13 @@ def write_hub(root: Path, book: Path | None, folder: Path) -> list[str]:
             f"The course in {root} belongs to root, so no user could grade it.",
             f"Give it to a user of its own: chown -R grader: {root}",
         )
-    os.umask(0o022)
     folder = folder.resolve()
+    if len(str(folder)) > _LONGEST:
+        raise KitError(
+            f"The path {folder} has more than {_LONGEST} characters, which is too long for the sockets of kernels.",
+            "Name another folder, such as /srv/ros2.",
+        )
+    os.umask(0o022)
     folder.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=folder) as place:
         write_kit(root, book, Path(place))

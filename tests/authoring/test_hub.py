@@ -77,6 +77,13 @@ def test_a_course_that_belongs_to_root_is_not_served(place: Path) -> None:
     assert "chown" in refused.value.do and not (place / "ros2").exists()
 
 
+@needs_root
+def test_a_folder_whose_path_leaves_no_room_for_sockets_is_refused(place: Path) -> None:
+    with pytest.raises(KitError, match="too long for the sockets") as refused:
+        write_hub(course_of(place, "nobody"), None, place / "a-course-with-a-long-name")
+    assert "/srv/ros2" in refused.value.do and not (place / "a-course-with-a-long-name").exists()
+
+
 ANN, BOB, GRADER = "hub-t-ann", "hub-t-bob", "hub-t-grader"
 
 

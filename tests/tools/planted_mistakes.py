@@ -1,6 +1,6 @@
 """Plant mistakes in checks, and count how many of them a bank of past answers stops.
 
-`python tests/tools/planted_mistakes.py [--answers 6] [--jobs 3] [--only NUMBER …]` takes the mistakes of
+`python tests/tools/planted_mistakes.py [--answers 6] [--jobs 3] [--once] [--only NUMBER …]` takes the mistakes of
 `planted_mistakes.yaml`. The bank holds the same number of answers of each lab. A rule picks them from the sample class,
 whatever the mistakes are: the solution, the first other right answer, the unfinished one, and then the students with
 mistakes, in the order of their names. Each check with a mistake runs on all of these answers. A mistake is stopped if
@@ -12,6 +12,7 @@ from __future__ import annotations
 import argparse
 import sys
 import tempfile
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,6 +25,7 @@ import sample_class
 from places import ROOT
 
 from autograder.authoring.bank import Banked, Difference, differences, verdict
+from autograder.authoring.mutation.mutants import using
 from autograder.core.results import Isolation, SubmissionResult
 from autograder.course.lab import Cell, Lab, load_lab
 from autograder.grading.class_runner import run_jobs
@@ -62,7 +64,18 @@ def chosen_answers(lab: str, number: int) -> list[str]:
     names = sample_class.students(lab)
     right = [name for name in names if name.startswith("correct")]
     wrong = [name for name in names if name.startswith("m")]
+    if number == 0:
+        return [name for name in ("solution", *right, "partial") if name in names] + wrong
     return [name for name in ("solution", *right[:1], "partial") if name in names] + wrong[: number - 3]
+
+
+def different(lab: Lab, check: Cell, students: dict[str, Path]) -> dict[str, Path]:
+    """Return the students without those who hand in the same as an earlier one to this check."""
+    names, found = sorted(using(lab, check)), {}
+    for student, path in students.items():
+        sources = read_submission(path, lab).sources
+        found.setdefault(tuple(sources[name] for name in names), (student, path))
+    return dict(found.values())
 
 
 def run(lab: Lab, cells: Sequence[Cell], students: dict[str, Path], check: str, jobs: int) -> list[SubmissionResult]:
@@ -84,44 +97,63 @@ def compared(bank: dict[str, Banked], results: Sequence[SubmissionResult]) -> li
     return [one for result in results for one in differences(result.student, bank[result.student], result)]
 
 
-def by_points(bank: dict[str, Banked], results: Sequence[SubmissionResult]) -> list[Difference]:
-    """Return what a bank would list that knows only the points of the checks."""
-    return compared({name: entry.model_copy(update={"verdicts": {}}) for name, entry in bank.items()}, results)
+def knowing_less(bank: dict[str, Banked], *unknown: str) -> dict[str, Banked]:
+    """Return a bank that does not know some parts of the verdicts."""
+    return {
+        name: entry.model_copy(
+            update={
+                "verdicts": {
+                    check: one.model_copy(update=dict.fromkeys(unknown)) for check, one in entry.verdicts.items()
+                }
+            }
+        )
+        for name, entry in bank.items()
+    }
+
+
+def tried(mistake: Mistake, asked: argparse.Namespace, folder: Path) -> Counter[str]:
+    """Plant a mistake, print what the bank finds, and return which kinds of a bank stop it."""
+    lab = load_lab(ROOT, mistake.lab)
+    names = chosen_answers(lab.name, asked.answers)
+    made = {name: sample_class.build_student(lab, name, folder) / f"{lab.name}.ipynb" for name in names}
+    students = different(lab, next(one for one in lab.checks if one.grade_id == mistake.check), made)
+    before = run(lab, lab.cells, students, mistake.check, asked.jobs)
+    again = [] if asked.once else run(lab, lab.cells, students, mistake.check, asked.jobs)
+    after = run(lab, mistake.planted(lab.cells), students, mistake.check, asked.jobs)
+    bank = {result.student: banked(result) for result in before}
+    banks = {
+        "by all that the bank knows": bank,
+        "without the numbers of expectations": knowing_less(bank, "expectations"),
+        "by points alone": knowing_less(bank, "parts", "codes", "expectations"),
+    }
+    found = {kind: compared(one, after) for kind, one in banks.items()}
+    alarms = compared(bank, again)
+    said = "; ".join(f"{kind} {'stopped' if one else 'NOT stopped'}" for kind, one in found.items())
+    print(f"{mistake.check}, {mistake.kind}: {mistake.about} ({len(students)} different answers): {said}")
+    for label, one in (
+        *(("", one) for one in found["by all that the bank knows"]),
+        *(("ALARM ", one) for one in alarms),
+    ):
+        print(f"  {label}{one.entry}: {'; '.join(one.changes)}")
+    sys.stdout.flush()
+    return Counter({kind: 1 for kind, one in found.items() if one} | {"false alarms": len(alarms)})
 
 
 def main() -> int:
-    """Run the experiment, print a line for each mistake, and the figures at the end."""
+    """Run the experiment, and print a line for each mistake and the figures at the end."""
     parser = argparse.ArgumentParser()
-    parser.add_argument("--answers", type=int, default=6, help="how many answers of each lab the bank holds")
+    parser.add_argument("--answers", type=int, default=6, help="how many answers of each lab the bank holds; 0: all")
+    parser.add_argument("--once", action="store_true", help="do not run the unchanged checks again")
     parser.add_argument("--jobs", type=int, default=3, help="how many answers run at once")
     parser.add_argument("--only", type=int, nargs="*", help="the numbers of the mistakes, from 1; default: all")
     asked = parser.parse_args()
     mistakes = [Mistake(**one) for one in yaml.safe_load(LIST.read_text(encoding="utf-8"))]
-    stopped = points_only = false_alarms = 0
+    chosen = [mistakes[number - 1] for number in asked.only] if asked.only else mistakes
+    figures: Counter[str] = Counter()
     with tempfile.TemporaryDirectory(prefix="bank-") as folder:
-        for number, mistake in enumerate(mistakes, 1):
-            if asked.only and number not in asked.only:
-                continue
-            lab = load_lab(ROOT, mistake.lab)
-            students = {
-                name: sample_class.build_student(lab, name, Path(folder)) / f"{lab.name}.ipynb"
-                for name in chosen_answers(lab.name, asked.answers)
-            }
-            before, again = (run(lab, lab.cells, students, mistake.check, asked.jobs) for _ in range(2))
-            bank = {result.student: banked(result) for result in before}
-            alarms = compared(bank, again)
-            after = run(lab, mistake.planted(lab.cells), students, mistake.check, asked.jobs)
-            found, with_points = compared(bank, after), by_points(bank, after)
-            stopped, points_only = stopped + bool(found), points_only + bool(with_points)
-            false_alarms += len(alarms)
-            said = ["stopped" if one else "not stopped" for one in (found, with_points)]
-            print(f"{number} {mistake.check}, {mistake.kind}: {mistake.about}: {said[0]}; by points alone {said[1]}")
-            for label, one in (*(("", one) for one in found), *(("false alarm: ", one) for one in alarms)):
-                print(f"  {label}{one.entry}: {'; '.join(one.changes)}", flush=True)
-    tried = len(asked.only or mistakes)
-    print(
-        f"{stopped} of {tried} stopped; {points_only} by points alone; {false_alarms} false alarms of unchanged checks"
-    )
+        for mistake in chosen:
+            figures += tried(mistake, asked, Path(folder))
+    print(f"{len(chosen)} mistakes; stopped or false alarms: {dict(figures)}")
     return 0
 
 
