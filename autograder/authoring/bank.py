@@ -1,8 +1,8 @@
 """A bank of past terms: anonymous answers with their verdicts, which today's kit and lab must still give.
 
 A verdict is the final points of a check, and, if nobody changed these points by hand, the points of its parts, the
-reasons for which points were lost, and how many expectations held. Points alone would hide a check that takes points off
-for the wrong reason, or that no longer looks at something.
+reasons for which points were lost, and how many expectations held. Points alone would hide a check that takes points
+off for the wrong reason, or that no longer looks at something.
 
 Only programs and files are kept, without the names of students and without answers in words. A difference is either a
 mistake in today's check, or a mistake of the past that somebody explains. A lab is not released before that.
