@@ -51,7 +51,6 @@ class Navigator(Node):
         try:
             return self.drive(goal_handle)
         finally:
-            self.stops += goal_handle.is_cancel_requested
             self.drives = self.stops > 1
 
     def drive(self, goal_handle):
@@ -62,6 +61,7 @@ class Navigator(Node):
             time.sleep(0.1)
             if goal_handle.is_cancel_requested:
                 goal_handle.canceled()
+                self.stops += 1
                 return result_of(self.position)
             left = target - self.position
             self.position = target if abs(left) <= reach else self.position + (reach if left > 0.0 else -reach)
