@@ -9,7 +9,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from autograder.diagnosis import callbacks, programs
 from autograder.diagnosis.chain import inside_reason
 from autograder.diagnosis.inside import Inside, called, listed
-from autograder.diagnosis.names import why_no_endpoint
+from autograder.diagnosis.names import absolute_name, why_no_endpoint
 from autograder.diagnosis.programs import program_trouble
 from autograder.diagnosis.scene import Scene, first
 from autograder.diagnosis.together import why_starved
@@ -96,6 +96,7 @@ def why_silent(scene: Scene, topic: str, msg_type: type, profile: QoSProfile) ->
         or lifecycle_silence(scene, topic)
         or too_old(scene, topic, profile)
         or not_due(scene, topic)
+        or listens_elsewhere(scene, topic)
         or why_starved(scene)
         or first((callbacks.never_awaited,), scene.inside_of(node))
         or SILENT(account(scene, topic))
@@ -168,6 +169,20 @@ def _no_timer_due(inside: Inside, node: str) -> Reason | None:
         f"`{inside.name}`: {called(late[0])} has not fired yet; the program has run for {inside.age:.0f} s.",
         f"`create_timer` takes its period in seconds.{meant}",
     )
+
+
+def listens_elsewhere(scene: Scene, topic: str) -> Reason | None:
+    """Must have seen: a node that has published nothing on a topic, and a subscription of it that got nothing: nobody
+    publishes under its name, which is absolute, but somebody does under this name in the node's namespace.
+    """
+    for inside, publisher in _publishers(scene, topic):
+        space = publisher.node.rpartition("/")[0]
+        for thing in [] if publisher.runs else inside.callbacks:
+            unheard = (thing.kind, thing.node, thing.runs) == ("subscription", publisher.node, 0)
+            unsaid = unheard and thing.given.startswith("/") and not scene.observer.publishers(thing.name)
+            if unsaid and scene.observer.publishers(space + thing.given):
+                return absolute_name(scene, "subscription", thing.name)
+    return None
 
 
 def nothing_due(scene: Scene, node: str) -> Reason | None:

@@ -108,6 +108,36 @@ def test_a_check_sees_where_a_car_would_come_without_the_box_that_holds_it() -> 
     assert found.points == 1, found
 
 
+RESTS = """
+steps = 0
+def count(odometry):
+    global steps
+    steps += 1
+    command.linear.x, command.angular.z = (0.5, 0.0) if steps < 20 else (0.0, 0.0) if steps < 60 else {then}
+node.create_subscription(Odometry, "odom", count, 10)
+"""
+
+
+@pytest.mark.parametrize(
+    ("then", "told"),
+    [("(0.5, 0.0)", "the car stood, and then it drove on."), ("(0.0, 1.0)", "and then it turned on the spot.")],
+)
+def test_a_car_that_does_not_stay_where_it_has_stopped_is_told_for_how_long_it_stood(then: str, told: str) -> None:
+    check = 'with launch("p", world="street") as ros:\n    car = ros.car()\n    car.expect_driven(0.2)\n'
+    check += "    car.expect_stopped_within(5, stays=1)\n    car.expect_stopped_within(5, stays=6)\nros.score(1)"
+    found = graded(check, DRIVES.format(speed=0.0, more=RESTS.format(then=then)))
+    failed = found.first_failure
+    assert [outcome.status for outcome in found.outcomes[:2]] == 2 * [Status.PASSED], found
+    assert failed is not None and failed.code == "not-stopped" and told in failed.because, found
+
+
+def test_a_car_that_only_turns_has_turned() -> None:
+    check = 'with launch("p", world="street") as ros:\n    ros.car().expect_driven(0.2, within=3)\nros.score(1)'
+    failed = graded(check, DRIVES.format(speed=0.0, more="command.angular.z = 1.0")).first_failure
+    assert failed is not None and failed.code == "not-driven", failed
+    assert "It drove 0.00 m" in failed.because and "and turned by" in failed.because, failed.because
+
+
 def test_a_program_that_sends_no_command_reads_why() -> None:
     check = 'with launch("p", world="street") as ros:\n    ros.car().expect_driven(1.0, within=1)\nros.score(1)'
     found = graded(check, DRIVES.format(speed=1.0, more="").replace('"cmd_vel"', '"cmd_vell"'))

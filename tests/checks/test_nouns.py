@@ -249,6 +249,8 @@ LINES = {
         ("ros.car().expect_reached('parking', within=0.2)", "place-not-reached"),
         ("ros.car().expect_reached('end', within=20)", ""),
         ("ros.car().expect_stopped_within(5, at='end')", ""),
+        ("ros.car().expect_stopped_within(5, at='end', stays=2)", ""),
+        ("ros.car().expect_stopped_within(0.1, at='parking', stays=2)", "not-stopped"),
         ("ros.car().expect_no_touch()", "touched"),
         ("ros.require(ros.car().pose.x > 7 and ros.car().trail()[0].pose.x < 1, 'It drove')", ""),
         ("ros.require_equal('The wall', ros.car().touches()[0].what, 'a wall')", ""),

@@ -124,6 +124,17 @@ class Case:
 
 
 THREADS = "executor = MultiThreadedExecutor(num_threads={})\nexecutor.add_node(node)\nexecutor.spin()"
+ABROAD = """
+other = rclpy.create_node('other', namespace='/{}')
+other.create_publisher(String, 'words', 10)
+other.create_subscription(String, '/heard', print, 10)
+other.create_timer(0.05, lambda: None)
+node.create_publisher(String, '/{}/heard', 10)
+executor = MultiThreadedExecutor(num_threads=2)
+executor.add_node(node)
+executor.add_node(other)
+executor.spin()
+"""
 TALK = "self.create_timer(0.05, lambda: self.out.publish(String(data='x')))\n"
 SERVER = "self.create_service(Trigger, '~/gate', lambda request, response: response, callback_group=Reentrant())\n"
 CLIENT = "self.client = self.create_client(Trigger, '~/gate'{})\n"
@@ -1270,6 +1281,18 @@ CASES = {
         says="absolute-name",
         never=("topic-present",),
         ask=lambda scene, name: diagnosis.why_topic_present(scene, "/elsewhere"),
+    ),
+    "listens_elsewhere": Case(
+        main=ABROAD.format("abroad", "abroad"),
+        says="absolute-name",
+        because="`/heard`",
+        ask=lambda scene, name: diagnosis.why_silent(scene, "/abroad/words", String, quiet_profile()),
+    ),
+    "nobody_says_it": Case(
+        main=ABROAD.format("away", "elsewhere"),
+        says="silent",
+        never=("absolute-name",),
+        ask=lambda scene, name: diagnosis.why_silent(scene, "/away/words", String, quiet_profile()),
     ),
     "used_topic": Case(
         says="topic-present",

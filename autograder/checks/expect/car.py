@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from itertools import pairwise
 from typing import TYPE_CHECKING, NoReturn
 
 from geometry_msgs.msg import Twist
@@ -25,9 +26,15 @@ if TYPE_CHECKING:  # loads numpy, which most labs do not need
 
 PLACE_NOT_REACHED = Kind("place-not-reached", "the car did not come to the place in time", Group.WORLD)
 TOUCHED = Kind("touched", "the car touched a wall, a box or another car", Group.WORLD)
-NOT_STOPPED = Kind("not-stopped", "the car still drives, or it stands somewhere else than it should", Group.WORLD)
+NOT_STOPPED = Kind(
+    "not-stopped",
+    "the car still drives, it stands somewhere else than it should, or it did not stay there",
+    Group.WORLD,
+)
 NOT_DRIVEN = Kind("not-driven", "the car got commands, but it did not drive as far as it should", Group.WORLD)
 
+TURNED = 0.5
+"""Radians by which a car's heading must change to have turned: one that comes to a stop still swings a little."""
 NEARLY = 0.02
 """Metres that make no difference: a car that pushes against a wall still comes a little nearer to it."""
 _THERE = 0.05
@@ -158,12 +165,13 @@ class Car(Expectations):
         self._fail(title, TOUCHED(text), hint=hint, picture=self._picture(self._mark(first.x, first.y, text)))
 
     @waits_for("the car to stand")
-    def expect_stopped_within(self, seconds: float, *, at: str = "", hint: str = "") -> None:
+    def expect_stopped_within(self, seconds: float, *, at: str = "", stays: float = 0.0, hint: str = "") -> None:
         """It stands, at the latest so many seconds of the world from now.
 
         Args:
             seconds: from now on, until it stands; it must then go on standing for a quarter of a second.
             at: the place of the map on which it must stand; by default anywhere.
+            stays: seconds of the world for which it must then go on standing, without turning on the spot.
             hint: a pointer for the student.
 
         Example:
@@ -174,19 +182,28 @@ class Car(Expectations):
         """
         if at:
             self._refuse_place(at)
-        deadline = self._world.simulation.time + seconds
+        began = self._world.simulation.time
+        deadline = began + seconds
 
         def stopped() -> bool:
-            since = self._stands_since()
+            # Nobody drives on a car whose programs have ended, so nothing more has to be waited for.
+            enough = STANDS_FOR if self._running.all_ended() else max(stays, STANDS_FOR)
+            since = self._stands_since(enough, may_turn=not stays)
             return since is not None and since <= deadline and self._is_at(at)
 
+        def too_late() -> bool:
+            since = self._stands_since(0.0, may_turn=not stays)
+            return self._world.simulation.time > deadline and (since is None or since > deadline or not self._is_at(at))
+
         where = f" on {at}" if at else ""
-        title = f"`{self.name}` stands{where} within {seconds:g} s"
-        if self._wait_in_world(stopped, seconds + STANDS_FOR + 0.1):
+        title = f"`{self.name}` stands{where} within {seconds:g} s" + f", and for {stays:g} s more" * bool(stays)
+        if self._wait_in_world(stopped, seconds + max(stays, STANDS_FOR) + 0.1, too_late):
             outcomes.passed(title, observed=f"at {_at(self.pose)}")
             return
         last = self.trail()[-1]
-        if abs(last.speed) > _stands_below():
+        if text := self._how_its_rest_ended(at, began, deadline) if stays else "":
+            pass
+        elif abs(last.speed) > _stands_below():
             text = f"At {last.time:.1f} s the car still drives with {last.speed:.2f} m/s, at {_at(last.pose)}."
         elif self._is_at(at):
             text = f"At {last.time:.1f} s the car had just stopped, at {_at(last.pose)}: too late."
@@ -214,20 +231,29 @@ class Car(Expectations):
             outcomes.passed(title, observed=f"{self._record.metres:.1f} m")
             return
         last = self.trail()[-1]
-        text = f"It drove {self._record.metres:.2f} m in {last.time:.1f} s, and is at {_at(last.pose)}."
+        turned = sum(_turned(one, other) for one, other in pairwise(self.trail()))
+        where = (
+            f"is at {_at(last.pose)}"
+            if turned < TURNED
+            else (f"turned by {math.degrees(turned):.0f} degrees, at {_at(last.pose)}")
+        )
+        text = f"It drove {self._record.metres:.2f} m in {last.time:.1f} s, and {where}."
         self._fail_with(title, NOT_DRIVEN, f"{text} {self._afterwards(last)}".strip(), last, hint)
 
     @property
     def _record(self) -> Record:
         return self._world.simulation.records[self._name]
 
-    def _wait_in_world(self, ready: Callable[[], bool], seconds: float) -> bool:
-        """Wait until something is so, or so many seconds of the world have gone by, or nothing drives the car."""
+    def _wait_in_world(
+        self, ready: Callable[[], bool], seconds: float, hopeless: Callable[[], bool] = lambda: False
+    ) -> bool:
+        """Wait until something is so or hopeless, or so many seconds of the world are over, or nothing drives it."""
         world = self._world.simulation
         deadline = world.time + seconds
 
         def nothing_more() -> bool:
-            return world.time >= deadline or (self._running.all_ended() and self._stands_since() is not None)
+            ended = self._running.all_ended() and self._stands_since() is not None
+            return ended or world.time >= deadline or hopeless()
 
         return self._observer.wait(ready, 4 * seconds + 10, nothing_more)
 
@@ -239,18 +265,34 @@ class Car(Expectations):
     def _away(self, place: str, sample: Sample) -> float:
         return self._world.simulation.room.distance_to(place, sample.pose.x, sample.pose.y)
 
-    def _is_at(self, place: str) -> bool:
-        return not place or self._world.simulation.room.place_at(self.pose.x, self.pose.y) == place
+    def _is_at(self, place: str, sample: Sample | None = None) -> bool:
+        pose = sample.pose if sample else self.pose
+        return not place or self._world.simulation.room.place_at(pose.x, pose.y) == place
 
-    def _stands_since(self) -> float | None:
+    def _stands_since(self, enough: float = STANDS_FOR, *, may_turn: bool = True) -> float | None:
         """Since when it stands; None if it does not, or not for long enough yet."""
         trail = self.trail()
         since = None
         for sample in reversed(trail):
-            if abs(sample.speed) > _stands_below():
+            if abs(sample.speed) > _stands_below() or not (may_turn or _turned(sample, trail[-1]) < TURNED):
                 break
             since = sample.time
-        return since if since is not None and trail[-1].time - since >= STANDS_FOR else None
+        return since if since is not None and trail[-1].time - since >= enough else None
+
+    def _how_its_rest_ended(self, at: str, began: float, deadline: float) -> str:
+        """Say how it left the place on which it had stopped in time, or turned there; empty if it did not stop."""
+        text, rest = "", None  # where its rest began
+        for sample in (one for one in self.trail() if one.time >= began):
+            drives = abs(sample.speed) > _stands_below()
+            if rest is None:
+                if not drives and sample.time <= deadline and self._is_at(at, sample):
+                    rest = sample
+            elif drives or _turned(rest, sample) >= TURNED:
+                if sample.time - rest.time >= STANDS_FOR:
+                    where, then = f" on {at}" if at else "", "drove on" if drives else "turned on the spot"
+                    text = f"From {rest.time:.1f} s to {sample.time:.1f} s the car stood{where}, and then it {then}."
+                rest = None
+        return text
 
     def _afterwards(self, sample: Sample) -> str:
         """Why it did not drive on, as far as the record shows that."""
@@ -293,6 +335,11 @@ class Car(Expectations):
         from autograder.world.drawing import drawn, still
 
         return still(drawn(self._world.simulation), marks)
+
+
+def _turned(one: Sample, other: Sample) -> float:
+    """The radians between two headings."""
+    return abs(math.remainder(other.pose.heading - one.pose.heading, math.tau))
 
 
 def _at(pose: Pose) -> str:
