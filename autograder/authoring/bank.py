@@ -15,6 +15,7 @@ import json
 from collections import Counter
 from contextlib import closing
 from dataclasses import dataclass
+from itertools import groupby
 from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict, ValidationError
@@ -307,7 +308,9 @@ def verdict(check: CheckResult) -> Verdict:
             codes.setdefault(one.part, one.code)
     whole = {part.title for part in check.parts if part.points == part.max_points}
     whole |= {""} if check.points == check.max_points else set()
-    held = Counter(one.part for one in check.outcomes if one.status is Status.PASSED and one.part in whole)
+    passed = [(one.part, one.title) for one in check.outcomes if one.status is Status.PASSED and one.part in whole]
+    # On a busy machine, a check that asks until something happens may ask once more: equal neighbours count as one.
+    held = Counter(part for (part, _), _ in groupby(passed))
     return Verdict(points=check.points, parts=check.parts, codes=codes, expectations=dict(held))
 
 
