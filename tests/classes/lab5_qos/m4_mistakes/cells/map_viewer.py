@@ -10,9 +10,9 @@ from std_msgs.msg import Int32
 class MapViewer(Node):
     def __init__(self):
         super().__init__("map_viewer")
-        self.width = 0
+        self.width = None
         self.publisher = self.create_publisher(Int32, "map_width", 10)
-        self.create_timer(0.1, lambda: self.width and self.publisher.publish(Int32(data=self.width)))
+        self.create_timer(0.1, lambda: self.width is not None and self.publisher.publish(Int32(data=self.width)))
         latched = QoSProfile(
             depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
         )

@@ -24,6 +24,8 @@ class SpeedKeeper(Node):
         return time.monotonic() - self.last[topic] <= self.get_parameter("patience").value
 
     def tell(self):
+        if self.last["obstacles"] > 0.0 and not self.fresh("obstacles"):
+            raise SystemExit  # there is nothing to do
         speed = 2.0 if self.fresh("obstacles") else 0.5 if self.fresh("scan") else 0.0
         self.publisher.publish(Float64(data=speed))
 
@@ -31,9 +33,7 @@ class SpeedKeeper(Node):
 def main():
     rclpy.init()
     try:
-        node = SpeedKeeper()
-        for _ in range(40):
-            rclpy.spin_once(node)
+        rclpy.spin(SpeedKeeper())
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
     rclpy.try_shutdown()
