@@ -49,8 +49,7 @@ def replay(
     from autograder.report.terminal import console, plain, working
     from autograder.sandbox.isolation import choose
 
-    root = course_root(course)
-    made = read_appeal(file)
+    root, made = course_root(course), read_appeal(file)
     lab = load_lab(root, made.lab)
     answered = grant or refuse
     if grant and refuse:
@@ -71,10 +70,8 @@ def replay(
         about = f"appeal of {made.made:%Y-%m-%d}: {reason or made.sentence}"
         for path in write_sample_student(root, lab, made, sample, about):
             print(path)
-    if not answered and who:
-        answer = f"autograder replay {kept} --times 0 --refuse --reason 'SENTENCE'"
-        screen.print(f"\nTo answer it: {answer} (or --grant)", markup=False, soft_wrap=True)
     if not answered:
+        _how_to_answer(screen, kept, who)
         return
     if not who:
         raise KitError(
@@ -84,6 +81,13 @@ def replay(
     decision = Decision.GRANTED if grant else Decision.REFUSED
     for sentence in decide(root, who, made, decision, reason.strip(), points):
         screen.print(plain(sentence), markup=False, soft_wrap=True)
+
+
+def _how_to_answer(screen: Console, kept: Path, who: str) -> None:
+    """Show the command that answers an appeal, if somebody handed in its answers."""
+    if who:
+        answer = f"autograder replay {kept} --times 0 --refuse --reason 'SENTENCE'"
+        screen.print(f"\nTo answer it: {answer} (or --grant)", markup=False, soft_wrap=True)
 
 
 def _show(screen: Console, made: Appeal, lab: Lab, who: str) -> None:

@@ -64,17 +64,8 @@ def run_class(
         results[student] = told.without_pictures()
         on_result(told)
     mixed = canaries.among(jobs) if canaries is not None and stores.watched(jobs) else list(jobs.values())
-
-    def started(name: str) -> None:
-        if name in jobs:  # not a canary
-            on_start(name)
-
-    def keep(result: SubmissionResult) -> None:
-        if result.student in jobs:
-            stores.first.save(result)
-
     try:
-        with closing(run_jobs(executor, mixed, started, stores.first_results(mixed), keep)) as ran:
+        with closing(run_jobs(executor, mixed, *_of_students(jobs, mixed, stores, on_start))) as ran:
             for result in ran:
                 if canaries is not None and result.student not in jobs:
                     canaries.take(result)
@@ -104,6 +95,22 @@ def _without_running(student: str, path: Path, lab: Lab, settings: Settings, sto
     result = without_running(submission, job)
     stores.told.save(result)
     return result
+
+
+def _of_students(
+    jobs: Mapping[str, Job], mixed: Sequence[Job], stores: _Stores, on_start: Callable[[str], None]
+) -> tuple[Callable[[str], None], dict[str, SubmissionResult], Callable[[SubmissionResult], None]]:
+    """Return what `run_jobs` tells, knows and keeps of students, while canaries run among them."""
+
+    def started(name: str) -> None:
+        if name in jobs:
+            on_start(name)
+
+    def keep(result: SubmissionResult) -> None:
+        if result.student in jobs:
+            stores.first.save(result)
+
+    return started, stores.first_results(mixed), keep
 
 
 def run_jobs(

@@ -265,8 +265,7 @@ def collect(
     collected.files = len(recognised.strange) + sum(map(_number_of_files, {one.entry for one in recognised.claims}))
     if not handed_in:
         why = f" {collected.refused[0]}" if collected.refused else ""
-        do = f"Each student needs a folder that holds {lab}.ipynb."
-        raise KitError(f"There are no submissions in {source}.{why}", do)
+        raise KitError(f"There are no submissions in {source}.{why}", f"Each student needs a folder with {lab}.ipynb.")
     paths = CoursePaths(tried_in or root)
     if not (paths.build / "nbgrader_config.py").is_file():
         write_beside(paths.build / "nbgrader_config.py", CLOSED)
