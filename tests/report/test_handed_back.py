@@ -380,7 +380,7 @@ def test_all_pages_can_be_read_by_everybody_on_a_phone_and_on_paper(graded: Grad
     entries, day = class_entries(graded.root, toy.LAB), datetime.date(2026, 11, 22)
     write_class_page(page, entries, day)
     appeal = Appeal("bob", toy.LAB, "check_talker", "2026-11-22", "It said hello.", "gradebook/appeals/toy.appeal.json")
-    term = write_term_page(page.with_name("term.html"), "ROS 2", entries, [toy.LAB], {toy.LAB: 2.0}, [appeal], day)
+    term = write_term_page(page.with_name("term.html"), "ROS 2", entries, [toy.LAB], {toy.LAB: 2.0}, [appeal], day, {})
     assert "weight 2" in term.read_text() and "autograder replay gradebook" in term.read_text()
     window = browser.new_page(viewport={"width": 390, "height": 800})
     window.set_default_timeout(1000 * BROWSER_SECONDS)
