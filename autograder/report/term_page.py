@@ -34,8 +34,7 @@ _FEWEST = 3
 _LAST = 2
 """The number of labs, counted from the end, that show who falls behind."""
 
-
-Roster = Mapping[str, Mapping[str, str]]
+RosterLines = Mapping[str, Mapping[str, str]]
 """The lines of a roster, by the students' names in the gradebook."""
 
 
@@ -55,7 +54,7 @@ class _Term:
     """The submissions of a term by student and lab, and each student's share of the points."""
 
     def __init__(
-        self, entries: Sequence[Entry], labs: Sequence[str], weights: Mapping[str, float], roster: Roster
+        self, entries: Sequence[Entry], labs: Sequence[str], weights: Mapping[str, float], roster: RosterLines
     ) -> None:
         self.by_student: dict[str, dict[str, Entry]] = {student: {} for student in roster}
         for entry in entries:
@@ -93,7 +92,7 @@ def write_term_page(
     weights: Mapping[str, float],
     appeals: Sequence[Appeal],
     written: datetime.date,
-    roster: Roster,
+    roster: RosterLines,
 ) -> Path:
     """Write the page and return its path.
 
