@@ -201,15 +201,8 @@ class Car(Expectations):
             outcomes.passed(title, observed=f"at {_at(self.pose)}")
             return
         last = self.trail()[-1]
-        if text := self._how_its_rest_ended(at, began, deadline) if stays else "":
-            pass
-        elif abs(last.speed) > _stands_below():
-            text = f"At {last.time:.1f} s the car still drives with {last.speed:.2f} m/s, at {_at(last.pose)}."
-        elif self._is_at(at):
-            text = f"At {last.time:.1f} s the car had just stopped, at {_at(last.pose)}: too late."
-        else:
-            text = f"At {last.time:.1f} s the car stands at {_at(last.pose)}, {self._away(at, last):.2f} m from {at}."
-        self._fail_with(title, NOT_STOPPED, text, last, hint)
+        left = self._how_its_rest_ended(at, began, deadline) if stays else ""
+        self._fail_with(title, NOT_STOPPED, left or self._why_it_does_not_stand(last, at), last, hint)
 
     @waits_for("the car to drive")
     def expect_driven(self, metres: float, *, within: float = 30.0, hint: str = "") -> None:
@@ -278,6 +271,14 @@ class Car(Expectations):
                 break
             since = sample.time
         return since if since is not None and trail[-1].time - since >= enough else None
+
+    def _why_it_does_not_stand(self, last: Sample, at: str) -> str:
+        """Say what it does at the end instead of standing on a place."""
+        if abs(last.speed) > _stands_below():
+            return f"At {last.time:.1f} s the car still drives with {last.speed:.2f} m/s, at {_at(last.pose)}."
+        if self._is_at(at):
+            return f"At {last.time:.1f} s the car had just stopped, at {_at(last.pose)}: too late."
+        return f"At {last.time:.1f} s the car stands at {_at(last.pose)}, {self._away(at, last):.2f} m from {at}."
 
     def _how_its_rest_ended(self, at: str, began: float, deadline: float) -> str:
         """Say how it left the place on which it had stopped in time, or turned there; empty if it did not stop."""
