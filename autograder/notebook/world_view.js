@@ -35,7 +35,8 @@ function drawRoom(box, room, cars) {
   for (const place of room.places) {
     for (const one of place.blocks) rectangle(up, one, { class: "aw-place" });
     const [x, y, w, h] = place.blocks[0];
-    element(svg, "text", { x: x + w / 2, y: height - y - h / 2, class: "aw-name" }, place.name);
+    const down = h > 0.36 ? 0.18 : h / 2; // at the upper edge, because a car that has arrived stands in the middle
+    element(svg, "text", { x: x + w / 2, y: height - y - h + down, class: "aw-name" }, place.name);
   }
   for (const one of room.walls) rectangle(up, one, { class: "aw-wall" });
   for (const one of room.boxes) {

@@ -107,8 +107,9 @@ class _Panel:
             for x, y, width, height in cells:
                 self._canvas.box(x, y, width, height, fill="#f4ee9c", dashed=True)
             x, y, width, height = max(cells, key=lambda one: one[2] * one[3])
-            if names:
-                self._canvas.words(x + width / 2, y + height / 2 + 6, place, size=SMALL, anchor="middle", halo=True)
+            if names:  # at the upper edge, because a car that has arrived stands in the middle
+                down = SMALL if height > 2 * SMALL else height / 2 + 6
+                self._canvas.words(x + width / 2, y + down, place, size=SMALL, anchor="middle", halo=True)
         for kind, look in ((WALL, None), (BOX, 6)):
             for one in blocks(room.solid == kind, room.cell):
                 self._canvas.box(*self._blocks(one), look=look, fill="#555555", line=0.6 if look is None else 1.2)
@@ -214,6 +215,8 @@ def still(world: Drawn, marks: Sequence[Mark] = ()) -> Picture:
     room = world.room
     scale = min((WIDTH - 2 * _MARGIN) / room.width, _TALLEST / room.height)
     lines = [one for mark in marks for one in _wrapped("✗", mark.text)]
+    if not marks and any(way.touches for way in world.ways):  # otherwise a mark tells it
+        lines += _wrapped("✗", "The car touched something here.")
     if any(way.brakes for way in world.ways):
         lines += _wrapped("■", "The motors braked here, because no command or no heartbeat had come for 0.3 s.")
     foot = 52 + (len(lines) + (1 if lines else 0)) * (SMALL + 8)

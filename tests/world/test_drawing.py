@@ -26,6 +26,11 @@ def test_a_still_shows_the_trail_the_touch_and_the_mark_and_says_so() -> None:
     assert "parking" in picture.alt and ">parking<" in picture.svg
 
 
+def test_a_still_without_marks_says_what_its_crosses_are() -> None:
+    assert "The car touched something here." in still(drawn(driven(6.0))).svg
+    assert "touched" not in still(drawn(driven(2.0))).svg
+
+
 def test_before_anything_happens_the_car_stands_there() -> None:
     picture = still(drawn(driven(0.0)))
     assert "The car stands at (0.9, 2.1)." in picture.alt
