@@ -26,10 +26,10 @@ _POINTS = 600
 _BADGES = 20
 """The badges with seconds that a trail has at the most."""
 _MARGIN = 40.0
-_BRAKE = 9.0
-"""The side of the square where a car was braked."""
-_BESIDE = 18.0
-"""The way from the trail to that square, so that it does not cover the seconds."""
+_BRAKE, _BRAKE_IN_STRIP = 9.0, 3.0
+"""The side of the square where a car was braked, in a still and in a film strip."""
+_BESIDE = 2.0
+"""The way from the trail to that square, in sides of it, so that it does not cover the seconds."""
 
 
 @dataclass(frozen=True)
@@ -158,11 +158,11 @@ class _Panel:
     def _closed(self, corners: Any) -> str:
         return "M" + "L".join("{:.1f} {:.1f}".format(*self.at(*corner)) for corner in corners) + "Z"
 
-    def brake(self, pose: Pose) -> None:
-        """Draw a small square beside the trail, where the watchdog began to brake a car."""
+    def brake(self, pose: Pose, size: float) -> None:
+        """Draw a square of this size beside the trail, where the watchdog began to brake a car."""
         x, y = self.at(pose.x, pose.y)
-        left = x + _BESIDE * math.sin(pose.heading) - _BRAKE / 2
-        self._canvas.box(left, y + _BESIDE * math.cos(pose.heading) - _BRAKE / 2, _BRAKE, _BRAKE, fill="#000")
+        left, top = x + _BESIDE * size * math.sin(pose.heading), y + _BESIDE * size * math.cos(pose.heading)
+        self._canvas.box(left - size / 2, top - size / 2, size, size, fill="#000")
 
     def cross(self, x: float, y: float, size: float = 14.0) -> None:
         """Draw a cross in a ring around a point."""
@@ -236,7 +236,7 @@ def _fill(panel: _Panel, world: Drawn, names: bool) -> None:
     for number, way in enumerate(world.ways):
         panel.trail(way, dashed=bool(number % 2), seconds=names)
         for brake in way.brakes:
-            panel.brake(brake.pose)
+            panel.brake(brake.pose, _BRAKE if names else _BRAKE_IN_STRIP)
     for pose in world.parked:
         panel.car(pose, _PARKED, "parked" if names else "")
     for number, way in enumerate(world.ways):
