@@ -6,25 +6,39 @@ import contextlib
 import copy
 import datetime
 import secrets
+import tempfile
 from pathlib import Path
 from typing import Any
 
-from nbgrader.exchange.default import ExchangeCollect
-
 from autograder.core.files import read_plain, write_beside
+from autograder.gradebook.private_nbgrader import CollectOwned
 from autograder.submission import exchange_secret, timestamp
 
 
-class CollectNotebooks(ExchangeCollect):  # type: ignore[misc]
-    """Collects from nbgrader's exchange only the notebooks, and the files that the exchange itself added to them."""
+class CollectNotebooks(CollectOwned):
+    """Collects from nbgrader's exchange only the notebooks, and the files that the exchange itself added to them.
+
+    A link is left out, because the person who collects can read files that students must not see, such as solutions.
+    """
 
     coursedir: Any
 
     def do_copy(self, src: str, dest: str, log: Any = None) -> None:
         """Copy one submission."""
-        self.coursedir = copy.copy(self.coursedir)
-        self.coursedir.include = ["*.ipynb", timestamp.FILE_NAME, exchange_secret.FILE_NAME]
-        super().do_copy(src, dest, log)
+        submission, most = Path(src), 1000 * self.coursedir.max_file_size
+        with tempfile.TemporaryDirectory() as place:
+            plain = Path(place, "plain")
+            plain.mkdir()
+            for name in sorted(path.name for path in submission.iterdir()):
+                if not name.endswith(".ipynb") and name not in (timestamp.FILE_NAME, exchange_secret.FILE_NAME):
+                    continue
+                try:
+                    content = read_plain(submission.parent, (submission.name, name), most)
+                except OSError as error:
+                    self.log.warning("%s in %s is left out: %s", name, submission.name, error.strerror)
+                else:
+                    (plain / name).write_bytes(content)
+            super().do_copy(str(plain), dest, log)
 
 
 def only_notebooks(course: Any) -> Any:

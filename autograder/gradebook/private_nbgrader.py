@@ -19,11 +19,13 @@ from nbgrader.api import Gradebook, MissingEntry
 from nbgrader.converters import Autograde
 from nbgrader.converters.generate_solution import GenerateSolution
 from nbgrader.dbutil import ALEMBIC_DIR
+from nbgrader.exchange.default import ExchangeCollect
 from nbgrader.nbgraderformat import common
 from nbgrader.preprocessors import Execute, SaveAutoGrades, SaveCells
 
 from autograder.gradebook.queries import engine_of
 from autograder.grading.nbgrader_validate import Verdicts, replace_validator
+from autograder.intake.entries import account_of
 
 jsonschema: Any = common.jsonschema
 
@@ -34,6 +36,38 @@ def in_first_pass(autograde: Autograde) -> bool:
     Its second pass reads the file that the first pass wrote.
     """
     return bool(autograde._sanitizing)
+
+
+class CollectOwned(ExchangeCollect):  # type: ignore[misc]
+    """Collects from nbgrader's exchange only what belongs to the account whose name it has.
+
+    Every user of the machine can make a folder there, with any name. nbgrader warns of a foreign name and collects the
+    folder nevertheless. If students have no accounts on this machine, everything is collected.
+    """
+
+    src_records: list[dict[str, Any]]
+    _accounts = False
+    """Whether students have accounts."""
+
+    def _path_to_record(self, path: str) -> dict[str, Any]:
+        record = super()._path_to_record(path)
+        account = account_of(Path(path))
+        self._accounts |= account == record["username"]
+        return {**record, "account": account}
+
+    def _is_foreign(self, record: dict[str, Any]) -> bool:
+        return self._accounts and record["account"] not in ("", record["username"])
+
+    def _sort_by_timestamp(self, records: list[dict[str, Any]]) -> list[dict[str, Any]]:
+        for record in filter(self._is_foreign, records):
+            told = "%r belongs to the account %r; it is left out."
+            self.log.warning(told, record["filename"], record["account"])
+        return list(super()._sort_by_timestamp([one for one in records if not self._is_foreign(one)] or records))
+
+    def copy_files(self) -> None:
+        """Copy the newest submission of each student."""
+        self.src_records = [record for record in self.src_records if not self._is_foreign(record)]
+        super().copy_files()
 
 
 class SaveScores(SaveAutoGrades):  # type: ignore[misc]

@@ -171,14 +171,19 @@ def _of_folder(source: Path, parts: tuple[str, ...]) -> list[Entry]:
         elif path.is_dir():
             listing = partial(_few, partial(in_folder, source, where))
             inside = partial(_of_folder, source, where)
-            entries.append(Entry(where, Kind.FOLDER, listing, inside, account=_account(path)))
+            entries.append(Entry(where, Kind.FOLDER, listing, inside, account=account_of(path)))
         else:
             entries.append(_file(Member(where, partial(read_plain, source, where))))
     return entries
 
 
-def _account(path: Path) -> str:
-    owner = path.stat().st_uid
+def account_of(path: Path) -> str:
+    """Return the account of another user to whom a folder or a link belongs; empty if it belongs to this user.
+
+    Raises:
+        OSError: there is no such folder.
+    """
+    owner = path.lstat().st_uid
     if owner == os.geteuid():
         return ""
     try:

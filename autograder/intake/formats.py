@@ -215,13 +215,13 @@ def exchange(entries: Sequence[Entry], lab: str) -> Recognised:
     forms = _forms([entry for entry in entries if entry.kind is Kind.FOLDER], _INBOUND)
     accounts = any(entry.account == match["student"] for entry, match in forms)
     for entry, match in forms:
-        if accounts and entry.account not in ("", match["student"]):
-            found.strange.append(f"{entry.name[:200]!r} belongs to the account {entry.account!r}; it is left out.")
+        if match["lab"] != lab:
             found.aside.append(entry)
-        elif match["lab"] == lab:
-            found.claims.append(Claim(entry, {"id": match["student"]}, "", (match["when"],), handed_in=match["when"]))
+        elif accounts and entry.account not in ("", match["student"]):
+            found.strange.append(f"{entry.name[:200]!r} belongs to the account {entry.account!r}.")
+            found.aside.append(entry)
         else:
-            found.aside.append(entry)
+            found.claims.append(Claim(entry, {"id": match["student"]}, "", (match["when"],), handed_in=match["when"]))
     return found if found.claims else Recognised()
 
 

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import json
 import os
+import pwd
+import shutil
 import subprocess
 import sys
 from pathlib import Path
 
+import pytest
 import toy
 from places import ROOT
 
@@ -32,15 +35,51 @@ def nbgrader(folder: Path, *arguments: str) -> str:
     return told
 
 
+EXCHANGE = """
+get_config().CourseDirectory.course_id = "ros2"  # noqa: F821
+get_config().Exchange.root = {!r}  # noqa: F821
+"""
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root can give files to somebody else")
+def test_collect_takes_neither_the_work_of_another_account_nor_a_link(tmp_path: Path) -> None:
+    """Everybody may put a folder with any name into the exchange: here two accounts that every machine has."""
+    root, inbound = toy.make_course(tmp_path / "course"), tmp_path / "exchange" / "ros2" / "inbound"
+    inbound.parent.parent.mkdir()
+    inbound.parent.parent.chmod(0o777)
+    settings = TEMPLATE.read_text(encoding="utf-8") + EXCHANGE.format(str(tmp_path / "exchange"))
+    (root / "nbgrader_config.py").write_text(settings, encoding="utf-8")
+    trust(root)
+    forged = "daemon+toy+2026-12-24 10:00:00 UTC+b"
+    for owner, name, work in (
+        ("daemon", "daemon+toy+2026-11-20 10:00:00 UTC+a", "own"),
+        ("bin", "bin+toy+2026-11-20 10:00:00 UTC+a", "own"),
+        ("bin", forged, "forged"),
+        ("bin", "sys+toy+2026-12-24 10:00:00 UTC+c", "forged"),
+    ):
+        (inbound / name).mkdir(parents=True)
+        (inbound / name / "toy.ipynb").write_text(work)
+        (inbound / name / "timestamp.txt").write_text("2026-11-20 10:00:00 UTC")
+        shutil.chown(inbound / name, owner)
+    (inbound / "bin+toy+2026-11-20 10:00:00 UTC+a" / "other.ipynb").symlink_to(root / "solutions/toy/toy.ipynb")
+    (inbound / "sys+toy+2026-12-25 10:00:00 UTC+d").symlink_to(root / "solutions/toy")
+    os.chown(inbound / "sys+toy+2026-12-25 10:00:00 UTC+d", *(pwd.getpwnam("bin")[2:4]), follow_symlinks=False)
+
+    told = nbgrader(root, "collect", "toy")
+    assert f"'{forged}' belongs to the account 'bin'; it is left out." in told and "other.ipynb in bin+toy" in told
+    submitted = root / "build" / "submitted"
+    assert {path.relative_to(submitted).as_posix() for path in submitted.glob("*/toy/*")} == {
+        f"{name}/toy/{file}" for name in ("daemon", "bin") for file in ("toy.ipynb", "timestamp.txt")
+    }
+    assert {path.read_text() for path in submitted.glob("*/toy/toy.ipynb")} == {"own"}
+
+
 def test_a_lab_goes_out_and_feedback_comes_back_through_the_exchange(tmp_path: Path) -> None:
     root, student = toy.make_course(tmp_path / "course"), tmp_path / "ann"
     student.mkdir()
     (tmp_path / "exchange").mkdir(mode=0o777)
     (tmp_path / "exchange").chmod(0o777)
-    settings = (
-        '\nget_config().CourseDirectory.course_id = "ros2"  # noqa: F821\n'
-        f"get_config().Exchange.root = {str(tmp_path / 'exchange')!r}  # noqa: F821\n"
-    )
+    settings = EXCHANGE.format(str(tmp_path / "exchange"))
     (root / "nbgrader_config.py").write_text(TEMPLATE.read_text(encoding="utf-8") + settings, encoding="utf-8")
     cache = f"get_config().Exchange.cache = {str(tmp_path / 'cache')!r}\n"
     (student / "nbgrader_config.py").write_text(settings + cache, encoding="utf-8")

@@ -20,6 +20,7 @@ prepare_nbgrader()
 
 import nbgrader  # noqa: E402
 from nbgrader.converters import Autograde  # noqa: E402
+from nbgrader.exchange.default import ExchangeCollect  # noqa: E402
 from nbgrader.nbgraderformat import MetadataValidator, common  # noqa: E402
 from nbgrader.preprocessors import Execute, SaveAutoGrades  # noqa: E402
 from nbgrader.validator import Validator  # noqa: E402
@@ -34,6 +35,8 @@ USED = [
     (SaveAutoGrades, "_add_score", ["self", "cell", "resources"], "records a cell's points"),
     (Execute, "preprocess", ["self", "nb", "resources", "km"], "executes notebooks, which the kit closes"),
     (Validator, "validate", ["self", "filename"], "is nbgrader's validation, which the kit replaces"),
+    (ExchangeCollect, "_path_to_record", ["self", "path"], "reads the name of a submission in the exchange"),
+    (ExchangeCollect, "_sort_by_timestamp", ["self", "records"], "finds a student's newest submission"),
     (Validator, "invert", None, "asks for what passed"),
 ]
 

@@ -193,7 +193,7 @@ def test_nobody_hands_in_as_somebody_else_in_nbgraders_exchange(tmp_path: Path) 
     """Its folder `inbound` takes folders of all users, with any name: here two accounts that every machine has."""
     honest = [(name, f"{name}+toy+2026-11-20 10:00:00 UTC+a") for name in ("daemon", "bin")]
     forged = "daemon+toy+2026-12-24 10:00:00 UTC+b"
-    for name, folder in (*honest, ("bin", forged)):
+    for name, folder in (*honest, ("bin", forged), ("bin", forged.replace("toy", "another"))):
         (tmp_path / "inbound" / folder).mkdir(parents=True)
         (tmp_path / "inbound" / folder / "toy.ipynb").write_text("the work of daemon" if folder != forged else "evil")
         shutil.chown(tmp_path / "inbound" / folder, name)
@@ -201,7 +201,7 @@ def test_nobody_hands_in_as_somebody_else_in_nbgraders_exchange(tmp_path: Path) 
     assert {name: path.read_text() for name, path in collected.notebooks.items()} == dict.fromkeys(
         ("daemon", "bin"), "the work of daemon"
     )
-    assert f"'{forged}' belongs to the account 'bin'; it is left out." in " ".join(collected.refused)
+    assert collected.refused == [f"'{forged}' belongs to the account 'bin'. It was left out."]
 
 
 def test_whatever_lies_among_nbgraders_folders_is_taken_or_named(tmp_path: Path) -> None:

@@ -312,10 +312,9 @@ def release_lab(grader: Person) -> None:
 
 
 def grade_class(grader: Person) -> str:
-    """Collect and grade what was handed in, release the feedback, and return what the commands printed."""
-    told = grader.run(
-        f"!nbgrader collect {LAB}; autograder grade {LAB} build/submitted; nbgrader release_feedback {LAB}"
-    )
+    """Grade what was handed in, release the feedback, and return what the commands printed."""
+    inbound = grader.hub.folder / "exchange" / "ros2" / "inbound"
+    told = grader.run(f"!autograder grade {LAB} {inbound}; nbgrader release_feedback {LAB}")
     assert "Feedback released" in told, told
     return told
 

@@ -83,7 +83,7 @@ class Term:
         self.all_at_once("check, and submit", self.check_and_submit)
         began = time.monotonic()
         real_hub.grade_class(grader)
-        self.say(f"collect, grade, and release the feedback: {time.monotonic() - began:.0f} s")
+        self.say(f"grade, and release the feedback: {time.monotonic() - began:.0f} s")
         self.all_at_once("fetch the feedback", self.fetch_feedback)
         for name, seen in self.seen.items():
             seen.seconds = cpu_time_of(name)
