@@ -20,6 +20,7 @@ from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
+from autograder.authoring.mutation.mutants import using
 from autograder.core.errors import KitError
 from autograder.core.files import write_beside
 from autograder.core.results import CheckResult, Part, Status, SubmissionResult
@@ -144,11 +145,20 @@ class Compared:
     """The checks that no entry has final points for, so that the bank says nothing about them."""
 
 
-def add(root: Path, lab_name: str) -> tuple[int, int]:
-    """Add the graded class of a lab to the bank.
+@dataclass(frozen=True)
+class Added:
+    """What has become of the submissions of a graded class."""
 
-    Returns:
-        The numbers of new entries, and of students whose answers the bank had already.
+    entries: int
+    """The number of new entries."""
+    known: int
+    """The number of students whose answers were in the bank already."""
+    unreadable: int
+    """The number of students whose notebook cannot be read."""
+
+
+def add(root: Path, lab_name: str) -> Added:
+    """Add the graded class of a lab to the bank.
 
     Raises:
         KitError: the lab has no grades.
@@ -158,11 +168,12 @@ def add(root: Path, lab_name: str) -> tuple[int, int]:
     results = {one.student: one for one in ResultStore(root).all(lab_name) if one.student in grades}
     if not results:
         raise KitError(f"There are no grades of {lab_name}.", f"Grade a class first: autograder grade {lab_name}")
-    new = 0
+    new = unreadable = 0
     checks = {cell.grade_id for cell in lab.checks}
     for student, result in results.items():
         submission = read_submission(paths.submitted_notebook(student, lab_name), lab)
         if not submission.readable:
+            unreadable += 1
             continue
         sources = {name: text for name, text in submission.sources.items() if lab.answers[name].file is not None}
         of_answers = Submission(sources=submission.sources)
@@ -177,7 +188,7 @@ def add(root: Path, lab_name: str) -> tuple[int, int]:
             new += 1
             banked = Banked(sources=sources, own=own, points=points, verdicts=verdicts)
             write_beside(path, banked.model_dump_json(indent=1) + "\n")
-    return new, len(results) - new
+    return Added(entries=new, known=len(results) - new - unreadable, unreadable=unreadable)
 
 
 def check(root: Path, lab_name: str, settings: Settings) -> Compared:
@@ -189,9 +200,11 @@ def check(root: Path, lab_name: str, settings: Settings) -> Compared:
         settings: how the entries are run.
 
     Raises:
-        KitError: an entry cannot be read.
+        KitError: there is no entry, or one cannot be read.
     """
     lab, entries = load_lab(root, lab_name), _entries(root, lab_name)
+    if not entries:
+        raise KitError(f"The bank has no answers of {lab_name}.", f"Add a graded class: autograder bank add {lab_name}")
     jobs = [job_of(_submission(entry, lab), name, lab, settings) for name, entry in entries.items()]
     found: list[Difference] = []
     with closing(run_jobs(Local(settings.at_once), jobs)) as ran:
@@ -208,6 +221,22 @@ def check(root: Path, lab_name: str, settings: Settings) -> Compared:
         ),
         untried=[name for name, before in points.items() if not any(one is not None for one in before)],
     )
+
+
+def programs(root: Path, lab_name: str, entry: str, check_id: str) -> dict[str, str]:
+    """Return the sources of an entry that can affect a check, by the grade_id of the answer.
+
+    Raises:
+        KitError: there is no such entry or check, or an entry cannot be read.
+    """
+    lab, entries = load_lab(root, lab_name), _entries(root, lab_name)
+    if entry not in entries:
+        raise KitError(f"The bank has no entry {entry} of {lab_name}.", "`autograder bank check` lists the entries.")
+    meant = next((cell for cell in lab.checks if cell.grade_id == check_id), None)
+    if meant is None:
+        raise KitError(f"{lab_name} has no check `{check_id}`.", "`autograder bank check` lists the checks.")
+    sources = _submission(entries[entry], lab).sources
+    return {name: sources[name] for name in sorted(using(lab, meant)) if name in entries[entry].sources}
 
 
 def explain(root: Path, lab_name: str, entry: str, check_id: str, because: str) -> int:

@@ -1,4 +1,4 @@
-"""The commands `autograder bank add`, `check` and `explain`, for the bank of past terms."""
+"""The commands `autograder bank add`, `check`, `show` and `explain`, for the bank of past terms."""
 
 from __future__ import annotations
 
@@ -15,6 +15,8 @@ bank = typer.Typer(no_args_is_help=True)
 app.add_typer(bank, name="bank", help="Keep answers of past terms, and find out whether they still get their points.")
 
 LabArgument = Annotated[str, typer.Argument(help="The lab, such as lab2_executors.")]
+EntryArgument = Annotated[str, typer.Argument(help="The entry, as `bank check` lists it.")]
+CheckArgument = Annotated[str, typer.Argument(help="The check, by its id.")]
 
 
 @bank.command("add")
@@ -25,10 +27,12 @@ def add_class(lab: LabArgument, course: CourseOption = None) -> None:
     from autograder.intake.words import count
 
     root = course_root(course)
-    new, known = add(root, lab)
-    print(f"Added {_entries(new)} to {CoursePaths(root).bank(lab)}.")
-    if known:
-        print(f"The answers of {count(known, 'student')} are there already, or cannot be read.")
+    added = add(root, lab)
+    print(f"Added {_entries(added.entries)} to {CoursePaths(root).bank(lab)}.")
+    if added.known:
+        print(f"The answers of {count(added.known, 'student')} are there already.")
+    if added.unreadable:
+        print(f"The notebook of {count(added.unreadable, 'student')} cannot be read, and is not in the bank.")
 
 
 @bank.command("check")
@@ -71,13 +75,23 @@ def check_bank(
     raise typer.Exit(1 if bad else 0)
 
 
+@bank.command("show")
+def show_programs(lab: LabArgument, entry: EntryArgument, check: CheckArgument, course: CourseOption = None) -> None:
+    """Print the programs and files of an entry that a check looks at."""
+    from autograder.authoring.bank import programs
+    from autograder.course.paths import course_root
+    from autograder.report.terminal import plain
+
+    print(plain("\n\n".join(programs(course_root(course), lab, entry, check).values())))
+
+
 @bank.command("explain")
 def explain_difference(
     lab: LabArgument,
     entry: Annotated[
         str, typer.Argument(help="The entry, as `bank check` lists it; `all` for all entries in its list.")
     ],
-    check: Annotated[str, typer.Argument(help="The check, by its id.")],
+    check: CheckArgument,
     reason: Annotated[str, typer.Argument(help="Why today's verdict is right.")],
     course: CourseOption = None,
 ) -> None:

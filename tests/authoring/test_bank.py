@@ -10,7 +10,8 @@ import pytest
 import toy
 from typer.testing import CliRunner
 
-from autograder.authoring.bank import explain
+from autograder.authoring.bank import check as bank_check
+from autograder.authoring.bank import explain, programs
 from autograder.authoring.release import release
 from autograder.cli.main import app
 from autograder.core.errors import KitError
@@ -37,10 +38,12 @@ def test_a_release_waits_until_every_difference_is_explained(tmp_path: Path, mon
     grade_class(root, toy.LAB, tmp_path / "class", Settings(Isolation.NONE, canaries=False))
     by_hand.give(root, "bob", "check_talker", 3)
     release(root, toy.LAB)  # there is no bank yet
+    with pytest.raises(KitError, match="The bank has no answers of toy"):
+        bank_check(root, toy.LAB, Settings(Isolation.NONE))
 
     assert run(root, "add", toy.LAB) == (
         0,
-        f"Added 2 entries to {root}/bank/toy.\nThe answers of 1 student are there already, or cannot be read.\n",
+        f"Added 2 entries to {root}/bank/toy.\nThe answers of 1 student are there already.\n",
     )
     texts = [path.read_text() for path in (root / "bank" / toy.LAB).glob("*.json")]
     assert not any(name in text for text in texts for name in ("ann", "bob", "cem"))
@@ -53,6 +56,11 @@ def test_a_release_waits_until_every_difference_is_explained(tmp_path: Path, mon
     assert status == 1 and f"toy {entry} check_talker: 3 → 0: It says something else" in said  # no parts: by hand
     with pytest.raises(KitError, match="1 difference is unexplained in the bank of past terms"):
         release(root, toy.LAB)
+    assert run(root, "show", toy.LAB, entry, "check_talker") == (0, "%%node talker\nprint('no')\n")
+    with pytest.raises(KitError, match="toy has no check `talker`"):
+        programs(root, toy.LAB, entry, "talker")
+    with pytest.raises(KitError, match="The bank has no entry ann of toy"):
+        programs(root, toy.LAB, "ann", "check_talker")
     with pytest.raises(KitError, match=f"found no difference of check_answers in '{entry}'"):
         explain(root, toy.LAB, entry, "check_answers", "It was too lenient.")
     assert run(root, "explain", toy.LAB, entry, "check_talker", "It was too lenient.")[0] == 0
