@@ -42,11 +42,15 @@ def check_bank(
     jobs: Annotated[int, typer.Option(min=0, help="How many entries run at once; 0: depends on the CPUs.")] = 0,
     course: CourseOption = None,
 ) -> None:
-    """Run today's checks on all entries, and list every difference. Exit status: 0, or 1 if one is unexplained."""
+    """Run today's checks on all entries, and list every difference.
+
+    Exit status: 0; 1 if a difference is unexplained, or if the machine was too busy for a check.
+    """
     from autograder.authoring.bank import check
     from autograder.course.lab import lab_names
     from autograder.course.paths import CoursePaths, course_root
     from autograder.grading.runner import Settings
+    from autograder.intake.words import count
     from autograder.report.terminal import plain
     from autograder.sandbox.isolation import choose
 
@@ -55,7 +59,7 @@ def check_bank(
     if not names:
         raise KitError("The bank is empty.", "Add a graded class: autograder bank add LAB")
     settings = Settings(isolation=choose(isolation), jobs=jobs)
-    bad = 0
+    bad = too_busy = 0
     for name in names:
         found = check(root, name, settings)
         for one in found.differences:
@@ -63,16 +67,25 @@ def check_bank(
             print(
                 plain(": ".join(filter(None, (f"{name} {one.entry} {one.check}", "; ".join(one.changes), one.because))))
             )
-        print(f"{name}: {_entries(found.entries)}", file=sys.stderr)
+        differ = count(len(found.differences), "difference")
+        print(f"{name}: {_entries(found.entries)}, {differ} that nobody has explained", file=sys.stderr)
+        too_busy += len(found.too_busy)
+        for check_id, times in found.too_busy.items():
+            print(plain(f"{name} {check_id}: not decided in {_entries(times)}, because the machine was too busy."))
         for check_id, times in found.never_decided.items():
             why = "because it had no points when they were added"
             print(plain(f"{name} {check_id}: not compared in {_entries(times)}, {why}."))
         for check_id in found.untried:
             print(plain(f"{name} {check_id}: no entry has points of it, so the bank says nothing about this check."))
     if bad:
-        how = "autograder bank explain LAB ENTRY CHECK REASON"
-        print(f"{bad} unexplained. Correct the check, or say why it is right: {how}", file=sys.stderr)
-    raise typer.Exit(1 if bad else 0)
+        print(
+            "Look at the programs of an entry: autograder bank show LAB ENTRY CHECK\n"
+            "Then correct the check, or say why it is right: autograder bank explain LAB ENTRY CHECK REASON",
+            file=sys.stderr,
+        )
+    if too_busy:
+        print("Run it again when the machine has less to do, or with fewer entries at once: --jobs 1", file=sys.stderr)
+    raise typer.Exit(1 if bad or too_busy else 0)
 
 
 @bank.command("show")

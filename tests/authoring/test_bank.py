@@ -20,6 +20,7 @@ from autograder.course.lab import load_lab
 from autograder.gradebook.class_run import grade_class
 from autograder.grading.job import Job
 from autograder.grading.runner import Settings
+from autograder.grading.trusted_result import too_busy
 
 
 def run(root: Path, *arguments: str) -> tuple[int, str]:
@@ -52,7 +53,7 @@ def test_a_release_waits_until_every_difference_is_explained(tmp_path: Path, mon
         release(root, toy.LAB)
 
     status, said = run(root, "check", "--isolation", "none")
-    entry = said.split()[1]
+    entry = next(line.split()[1] for line in said.splitlines() if "check_talker: 3 → 0" in line)
     assert status == 1 and f"toy {entry} check_talker: 3 → 0: It says something else" in said  # no parts: by hand
     with pytest.raises(KitError, match="1 difference is unexplained in the bank of past terms"):
         release(root, toy.LAB)
@@ -91,6 +92,26 @@ def test_a_release_waits_until_every_difference_is_explained(tmp_path: Path, mon
     status, said = run(root, "check", toy.LAB, "--isolation", "none")
     assert status == 0 and "toy check_talker: not compared in 1 entry, because it had no points" in said
     assert "toy check_table: no entry has points of it, so the bank says nothing about this check." in said
+
+
+def test_a_machine_that_is_too_busy_is_no_difference(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("autograder.grading.executors.local.run_in_worker", lambda job, *_: toy.judge(job))
+    root = toy.make_course(tmp_path / "course")
+    toy.hand_in(tmp_path / "class", "ann", load_lab(root, toy.LAB).clean_notebook({})["cells"])
+    grade_class(root, toy.LAB, tmp_path / "class", Settings(Isolation.NONE, canaries=False))
+    assert run(root, "add", toy.LAB)[0] == 0
+
+    def busy(job: Job) -> SubmissionResult:
+        told = toy.judge(job)
+        told.checks[0] = too_busy(job.checks[0], 4.0)
+        return told
+
+    monkeypatch.setattr("autograder.grading.executors.local.run_in_worker", lambda job, *_: busy(job))
+    status, said = run(root, "check", toy.LAB, "--isolation", "none")
+    assert status == 1 and "0 differences" in said
+    assert "toy check_talker: not decided in 1 entry, because the machine was too busy." in said
+    with pytest.raises(KitError, match="the machine was too busy to run the whole bank"):
+        release(root, toy.LAB)
 
 
 class Judge:
