@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import sys
 from collections import Counter
 from contextlib import closing
 from dataclasses import dataclass
@@ -19,17 +20,22 @@ from itertools import groupby
 from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict, ValidationError
+from rich.console import Console
 
+from autograder.authoring.mutation.mutants import using
 from autograder.core.errors import KitError
 from autograder.core.files import write_beside
 from autograder.core.results import CheckResult, Part, Status, SubmissionResult
 from autograder.course.lab import Lab, load_lab
 from autograder.course.paths import CoursePaths
+from autograder.gradebook.class_run import Steps
 from autograder.gradebook.grades import read_grades
 from autograder.grading.class_runner import run_jobs
 from autograder.grading.executors.local import Local
 from autograder.grading.runner import Settings, job_of
 from autograder.grading.store import ResultStore
+from autograder.grading.trusted_result import was_too_busy
+from autograder.intake.words import some
 from autograder.submission.answers import Submission, take_files
 from autograder.submission.reader import read_submission
 
@@ -129,6 +135,8 @@ class _Stamp(_Model):
 
     state: str
     differences: list[Difference]
+    too_busy: int
+    """The number of verdicts that the machine was too busy for."""
 
 
 @dataclass(frozen=True)
@@ -138,17 +146,28 @@ class Compared:
     entries: int
     differences: list[Difference]
     """Those that nobody has explained."""
+    too_busy: dict[str, int]
+    """Of checks that could not be decided today because the machine was too busy: in how many entries, by grade_id."""
     never_decided: dict[str, int]
     """Of checks that had no points in some entries when these were added: the number of those, by grade_id."""
     untried: list[str]
     """The checks that no entry has final points for, so that the bank says nothing about them."""
 
 
-def add(root: Path, lab_name: str) -> tuple[int, int]:
-    """Add the graded class of a lab to the bank.
+@dataclass(frozen=True)
+class Added:
+    """What has become of the submissions of a graded class."""
 
-    Returns:
-        The numbers of new entries, and of students whose answers the bank had already.
+    entries: int
+    """The number of new entries."""
+    known: int
+    """The number of students whose answers were in the bank already."""
+    unreadable: int
+    """The number of students whose notebook cannot be read."""
+
+
+def add(root: Path, lab_name: str) -> Added:
+    """Add the graded class of a lab to the bank.
 
     Raises:
         KitError: the lab has no grades.
@@ -158,11 +177,12 @@ def add(root: Path, lab_name: str) -> tuple[int, int]:
     results = {one.student: one for one in ResultStore(root).all(lab_name) if one.student in grades}
     if not results:
         raise KitError(f"There are no grades of {lab_name}.", f"Grade a class first: autograder grade {lab_name}")
-    new = 0
+    new = unreadable = 0
     checks = {cell.grade_id for cell in lab.checks}
     for student, result in results.items():
         submission = read_submission(paths.submitted_notebook(student, lab_name), lab)
         if not submission.readable:
+            unreadable += 1
             continue
         sources = {name: text for name, text in submission.sources.items() if lab.answers[name].file is not None}
         of_answers = Submission(sources=submission.sources)
@@ -177,11 +197,11 @@ def add(root: Path, lab_name: str) -> tuple[int, int]:
             new += 1
             banked = Banked(sources=sources, own=own, points=points, verdicts=verdicts)
             write_beside(path, banked.model_dump_json(indent=1) + "\n")
-    return new, len(results) - new
+    return Added(entries=new, known=len(results) - new - unreadable, unreadable=unreadable)
 
 
 def check(root: Path, lab_name: str, settings: Settings) -> Compared:
-    """Run today's checks on every entry of a lab, and return what they make of it.
+    """Run today's checks on every entry of a lab, show the progress, and return what they make of it.
 
     Args:
         root: the course's folder.
@@ -189,25 +209,50 @@ def check(root: Path, lab_name: str, settings: Settings) -> Compared:
         settings: how the entries are run.
 
     Raises:
-        KitError: an entry cannot be read.
+        KitError: there is no entry, or one cannot be read.
     """
     lab, entries = load_lab(root, lab_name), _entries(root, lab_name)
+    if not entries:
+        raise KitError(f"The bank has no answers of {lab_name}.", f"Add a graded class: autograder bank add {lab_name}")
     jobs = [job_of(_submission(entry, lab), name, lab, settings) for name, entry in entries.items()]
     found: list[Difference] = []
-    with closing(run_jobs(Local(settings.at_once), jobs)) as ran:
+    too_busy: Counter[str] = Counter()
+    with (
+        Steps(len(jobs), Console(file=sys.stderr, highlight=False)) as steps,
+        closing(run_jobs(Local(settings.at_once), jobs, steps.started)) as ran,
+    ):
         for result in ran:
+            steps.finished(result)
             found += differences(result.student, entries[result.student], result)
+            too_busy.update(one.grade_id for one in result.checks if was_too_busy(one))
     found.sort(key=lambda one: (one.check, one.entry))
-    _write_stamp(root, lab, found)
+    _write_stamp(root, lab, found, too_busy.total())
     points = {cell.grade_id: [entry.points.get(cell.grade_id) for entry in entries.values()] for cell in lab.checks}
     return Compared(
         entries=len(entries),
         differences=found,
+        too_busy=dict(too_busy),
         never_decided=dict(
             Counter(name for one in entries.values() for name, got in one.points.items() if got is None)
         ),
         untried=[name for name, before in points.items() if not any(one is not None for one in before)],
     )
+
+
+def programs(root: Path, lab_name: str, entry: str, check_id: str) -> dict[str, str]:
+    """Return the sources of an entry that can affect a check, by the grade_id of the answer.
+
+    Raises:
+        KitError: there is no such entry or check, or an entry cannot be read.
+    """
+    lab, entries = load_lab(root, lab_name), _entries(root, lab_name)
+    if entry not in entries:
+        raise KitError(f"The bank has no entry {entry} of {lab_name}.", "`autograder bank check` lists the entries.")
+    meant = next((cell for cell in lab.checks if cell.grade_id == check_id), None)
+    if meant is None:
+        raise KitError(f"{lab_name} has no check `{check_id}`.", "`autograder bank check` lists the checks.")
+    sources = _submission(entries[entry], lab).sources
+    return {name: sources[name] for name in sorted(using(lab, meant)) if name in entries[entry].sources}
 
 
 def explain(root: Path, lab_name: str, entry: str, check_id: str, because: str) -> int:
@@ -234,19 +279,19 @@ def explain(root: Path, lab_name: str, entry: str, check_id: str, because: str) 
             f"The last `autograder bank check {lab_name}` found no difference of {check_id} in {entry!r}.",
             f"Run it, and name an entry that it lists, or `all`: autograder bank check {lab_name}",
         )
-    of_today = stamp is not None and stamp.state == _state(root, lab)
+    of_today = stamp if stamp is not None and stamp.state == _state(root, lab) else None
     for one in meant:
         banked = entries[one.entry]
         known = banked.explained | {check_id: Explained(**one.now.model_dump(), because=because)}
         path = CoursePaths(root).bank(lab_name) / f"{one.entry}.json"
         write_beside(path, banked.model_copy(update={"explained": known}).model_dump_json(indent=1) + "\n")
-    if of_today:  # nothing but the explanations has changed, so nothing needs to run again
-        _write_stamp(root, lab, [one for one in found if one not in meant])
+    if of_today is not None:  # nothing but the explanations has changed, so nothing needs to run again
+        _write_stamp(root, lab, [one for one in found if one not in meant], of_today.too_busy)
     return len(meant)
 
 
 def refuse_unexplained(root: Path, lab: Lab) -> None:
-    """Refuse to release a lab if the bank was not run with today's kit and lab, or if a difference is unexplained.
+    """Refuse to release a lab if the bank was not run completely with today's version, or a difference is unexplained.
 
     Raises:
         KitError: the lab must not be released.
@@ -260,7 +305,16 @@ def refuse_unexplained(root: Path, lab: Lab) -> None:
         raise KitError(f"{lab.name} is not released: the bank of past terms was not run with today's version.", again)
     if stamp.differences:
         differ = "1 difference is" if len(stamp.differences) == 1 else f"{len(stamp.differences)} differences are"
-        raise KitError(f"{lab.name} is not released: {differ} unexplained in the bank of past terms.", again)
+        where = some([f"{one.check} of {one.entry}" for one in stamp.differences], ", ")
+        raise KitError(
+            f"{lab.name} is not released: {differ} unexplained in the bank of past terms: {where}.",
+            f"Correct the check, or explain the difference: autograder bank explain {lab.name} ENTRY CHECK REASON",
+        )
+    if stamp.too_busy:
+        raise KitError(
+            f"{lab.name} is not released: the machine was too busy to run the whole bank of past terms.",
+            f"{again}. Do this when the machine has less to do, or with fewer entries at once, such as --jobs 1.",
+        )
 
 
 def _read_stamp(root: Path, lab: str) -> _Stamp | None:
@@ -270,8 +324,8 @@ def _read_stamp(root: Path, lab: str) -> _Stamp | None:
         return None  # it never ran, or another version of the kit wrote this
 
 
-def _write_stamp(root: Path, lab: Lab, found: list[Difference]) -> None:
-    stamp = _Stamp(state=_state(root, lab), differences=found)
+def _write_stamp(root: Path, lab: Lab, found: list[Difference], too_busy: int) -> None:
+    stamp = _Stamp(state=_state(root, lab), differences=found, too_busy=too_busy)
     write_beside(CoursePaths(root).bank_checked(lab.name), stamp.model_dump_json(indent=1) + "\n")
 
 
@@ -315,7 +369,10 @@ def verdict(check: CheckResult) -> Verdict:
 
 
 def differences(name: str, entry: Banked, result: SubmissionResult) -> list[Difference]:
-    """Return the checks that say something else about an entry than in the past, without those that are explained."""
+    """Return the checks that say something else about an entry than in the past.
+
+    Checks that are explained or that the machine was too busy for are left out.
+    """
     found = []
     today = {one.grade_id: one for one in result.checks}
     for check_id, points in entry.points.items():
@@ -323,6 +380,8 @@ def differences(name: str, entry: Banked, result: SubmissionResult) -> list[Diff
         now = verdict(one) if one is not None else Verdict(points=None)
         if points is None or now.is_covered_by(before) or (known is not None and now.is_covered_by(known)):
             continue  # nobody had decided, or somebody has explained it
+        if one is not None and was_too_busy(one):
+            continue  # this says nothing about the check
         why = "It gives no result any more."
         if one is not None:
             why = one.first_failure.because if one.first_failure is not None else ""

@@ -87,6 +87,11 @@ def lacks_a_result(result: SubmissionResult) -> bool:
     return any(outcome.code in (NO_RESULT.code, TOO_BUSY.code) for check in result.checks for outcome in check.outcomes)
 
 
+def was_too_busy(check: CheckResult) -> bool:
+    """Return whether a check is undecided because the machine was too busy, also when the check ran again alone."""
+    return check.points is None and any(outcome.code == TOO_BUSY.code for outcome in check.outcomes)
+
+
 def was_killed(check: CheckResult) -> bool:
     """Return whether a check failed because a program was ended by SIGKILL, which the kit did not send.
 

@@ -10,7 +10,8 @@ import pytest
 import toy
 from typer.testing import CliRunner
 
-from autograder.authoring.bank import explain
+from autograder.authoring.bank import check as bank_check
+from autograder.authoring.bank import explain, programs
 from autograder.authoring.release import release
 from autograder.cli.main import app
 from autograder.core.errors import KitError
@@ -19,6 +20,7 @@ from autograder.course.lab import load_lab
 from autograder.gradebook.class_run import grade_class
 from autograder.grading.job import Job
 from autograder.grading.runner import Settings
+from autograder.grading.trusted_result import too_busy
 
 
 def run(root: Path, *arguments: str) -> tuple[int, str]:
@@ -37,10 +39,12 @@ def test_a_release_waits_until_every_difference_is_explained(tmp_path: Path, mon
     grade_class(root, toy.LAB, tmp_path / "class", Settings(Isolation.NONE, canaries=False))
     by_hand.give(root, "bob", "check_talker", 3)
     release(root, toy.LAB)  # there is no bank yet
+    with pytest.raises(KitError, match="The bank has no answers of toy"):
+        bank_check(root, toy.LAB, Settings(Isolation.NONE))
 
     assert run(root, "add", toy.LAB) == (
         0,
-        f"Added 2 entries to {root}/bank/toy.\nThe answers of 1 student are there already, or cannot be read.\n",
+        f"Added 2 entries to {root}/bank/toy.\nThe answers of 1 student are there already.\n",
     )
     texts = [path.read_text() for path in (root / "bank" / toy.LAB).glob("*.json")]
     assert not any(name in text for text in texts for name in ("ann", "bob", "cem"))
@@ -49,10 +53,15 @@ def test_a_release_waits_until_every_difference_is_explained(tmp_path: Path, mon
         release(root, toy.LAB)
 
     status, said = run(root, "check", "--isolation", "none")
-    entry = said.split()[1]
+    entry = next(line.split()[1] for line in said.splitlines() if "check_talker: 3 → 0" in line)
     assert status == 1 and f"toy {entry} check_talker: 3 → 0: It says something else" in said  # no parts: by hand
     with pytest.raises(KitError, match="1 difference is unexplained in the bank of past terms"):
         release(root, toy.LAB)
+    assert run(root, "show", toy.LAB, entry, "check_talker") == (0, "%%node talker\nprint('no')\n")
+    with pytest.raises(KitError, match="toy has no check `talker`"):
+        programs(root, toy.LAB, entry, "talker")
+    with pytest.raises(KitError, match="The bank has no entry ann of toy"):
+        programs(root, toy.LAB, "ann", "check_talker")
     with pytest.raises(KitError, match=f"found no difference of check_answers in '{entry}'"):
         explain(root, toy.LAB, entry, "check_answers", "It was too lenient.")
     assert run(root, "explain", toy.LAB, entry, "check_talker", "It was too lenient.")[0] == 0
@@ -83,6 +92,26 @@ def test_a_release_waits_until_every_difference_is_explained(tmp_path: Path, mon
     status, said = run(root, "check", toy.LAB, "--isolation", "none")
     assert status == 0 and "toy check_talker: not compared in 1 entry, because it had no points" in said
     assert "toy check_table: no entry has points of it, so the bank says nothing about this check." in said
+
+
+def test_a_machine_that_is_too_busy_is_no_difference(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("autograder.grading.executors.local.run_in_worker", lambda job, *_: toy.judge(job))
+    root = toy.make_course(tmp_path / "course")
+    toy.hand_in(tmp_path / "class", "ann", load_lab(root, toy.LAB).clean_notebook({})["cells"])
+    grade_class(root, toy.LAB, tmp_path / "class", Settings(Isolation.NONE, canaries=False))
+    assert run(root, "add", toy.LAB)[0] == 0
+
+    def busy(job: Job) -> SubmissionResult:
+        told = toy.judge(job)
+        told.checks[0] = too_busy(job.checks[0], 4.0)
+        return told
+
+    monkeypatch.setattr("autograder.grading.executors.local.run_in_worker", lambda job, *_: busy(job))
+    status, said = run(root, "check", toy.LAB, "--isolation", "none")
+    assert status == 1 and "0 differences" in said
+    assert "toy check_talker: not decided in 1 entry, because the machine was too busy." in said
+    with pytest.raises(KitError, match="the machine was too busy to run the whole bank"):
+        release(root, toy.LAB)
 
 
 class Judge:

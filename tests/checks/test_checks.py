@@ -635,6 +635,8 @@ def test_an_action_is_followed_from_the_goal_to_its_end(grade: Grade) -> None:
         counter__py=COUNTER,
     )
     assert result.points == 2.0, result
+    decided = [one.title.rpartition("the goal ")[2] for one in result.outcomes if "decides" in one.title]
+    assert decided == ["`order=30`", "`order=100000`", "`order=-1`"]
 
 
 @pytest.mark.parametrize(

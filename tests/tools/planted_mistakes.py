@@ -93,9 +93,8 @@ def banked(result: SubmissionResult) -> Banked:
 
 
 def compared(bank: dict[str, Banked], results: Sequence[SubmissionResult]) -> list[Difference]:
-    """Return what `make bank` would list, without checks that a busy machine left undecided."""
-    found = [one for result in results for one in differences(result.student, bank[result.student], result)]
-    return [one for one in found if one.now.points is not None]
+    """Return what `make bank` would list."""
+    return [one for result in results for one in differences(result.student, bank[result.student], result)]
 
 
 def knowing_less(bank: dict[str, Banked], *unknown: str) -> dict[str, Banked]:

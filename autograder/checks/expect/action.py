@@ -8,7 +8,7 @@ from autograder import diagnosis
 from autograder.checks import outcomes
 from autograder.checks.expect.discovery import Discovery
 from autograder.checks.expect.expectations import WITHIN
-from autograder.checks.message_text import set_fields
+from autograder.checks.message_text import set_fields, shorten
 from autograder.checks.misuse import Misuse, refuse_other_class
 from autograder.checks.running_launch import RunningLaunch
 from autograder.checks.waiting import waits_for
@@ -83,7 +83,10 @@ class Action(Discovery):
             self._fail(title, waits, expected="accepted or rejected", observed="no answer", hint=hint)
         observed = "accepted" if sent.accepted else "rejected"
         if accepted is None or accepted == sent.accepted:
-            outcomes.passed(title, observed=observed)
+            # The goal is named, so that goals that differ count as different expectations.
+            outcomes.passed(
+                f"The action `{name}` decides about the goal `{shorten(set_fields(goal))}`", observed=observed
+            )
             return sent
         if accepted:
             because = f"The server rejected a goal that it should accept: {set_fields(goal)}."
