@@ -29,6 +29,7 @@ def test_a_still_shows_the_trail_the_touch_and_the_mark_and_says_so() -> None:
 def test_before_anything_happens_the_car_stands_there() -> None:
     picture = still(drawn(driven(0.0)))
     assert "The car stands at (0.9, 2.1)." in picture.alt
+    assert "The car /front stands at" in still(drawn(Simulation(read_room("room"), ["front"]))).alt
 
 
 def test_a_car_that_was_put_back_has_no_trail_across_the_room() -> None:
