@@ -38,6 +38,8 @@ _BOTTOM = """
   programs.
 - Your programs are in the folder `nodes` of the lab, below the name of the notebook. Only what you write in cells is
   graded; a file that you put into that folder yourself stays there, but is not handed in.
+- Code that several programs share can be in a cell of its own: what a cell `%%node my_helpers` defines, the other
+  programs import with `from my_helpers import …`.
 - `%%node?` and `%%file?` show an example. The tab key completes the names of your programs after `launch("`, commands
   and what is on the graph after `%ros2`, and what a launch can do after `ros.`.
 - `%lab` at the end of a lab shows what is done and what is still open.

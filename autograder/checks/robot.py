@@ -116,7 +116,7 @@ class Robot:
         return "\n".join(
             [
                 *lines,
-                f"running: {', '.join(running)} (nodes: {nodes})",
+                f"running: {', '.join(running)} (nodes so far: {nodes})",
                 "  look at it with %ros2, as in `%ros2 node list`; end it with .stop()",
                 f"  in a terminal: {terminal}",
             ]

@@ -145,6 +145,12 @@ def check_name(magic: str, name: str) -> None:
     if len(name) > NAME_LENGTH:
         raise BadNameError(f"The name `{name[:40]}…` is too long: at most {NAME_LENGTH} characters.")
     if magic == "file" and not _FILE_NAME.fullmatch(name) and not _PACKAGE_FILE.fullmatch(name):
+        module = name.removesuffix(".py")
+        if module != name and _NODE_NAME.fullmatch(module):
+            raise BadNameError(
+                f"`{name[:80]}` is a Python file, and such a file is written with `%%node {module}`. This is also the"
+                f" way to a module of your own: your other programs can then say `from {module} import …`."
+            )
         raise BadNameError(
             f"`{name[:80]}` cannot name a file: use letters, digits, `-`, `_` and dots, no folder,"
             " and end in .yaml, .yml, .json or .csv. A file of a package begins with the package's folder,"

@@ -59,11 +59,12 @@ function drawRoom(box, room, cars) {
   const turn = (group, [x, y, heading]) =>
     group.setAttribute("transform", `translate(${x} ${y}) rotate(${(heading * 180) / Math.PI})`);
   for (const pose of room.parked) turn(drawCar("aw-parked"), pose);
-  const bodies = cars.map((_, number) => drawCar(`aw-car${number % 4}`));
+  const bodies = []; // of each car whose place is known: none before the first message
   const names = cars.map((name) => element(svg, "text", { class: "aw-name" }, name));
   const paths = cars.map(() => []);
   return (message) => {
     message.cars.forEach((car, number) => {
+      bodies[number] ??= drawCar(`aw-car${number % 4}`);
       turn(bodies[number], car.pose);
       names[number].setAttribute("x", car.pose[0]);
       names[number].setAttribute("y", height - car.pose[1] - wide);

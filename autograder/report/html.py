@@ -161,7 +161,7 @@ def check_html(
         passed=found.passed,
         held=found.held,
         holding=words.holding(found),
-        pictures=[one.picture for one in shown.outcomes if one.status is Status.PASSED and one.picture is not None],
+        pictured=[one for one in shown.outcomes if one.status is Status.PASSED and one.picture is not None],
         logs=cut if shown.status is not Status.PASSED else [],
         origin=origin,
     )

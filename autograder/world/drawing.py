@@ -313,7 +313,7 @@ def in_words(world: Drawn, marks: Sequence[Mark] = ()) -> str:
 
 def _told(way: Way, room: Room) -> str:
     first, last = way.trail[0], way.trail[-1]
-    car = f"The car {way.name}" if way.name else "The car"
+    car = f"The car /{way.name}" if way.name else "The car"
     metres = sum(
         math.hypot(one.pose.x - other.pose.x, one.pose.y - other.pose.y)
         for one, other in pairwise(way.trail)

@@ -120,7 +120,9 @@ def test_a_defect_is_told_at_once_with_its_line(
     [
         ("%%node ../x\n1\n", "cannot name a program"),
         ("%%node\n1\n", "needs a name"),
-        ("%%file a.py\n1\n", "cannot name a file"),
+        ("%%file a.txt\n1\n", "cannot name a file"),
+        ("%%file my_main.py\n1\n", "is written with `%%node my_main`"),
+        ("%%file A.py\n1\n", "cannot name a file"),
         ("%%node X\n1\n", "cannot name a program"),
         ("%%node rclpy\n1\n", "the name of an installed module"),
         ("%%node json\n1\n", "the name of an installed module"),
@@ -618,7 +620,7 @@ def test_what_cannot_be_started_or_drawn_is_a_sentence_and_what_runs_goes_on(not
     ):
         shown = notebook.run(typo)
         assert sentence in shown.error and "autograder/checks" not in shown.error
-        assert "running: talker (nodes: /talker)" in notebook.run("print(robot)").text
+        assert "running: talker (nodes so far: /talker)" in notebook.run("print(robot)").text
     notebook.run("robot.stop()")
 
 
@@ -687,11 +689,11 @@ def test_a_check_that_fails_where_others_have_the_cpus_says_so(notebook: Noteboo
     """The kernel and its programs are kept from the CPUs as on a busy machine; what was measured stands for that."""
     write(notebook)
     notebook.run(
-        "from autograder.graph.patience import Patience\nreal = Patience.decided\nPatience.decided = lambda self: 3.2"
+        "from autograder.graph.patience import Patience\nreal = Patience.decided\nPatience.decided = lambda self: 0.02"
     )
 
     def told(check: str) -> bool:
-        return "for 3.2 s while this check was running." in " ".join(notebook.run(check).text.split())
+        return "for 0.02 s while this check was running." in " ".join(notebook.run(check).text.split())
 
     fails = CHECK.replace("at_least=2", "at_least=2, at_most=0")
     assert told(fails) and not told(CHECK)

@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 from jupyter_lab import START_SECONDS, jupyter_lab, kernels, run_all
 from kernels import Notebook
+from places import ROOT
 
 SET_UP = "%load_ext autograder\nfrom autograder.checks import World, launch"
 DRIVER = """%%node driver
@@ -197,6 +198,35 @@ def test_in_jupyterlab_it_is_driven_with_the_keyboard_and_tells_what_happens(bro
             page.request.delete(f"{address}api/kernels/{kernel['id']}?token=lab")
         page.close()
     window.close()
+
+
+WITHOUT_A_KERNEL = """async (source) => {
+  const { default: view } = await import(URL.createObjectURL(new Blob([source], { type: 'text/javascript' })));
+  const room = { width: 6, height: 4, places: [], walls: [], boxes: [], parked: [], car: [0.4, 0.25] };
+  const model = {
+    get: () => ({ room, cars: [''], still: 'still', buttons: [] }),
+    send: () => {}, off: () => {},
+    on: (_, show) => { model.show = show; },
+  };
+  view.render({ model, el: document.body });
+  const bodies = () => [...document.querySelectorAll('.aw-body')].map(one => one.parentNode.getAttribute('transform'));
+  const seen = [bodies()];
+  const car = { pose: [2, 1, 0], trail: [], rays: [], speed: 0, state: '' };
+  for (const whole of [true, false]) {
+    model.show({ cars: [car], whole, brakes: [], touches: [], running: {}, rates: [], news: [] });
+    seen.push(bodies());
+  }
+  return seen;
+}"""
+
+
+def test_a_car_is_drawn_only_when_it_is_known_where_it_is(browser: Any) -> None:
+    """A busy machine may show the view for seconds before the first message comes; until then no car is in a corner."""
+    source = (ROOT / "autograder" / "notebook" / "world_view.js").read_text()
+    page = browser.new_page()
+    before, then, after = page.evaluate(WITHOUT_A_KERNEL, source)
+    page.close()
+    assert before == [] and then == after == ["translate(2 1) rotate(0)"]
 
 
 SAVED_LIVE = """() => {

@@ -360,7 +360,7 @@ def notebook(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Notebook]:
 
 def test_a_robot_goes_on_from_cell_to_cell(notebook: Notebook) -> None:
     assert "No program is running" in notebook.run("%ros2 node list").text
-    assert "running: talker (nodes: /talker)" in notebook.run('robot = launch("talker").start()').text
+    assert "running: talker (nodes so far: /talker)" in notebook.run('robot = launch("talker").start()').text
     assert notebook.run("%ros2 node list").text == "/talker\n"
     assert notebook.run("%ros2 topic echo /chatter -n 2").text == "data: hello\n---\n" * 2
     shown = notebook.run("%ros2 topic info /chater\n_exit_code").text

@@ -34,6 +34,7 @@ def test_a_still_without_marks_says_what_its_crosses_are() -> None:
 def test_before_anything_happens_the_car_stands_there() -> None:
     picture = still(drawn(driven(0.0)))
     assert "The car stands at (0.9, 2.1)." in picture.alt
+    assert "The car /front stands at" in still(drawn(Simulation(read_room("room"), ["front"]))).alt
 
 
 def test_a_car_that_was_put_back_has_no_trail_across_the_room() -> None:

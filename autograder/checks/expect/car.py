@@ -324,7 +324,7 @@ class Car(Expectations):
             topic = self._world.full_name(self._name, "cmd_vel")
             reason = diagnosis.why_silent(self._scene(), topic, Twist, QoSProfile(depth=1))
         mark = self._mark(sample.pose.x, sample.pose.y, text.strip())
-        self._fail(title, reason, observed="" if self._record.commands else "no command came", hint=hint,
+        self._fail(title, reason, observed="" if self._record.commands else "no command reached the car", hint=hint,
                    picture=self._picture(mark))  # fmt: skip
 
     def _mark(self, x: float, y: float, text: str) -> Mark:
