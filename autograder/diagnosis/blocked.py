@@ -231,7 +231,8 @@ def rate_unspun(inside: Inside) -> Reason | None:
         spun = any(executor.spinning for executor in inside.executors)
         if call.what == "rate.sleep" and not call.in_callback and call.blocks and not spun and not _foreign(inside):
             return RATE_UNSPUN(
-                f"{_at(inside, call)}`rate.sleep()` waits for a timer of the node, but nothing spins the node.",
+                f"{_at(inside, call)}`rate.sleep()` waits for a timer of the node, but nothing spins the node "
+                "meanwhile.",
                 "Spin the node in another thread, or better: use a timer and `rclpy.spin`.",
             )
     return None

@@ -262,10 +262,14 @@ def _ran(kind: str, runs: int) -> str:
 
 def why_no_answer(scene: Scene, name: str) -> Reason:
     """Return why an existing service did not answer."""
-    found = program_trouble(scene) or inside_reason(scene, _owner(scene, name))
+    owner = _owner(scene, name)
+    trouble = program_trouble(scene)
+    if trouble and trouble.kind is programs.EXITED and any(owner in one.nodes and one.alive for one in scene.insides):
+        trouble = None  # another program has done its work and has ended
+    found = trouble or inside_reason(scene, owner)
     if found:
         return found
-    insides = [inside for inside in scene.inside_of(_owner(scene, name)) if inside.alive]
+    insides = [inside for inside in scene.inside_of(owner) if inside.alive]
     found = first((programs.cannot_answer,), insides) or why_starved(scene)
     if found:
         return found

@@ -353,7 +353,7 @@ class _Told:
         """Return the sentences."""
         found = []
         for name, record in self._world.simulation.records.items():
-            car = f"The car /{name}" if name else "The car"
+            car = f"The car /{name}" if len(self._moves) > 1 else "The car"
             for touch in list(record.touches)[self._touches[name] :]:
                 found.append(f"{car} touches {touch.what} at ({touch.x:.1f}, {touch.y:.1f}).")
             for place in list(record.places)[self._places[name] :]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import base64
 import random
+import re
 import zlib
 from collections.abc import Sequence
 from html import escape
@@ -71,20 +72,24 @@ class OwnRun(BaseModel):
 
     def __repr__(self) -> str:
         asked = [f"{name}: {one.question.text}\n{_form(one.question)}" for name, one in self.named().items()]
-        return "\n\n".join([*asked, f"Copy this line into the table:\nrun: {self.line()}"])
+        return "\n\n".join([*asked, f"Copy this line into the cell of your answers:\nrun: {self.line()}"])
 
     __str__ = __repr__
 
     def _repr_html_(self) -> str:
         """Show each question above its picture, and the line for the table."""
         shown = [
-            f"<p><b>{name}</b>: {escape(one.question.text)}<br>{escape(_form(one.question))}</p>"
+            f"<p><b>{name}</b>: {_with_code(one.question.text)}<br>{escape(_form(one.question))}</p>"
             f"{one.question.picture(one.record).html()}"
             for name, one in self.named().items()
         ]
         style = "white-space:pre-wrap; overflow-wrap:anywhere"
-        line = f'<p>Copy this line into the table:</p><pre style="{style}">run: {self.line()}</pre>'
+        line = f'<p>Copy this line into the cell of your answers:</p><pre style="{style}">run: {self.line()}</pre>'
         return "".join([*shown, line])
+
+
+def _with_code(text: str) -> str:
+    return re.sub(r"`([^`]*)`", r"<code>\1</code>", escape(text))
 
 
 def _form(question: Question) -> str:

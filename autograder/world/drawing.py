@@ -42,13 +42,13 @@ class Way:
     brakes: Sequence[Sample] = ()
     """Where the watchdog began to brake the car, and it drove on later."""
 
-    def until(self, time: float) -> Way:
-        """Return the part of the way up to a moment."""
+    def between(self, begin: float, end: float) -> Way:
+        """Return the part of the way from one moment to another."""
         return replace(
             self,
-            trail=[one for one in self.trail if one.time <= time],
-            touches=[one for one in self.touches if one.time <= time],
-            brakes=[one for one in self.brakes if one.time <= time],
+            trail=[one for one in self.trail if begin <= one.time <= end],
+            touches=[one for one in self.touches if begin <= one.time <= end],
+            brakes=[one for one in self.brakes if begin <= one.time <= end],
         )
 
 
@@ -271,9 +271,12 @@ def _wrapped(sign: str, text: str) -> list[str]:
     return lines
 
 
-def strip(world: Drawn, frames: int = 6) -> Picture:
-    """Draw moments of the way, from the beginning to the end, one beside the other like a film."""
+def strip(world: Drawn, frames: int = 6, seconds: float | None = None) -> Picture:
+    """Draw moments of the way, or of its last seconds, up to the end, one beside the other like a film."""
     room = world.room
+    if seconds is not None:
+        since = _times(world)[1] - seconds
+        world = replace(world, ways=[way.between(since, math.inf) for way in world.ways])
     begin, end = _times(world)
     columns = min(3, frames)
     rows = math.ceil(frames / columns)
@@ -286,7 +289,7 @@ def strip(world: Drawn, frames: int = 6) -> Picture:
         time = begin + (end - begin) * number / max(1, frames - 1)
         row, column = divmod(number, columns)
         left, top = gap + column * (wide + gap) + (wide - room.width * scale) / 2, gap + row * high
-        now = replace(world, ways=[_at_least_one(way.until(time + STEP / 2), way) for way in world.ways])
+        now = replace(world, ways=[_at_least_one(way.between(begin, time + STEP / 2), way) for way in world.ways])
         _fill(_Panel(canvas, room, left, top, scale), now, names=False)
         canvas.words(left, top + room.height * scale + TEXT + 2, f"{time:.1f} s", size=SMALL)
     return canvas.picture(f"{frames} moments from {begin:.1f} s to {end:.1f} s. {in_words(world)}")

@@ -149,3 +149,33 @@ def test_a_node_that_lies_a_namespace_too_deep_is_found_beside_another_run_of_it
     current.check.close()
     assert found.code == "namespace" and "another namespace: `/car/car/left`." in found.because
     assert "something adds `/car` to that" in found.hint
+
+
+SILENT = """\
+import rclpy
+from std_srvs.srv import Trigger
+rclpy.init()
+node = rclpy.create_node("gate")
+async def never(request, response):
+    await rclpy.task.Future()
+node.create_service(Trigger, "open", never)
+rclpy.spin(node)
+"""
+ONCE = """\
+import rclpy
+rclpy.init()
+rclpy.spin_once(rclpy.create_node("once"), timeout_sec=0.1)
+"""
+
+
+def test_a_program_that_has_ended_is_not_why_the_service_of_another_one_does_not_answer(tmp_path: Path) -> None:
+    (tmp_path / "gate.py").write_text(SILENT)
+    (tmp_path / "once.py").write_text(ONCE)
+    current.check.configure(tmp_path, Isolation.NONE, 7)
+    with launch("once", "gate") as ros:
+        ros.wait(lambda: not ros.program("once").running(), 120.0)
+        ros.wait(lambda: "/open" in ros._running.observer.services(), 120.0)
+        ros.wait(lambda: any("/gate" in inside.nodes for inside in ros._running.scene().insides), 120.0)
+        found = autograder.diagnosis.why_no_answer(ros._running.scene(), "/open")
+    current.check.close()
+    assert found.code == "no-answer" and "/open" in found.because

@@ -125,6 +125,24 @@ def test_a_mark_is_sent_once_and_a_page_that_begins_to_look_gets_all(notebook: N
     assert shown.result == "(True, [], True, True)", shown
 
 
+ALONE = """driver = Program("driver", namespace="/front")
+robot = launch(driver, world=World("room", cars=["/front"])).start()
+robot.show()
+view, news = robot._running.view, []
+view._over.set()  # the view's own thread would take some of the news
+view._thread.join()
+view._told = type(view._told)(robot._running, robot._running.world)
+robot.wait(lambda: news.extend(view._message()["news"]) or news, 150)
+news[0].partition(",")[0]
+"""
+
+
+def test_a_car_that_is_alone_is_not_named(notebook: Notebook) -> None:
+    notebook.run(DRIVER)
+    notebook.run("from autograder.checks import Program")
+    assert notebook.run(ALONE).result == "'The car drives'"
+
+
 def test_topics_that_are_asked_for_are_shown_with_their_last_message(notebook: Notebook) -> None:
     notebook.run(DRIVER)
     notebook.run(TWO_SHOWN)

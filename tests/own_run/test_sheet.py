@@ -47,6 +47,7 @@ def test_a_line_carries_the_questions_and_their_answers() -> None:
     assert f"run: {own.line()}" in repr(own)
     shown = own._repr_html_()
     assert shown.count("<img ") == 3 and own.line() in shown
+    assert "<code>" in shown and "`" not in shown
 
 
 def test_each_run_of_the_cell_asks_other_questions() -> None:

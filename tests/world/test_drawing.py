@@ -61,6 +61,17 @@ def test_a_film_strip_shows_moments_from_the_beginning_to_the_end() -> None:
     assert picture.alt.startswith("4 moments from 0.1 s to 5.0 s.")
 
 
+def test_a_film_strip_of_the_last_seconds_leaves_out_what_was_before() -> None:
+    world = driven(2.0)
+    world.place("", Pose(0.9, 0.8, 0.0))
+    for _ in range(round(3.0 / STEP)):
+        world.command("", 0.4, 0.0)
+        world.step()
+    picture = strip(drawn(world), frames=4, seconds=3.0)
+    assert re.findall(r">(\d\.\d) s<", picture.svg) == ["2.0", "3.0", "4.0", "5.0"]
+    assert "The car drove 1.2 m from (2.3, 2.1) in 3.0 s and is at (2.1, 0.8)" in picture.alt
+
+
 def test_a_picture_of_a_long_run_stays_small() -> None:
     world = driven(0.0)
     for number in range(20 * 60 * 20):

@@ -112,11 +112,12 @@ class Draw(Expectations):
 
         return still(self._drawn("world"))
 
-    def film(self, frames: int = 6) -> Picture:
+    def film(self, frames: int = 6, *, seconds: float | None = None) -> Picture:
         """A film strip: moments of the world from the beginning to the end, one beside the other.
 
         Args:
             frames: how many.
+            seconds: only the last of it, in seconds of the world; by default all.
 
         Example:
             `ros.draw.film(frames=6)`
@@ -125,7 +126,9 @@ class Draw(Expectations):
 
         if not 2 <= frames <= _MOST_FRAMES:
             raise Misuse(f"film: frames={frames!r} is no number from 2 to {_MOST_FRAMES}.")
-        return strip(self._drawn("film"), frames)
+        if seconds is not None and not seconds > 0:
+            raise Misuse(f"film: seconds={seconds!r} is not above 0.")
+        return strip(self._drawn("film"), frames, seconds)
 
     def _drawn(self, picture: str) -> Drawn:
         from autograder.world.drawing import drawn
