@@ -33,8 +33,12 @@ def int_in_float(message: Any) -> str:
 
     rclpy's C code takes the int's memory for that of a float, and comes to a number so near to 0 that nobody means it.
     """
-    small = (f"{p}={v!r}" for p, v in _fields(message, "") if isinstance(v, float) and 0.0 < abs(v) < _MEANT)
-    return next(small, "")
+    return next((f"{path}={value!r}" for path, value in _fields(message, "") if was_an_int(value)), "")
+
+
+def was_an_int(value: Any) -> bool:
+    """Whether a value is what becomes of an `int` that was assigned where a `float` belongs."""
+    return isinstance(value, float) and 0.0 < abs(value) < _MEANT
 
 
 def set_fields(message: Any) -> str:

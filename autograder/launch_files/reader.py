@@ -89,9 +89,12 @@ class ActionInContext:
         """Whether `if` and `unless` allow the action to run."""
         for key in ("if", "unless"):
             if key in self.given:
-                word = self.text(key).strip().lower()
+                text = self.text(key).strip()
+                word = text.lower()
                 if word not in ("true", "1", "false", "0"):
-                    raise self.place.at(key).error(f"a condition is true, false, 1 or 0, not `{word}`.")
+                    known = text in self.context.configurations
+                    hint = f"The value of the argument is `$(var {text})`." if known else ""
+                    raise self.place.at(key).error(f"a condition is true, false, 1 or 0, not `{text}`.", hint)
                 return (word in ("true", "1")) == (key == "if")
         return True
 

@@ -25,7 +25,7 @@ from geometry_msgs.msg import Twist
 from rclpy.qos import QoSProfile
 
 from autograder.arguments.remap_rules import namespace_of
-from autograder.checks.message_text import in_words, set_fields, shorten
+from autograder.checks.message_text import in_words, int_in_float, set_fields, shorten, was_an_int
 from autograder.checks.program import Program
 from autograder.graph.names import full_name
 from autograder.notebook.world_extras import Buttons, Extras, ShownScan
@@ -335,6 +335,8 @@ def name_of(described: Program) -> str:
 def _state(car: cars.Car, missing: str) -> str:
     if car.touches:
         return f"touches {car.touches}"
+    if any(map(was_an_int, car.wanted)):
+        return "got an int, not a float: write 1.0 for 1"
     return f"brakes: no {missing}" if missing else ""
 
 
@@ -404,4 +406,5 @@ class _Rates:
 
 
 def _said(message: Any) -> str:
-    return shorten(in_words(message) if hasattr(message, "data") else set_fields(message))
+    said = shorten(in_words(message) if hasattr(message, "data") else set_fields(message))
+    return f"{said} (an int, not a float: write 1.0 for 1)" if int_in_float(message) else said

@@ -200,6 +200,15 @@ def test_a_check_places_the_car_and_drives_it_with_a_heartbeat() -> None:
     assert "because nothing came on `cmd_vel`, or no heartbeat, for 0.3 s" in failed.because, failed.because
 
 
+def test_an_int_in_a_command_is_told_and_not_where_the_check_has_turned_the_car() -> None:
+    check = 'with launch("p", world="street") as ros:\n    car = ros.car()\n    car.place(*car.pose[:2], 2.0)\n'
+    check += "    car.expect_driven(0.1, within=1)\nros.score(1)"
+    failed = graded(check, DRIVES.format(speed="1", more="")).first_failure
+    assert failed is not None and failed.code == "not-driven"
+    assert "has an `int` where a `float` is required: write `1.0`, not `1`" in failed.because, failed.because
+    assert "turned" not in failed.because, failed.because
+
+
 def test_commands_that_are_no_numbers_are_told_as_such_and_not_as_missing() -> None:
     check = (
         'with launch("p", world=World("street", patient=True)) as ros:\n    ros.car().expect_driven(0.1, within=1)\n'

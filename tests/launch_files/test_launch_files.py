@@ -284,6 +284,7 @@ def test_what_cannot_be_read_is_said_with_its_place(tmp_path: Path, text: str, t
         (f'launch:\n{CAMERA}, name: "${{side}}"}}\n', "`$(var NAME)`"),
         ("launch:\n- group:\n    include: {file: x}\n", "Write a list below `group:`"),
         ("launch:\n- include: {file: $(dirname)/a_launch.yaml}\n", "Is `a.launch.yaml` meant?"),
+        (f"launch:\n- arg: {{name: drive, default: 'true'}}\n{CAMERA}, if: drive}}\n", "argument is `$(var drive)`"),
     ],
 )
 def test_what_is_often_meant_is_in_the_hint(tmp_path: Path, text: str, hint: str) -> None:

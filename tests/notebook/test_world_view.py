@@ -154,6 +154,21 @@ def test_topics_that_are_asked_for_are_shown_with_their_last_message(notebook: N
     assert notebook.run("shown['running']").result == "{'/front/driver': True, '/rear/driver': True}"
 
 
+def test_an_int_that_becomes_no_number_is_told_beside_the_car_and_beside_the_message(notebook: Notebook) -> None:
+    notebook.run(DRIVER.replace("= 0.4", "= 1"))
+    notebook.run(TWO_SHOWN)
+    assert notebook.run("robot.topic('/rear/cmd_vel', Twist).listen().wait_for(1, within=150)").result == "True"
+    commanded = "all(car.wanted[1] for car in robot._running.world.simulation.driven.values())"
+    assert notebook.run(f"robot._running.observer.wait(lambda: {commanded}, 150)").result == "True"
+    seen = notebook.run(
+        "shown = robot._running.view._message()\n"
+        "shown['cars'][1]['state'] + '; ' + next(said for topic, _, said in shown['rates'] if said)"
+    )
+    told = "an int, not a float: write 1.0 for 1"
+    assert seen.result.startswith(f"'got {told}; linear.x="), seen
+    assert seen.result.endswith(f", angular.z=1.0 ({told})'"), seen
+
+
 def test_what_cannot_be_shown_is_told(notebook: Notebook) -> None:
     notebook.run(DRIVER)
     assert "this launch has no world" in notebook.run('launch("driver").show()').error

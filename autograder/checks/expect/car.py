@@ -13,6 +13,7 @@ from rclpy.qos import QoSProfile
 from autograder import diagnosis
 from autograder.checks import outcomes
 from autograder.checks.expect.expectations import Expectations
+from autograder.checks.message_text import was_an_int
 from autograder.checks.misuse import Misuse
 from autograder.checks.running_launch import RunningLaunch
 from autograder.checks.waiting import waits_for
@@ -224,7 +225,8 @@ class Car(Expectations):
             outcomes.passed(title, observed=f"{self._record.metres:.1f} m")
             return
         last = self.trail()[-1]
-        turned = sum(_turned(one, other) for one, other in pairwise(self.trail()))
+        turns = (_turned(one, other) for one, other in pairwise(self.trail()))
+        turned = sum(turn for turn in turns if turn <= _at_most_turned())  # a check may have put it there, turned
         where = (
             f"is at {_at(last.pose)}"
             if turned < TURNED
@@ -297,6 +299,8 @@ class Car(Expectations):
 
     def _afterwards(self, sample: Sample) -> str:
         """Why it did not drive on, as far as the record shows that."""
+        if any(map(was_an_int, self._world.simulation.driven[self._name].wanted)):
+            return "The last command on `cmd_vel` has an `int` where a `float` is required: write `1.0`, not `1`."
         touches = [touch for touch in self.touches() if self._is_there(touch, sample)]
         if touches:
             return f"There it touched {touches[-1].what}."
@@ -345,6 +349,14 @@ def _turned(one: Sample, other: Sample) -> float:
 
 def _at(pose: Pose) -> str:
     return f"({pose.x:.2f}, {pose.y:.2f})"
+
+
+def _at_most_turned() -> float:
+    """The radians by which a car can turn in a step, and a little more."""
+    from autograder.world.car import FASTEST_TURN
+    from autograder.world.simulation import STEP
+
+    return 1.1 * FASTEST_TURN * STEP
 
 
 def _stands_below() -> float:
