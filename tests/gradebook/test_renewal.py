@@ -56,7 +56,7 @@ def test_the_page_in_the_zip_shows_the_points_of_the_table(root: Path) -> None:
     assert status == 0 and "In the roster, but nothing was graded: cem." in said
     assert CliRunner().invoke(app, ["report", "--course", str(root)]).exit_code == 0
     assert "In the roster, but nothing was graded: cem." in CoursePaths(root).class_page(toy.LAB).read_text()
-    assert "Answers that nobody has graded yet count 0. There are some in 2 of 2 submissions." in said
+    assert "Not graded yet, so they count 0: 2 answers in 2 of 2 submissions." in said
     by_hand.give(root, "annlee", "why", 3.5, "Well said.")
     assert ",8.5\n" in export(root, "canvas")[1][""]
     status, pages, said = export(root, "canvas-feedback")
