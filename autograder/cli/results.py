@@ -129,11 +129,12 @@ def _wrote(output: Path, made: Export, entries: list[Entry]) -> str:
 def _say(left_out: list[str], entries: list[Entry]) -> None:
     from autograder.report.terminal import plain
 
-    open_cells = [len(entry.grade.waiting) for entry in entries if entry.grade is not None and entry.grade.waiting]
-    if open_cells:
-        some = f"{sum(open_cells)} answer{'' if sum(open_cells) == 1 else 's'}"
-        where = f"{len(open_cells)} of {len(entries)} submissions"
-        print(f"Not graded yet, so they count 0: {some} in {where}.", file=sys.stderr)
+    grades = [entry.grade for entry in entries if entry.grade is not None]
+    in_words = [sum(not cell.is_check for cell in grade.waiting) for grade in grades]
+    if sum(in_words):
+        answers = f"{sum(in_words)} answer{'s' * (sum(in_words) != 1)} in words"
+        where = f"{sum(map(bool, in_words))} of {len(entries)} submissions"
+        print(f"Not graded yet and counted as 0: {answers} in {where}.", file=sys.stderr)
     stale = sum(1 for entry in entries if entry.grade is not None and entry.grade.stale)
     if stale:
         where = f"{stale} of {len(entries)} submissions"
