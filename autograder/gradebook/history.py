@@ -13,7 +13,7 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from autograder.core.history import Decided, Entry, Graded, state_after
+from autograder.core.history import Decided, Entry, Graded, decisions, state_after
 from autograder.core.version import VERSION
 from autograder.course.lab import Lab, kit_digest
 from autograder.gradebook import own_tables
@@ -63,9 +63,12 @@ def note_decided(talks: Session | Connection, lab: str, student: str, decided: D
         decided: the answer.
         given: the points that the check gets; None if its points stay.
     """
-    before = state_after(own_tables.history(talks, lab, student).get(student, [])).points.get(decided.cell)
+    entries = own_tables.history(talks, lab, student).get(student, [])
+    before = state_after(entries).points.get(decided.cell)
     now = before if before is None or given is None else before.model_copy(update={"by_hand": given})
     points = {} if now is None or now == before else {decided.cell: now}
+    if not points and decisions(entries).get(decided.cell) == decided:  # the same command once more
+        return
     own_tables.note_history(talks, lab, student, Entry(at=_now(), by=user(), points=points, decided=decided))
 
 
