@@ -25,19 +25,21 @@ def write_sample_student(root: Path, lab: Lab, appeal: Appeal, name: str, about:
     folder = CoursePaths(root).sample_students(lab.name) / name
     if not re.fullmatch(r"[a-z][a-z0-9_]*", name):
         raise KitError(f"{name!r} cannot be the name of a sample student.", "Use lower-case letters, digits and _.")
-    if folder.exists():
-        raise KitError(f"There is a sample student {name} already.", "Choose another name.")
     check = next((cell for cell in lab.checks if cell.grade_id == appeal.check), None)
     if check is None:
         raise KitError(f"{lab.name} has no check `{appeal.check}`.", "The lab may have changed since.")
     submission = handed_in(appeal, lab)
-    written = []
+    texts = {}
     for grade_id in sorted(using(lab, check)):
         file = lab.answers[grade_id].file
         ending = "yaml" if file is not None and file.file_name.endswith((".yaml", ".yml")) else "py"
-        written.append(folder / "cells" / f"{grade_id}.{ending}")
-        write_beside(written[-1], submission.sources[grade_id].rstrip("\n") + "\n")
-    said = f"about: {json.dumps(' '.join(about.split()), ensure_ascii=False)}\nbase: solution\n"
-    written.append(folder / "expected.yaml")
-    write_beside(written[-1], said)
-    return written
+        texts[folder / "cells" / f"{grade_id}.{ending}"] = submission.sources[grade_id].rstrip("\n") + "\n"
+    told = json.dumps(" ".join(about.split()), ensure_ascii=False)
+    texts[folder / "expected.yaml"] = f"about: {told}\nbase: solution\n"
+    # The same command may have written them, and then have been refused because the class was being graded.
+    there = {path: path.read_text(encoding="utf-8") for path in folder.rglob("*") if path.is_file()}
+    if there and there != texts:
+        raise KitError(f"There is a sample student {name} already.", "Choose another name.")
+    for path, text in texts.items():
+        write_beside(path, text)
+    return list(texts)

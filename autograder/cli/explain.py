@@ -119,7 +119,7 @@ def _messages(root: Path, result: SubmissionResult, check: CheckResult, bag: Pat
     lab = load_lab(root, result.lab)
     notebook = CoursePaths(root).submitted_notebook(result.student, lab.name)
     if read_submission(notebook, lab).digest != result.digest:
-        screen.print("The submission or the lab has changed since; these are the messages of the current version.")
+        screen.print("The submission, the lab or the kit has changed since; these are messages of a new run.")
     settings = Settings(isolation=choose(result.isolation), seed=result.seed)
     with working(f"Running {check.grade_id} again for its messages"):
         again, messages = received(notebook, result.student, lab, settings, [check.grade_id])

@@ -47,7 +47,8 @@ def main() -> None:
         print(f"error: {error.filename or 'a file'}: {error.strerror or error}", file=sys.stderr)
         print(
             "  Make sure that its folder exists, that you may write there, and that the disk has space.\n"
-            '  To take over files that another user left in the course\'s folder, run: sudo chown -R "$USER" build',
+            '  To take over files that another user left in the course\'s folder, run: sudo chown -R "$USER" build\n'
+            '  Two users share a course through a group: see "Two people grade" in the instructors\' pages.',
             file=sys.stderr,
         )
         sys.exit(2)

@@ -13,7 +13,7 @@ from autograder.core.errors import KitError
 from autograder.report.export import FORMATS, SEVERAL_LABS  # imported here because the command's help lists all formats
 
 if TYPE_CHECKING:
-    from autograder.report.export.entry import Entry
+    from autograder.report.export.entry import Entry, Export
 
 LEFT_OUT = 3
 """The exit status if a student of the class is not in an export."""
@@ -106,7 +106,7 @@ def export(
     made = FORMATS[form](entries, column)
     if output is not None:
         write_beside(output, made.content)
-        print(output)
+        print(plain(_wrote(output, made, entries)))
     elif isinstance(made.content, str):
         print(made.content, end="")
     else:
@@ -118,13 +118,23 @@ def export(
     raise typer.Exit(LEFT_OUT if made.left_out else 0)
 
 
+def _wrote(output: Path, made: Export, entries: list[Entry]) -> str:
+    """Say what an export holds, and of how many students."""
+    labs = sorted({entry.lab for entry in entries})
+    count = f"{len(entries) - len(made.left_out)} of {len(entries)}" if made.left_out else f"{len(entries)}"
+    what = f"student{'s' * (len(entries) != 1)}" if len(labs) == 1 else "submissions"
+    return f"{output} holds {count} {what} of {', '.join(labs)}."
+
+
 def _say(left_out: list[str], entries: list[Entry]) -> None:
     from autograder.report.terminal import plain
 
-    waiting = sum(1 for entry in entries if entry.grade is not None and entry.grade.waiting)
-    if waiting:
-        where = f"There are some in {waiting} of {len(entries)} submissions."
-        print(f"Answers that nobody has graded yet count 0. {where}", file=sys.stderr)
+    grades = [entry.grade for entry in entries if entry.grade is not None]
+    in_words = [sum(not cell.is_check for cell in grade.waiting) for grade in grades]
+    if sum(in_words):
+        answers = f"{sum(in_words)} answer{'s' * (sum(in_words) != 1)} in words"
+        where = f"{sum(map(bool, in_words))} of {len(entries)} submissions"
+        print(f"Not graded yet and counted as 0: {answers} in {where}.", file=sys.stderr)
     stale = sum(1 for entry in entries if entry.grade is not None and entry.grade.stale)
     if stale:
         where = f"{stale} of {len(entries)} submissions"

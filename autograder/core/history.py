@@ -155,7 +155,8 @@ def told(entries: Sequence[Entry], cell: str = "") -> list[Event]:
         about = "" if entry.decided is None or cell not in ("", entry.decided.cell) else _appeal(entry.decided)
         what = ". ".join(filter(None, [_graded(before.graded, entry.graded), about]))
         if what or changes:
-            events.append(Event(entry.at, entry.by, what or "Points by hand", state.score, changes))
+            by_hand = "Points by hand" if any(change.cell for change in changes) else "Penalty"
+            events.append(Event(entry.at, entry.by, what or by_hand, state.score, changes))
     return events
 
 
@@ -182,9 +183,8 @@ def _changes(before: State, entry: Entry, cell: str) -> list[Change]:
         if why:
             changes.append(Change(name, _points(was), _points(now), why))
     if entry.penalty is not None and entry.penalty != before.penalty:
-        changes.append(
-            Change("", f"-{_number(before.penalty)}", f"-{_number(entry.penalty)}", "penalty for being late")
-        )
+        was_off, off = (_number(-points or 0.0) for points in (before.penalty, entry.penalty))
+        changes.append(Change("", was_off, off, "penalty for being late"))
     return changes
 
 

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-
-from sqlalchemy import create_engine
+from typing import Any
 
 from autograder.core.errors import KitError
 from autograder.core.files import only_one, write_beside
@@ -17,7 +16,6 @@ from autograder.gradebook.api import open_api
 from autograder.gradebook.grades import read_history, write_grades
 from autograder.gradebook.history import note_decided
 from autograder.gradebook.recorder import Recorder
-from autograder.gradebook.settings import gradebook_address
 from autograder.grading.appeal import ENDING, Appeal, handed_in, read_appeal
 from autograder.grading.store import ResultStore
 from autograder.report.term_page import Appeal as Waiting
@@ -91,17 +89,21 @@ def decide(
     """
     lab = load_lab(root, appeal.lab)
     told = []
+    answer = Decided(cell=appeal.check, asked=appeal.sentence, decision=decision, reason=reason)
     with only_one(CoursePaths(root).lock, "A grading"):
-        if decision is Decision.GRANTED:
-            told.append(_give(root, student, lab, appeal.check, points))
-        engine = create_engine(gradebook_address(root))
-        try:
-            with engine.begin() as connection:
-                own_tables.make_tables(connection)
-                answer = Decided(cell=appeal.check, asked=appeal.sentence, decision=decision, reason=reason)
-                note_decided(connection, lab.name, student, answer)
-        finally:
-            engine.dispose()
+        with open_api(root).gradebook as gradebook:
+            grade = _grade(gradebook, student, appeal)
+            given = (grade.max_score if points is None else points) if decision is Decision.GRANTED else None
+            if given is not None and not 0 <= given <= grade.max_score:
+                raise KitError(
+                    f"{appeal.check} gives 0 to {grade.max_score:g} points, not {given:g}.", "Name other points."
+                )
+            own_tables.make_tables(gradebook.db.connection())
+            note_decided(gradebook.db, lab.name, student, answer, given)
+            if given is not None:
+                grade.manual_score, grade.needs_manual_grade = given, False
+                told.append(f"{student} has {in_points(given)} for {appeal.check} now.")
+            gradebook.db.commit()
         recorder = Recorder(root, lab, force=False)
         if recorder.lacks_only_a_page(student):
             recorder.record(student)
@@ -112,17 +114,10 @@ def decide(
     return told
 
 
-def _give(root: Path, student: str, lab: Lab, check: str, points: float | None) -> str:
+def _grade(gradebook: Any, student: str, appeal: Appeal) -> Any:
     from nbgrader.api import MissingEntry
 
-    with open_api(root).gradebook as gradebook:
-        try:
-            grade = gradebook.find_grade(check, lab.name, lab.name, student)
-        except MissingEntry as error:
-            raise KitError(f"The gradebook has no check {check} of {student}.", "Grade the class first.") from error
-        given = grade.max_score if points is None else points
-        if not 0 <= given <= grade.max_score:
-            raise KitError(f"{check} gives 0 to {grade.max_score:g} points, not {given:g}.", "Name other points.")
-        grade.manual_score, grade.needs_manual_grade = given, False
-        gradebook.db.commit()
-    return f"{student} has {in_points(given)} for {check} now."
+    try:
+        return gradebook.find_grade(appeal.check, appeal.lab, appeal.lab, student)
+    except MissingEntry as error:
+        raise KitError(f"The gradebook has no check {appeal.check} of {student}.", "Grade the class first.") from error

@@ -30,7 +30,6 @@ from autograder.intake.roster import FILE_NAME, read_roster
 from autograder.report.feedback_page import Heading, Task, feedback_html
 from autograder.report.words import plain_title
 from autograder.submission import timestamp
-from autograder.submission.reader import read_submission
 
 _PART = 2
 """The level of the headings of a lab's parts."""
@@ -61,7 +60,7 @@ class FeedbackExporter(Exporter):  # type: ignore[misc]
         page = feedback_html(
             Heading(_title(lab), student, _name(root, student), _handed_in(folder)),
             _tasks(copied),
-            _result(root, lab, student, folder / f"{name}.ipynb"),
+            _result(told["db_url"], root, lab, student),
             read_grade(told["db_url"], name, student),
             datetime.date.today(),
             decisions(entries),
@@ -104,8 +103,20 @@ def _handed_in(folder: Path) -> str:
     return ""
 
 
-def _result(root: Path, lab: Lab, student: str, path: Path) -> SubmissionResult | None:
-    return ResultStore(root).fitting(lab, student, read_submission(path, lab).digest)
+def _result(address: str, root: Path, lab: Lab, student: str) -> SubmissionResult | None:
+    """Return the result that the gradebook has recorded, even if an earlier version of the kit made it.
+
+    None: it is not there any more, or the lab has changed since.
+    """
+    engine = engine_of(address)
+    try:
+        with engine.connect() as connection:
+            recorded = own_tables.recorded(connection, lab.name, student).get(student)
+    finally:
+        engine.dispose()
+    if recorded != own_tables.recordable(root, lab.name, lab.source_digest, student):
+        return None
+    return ResultStore(root).readable(lab, student)
 
 
 def _tasks(nb: Any) -> list[Task]:

@@ -13,7 +13,7 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from autograder.core.history import Decided, Entry, Graded, state_after
+from autograder.core.history import Decided, Entry, Graded, decisions, state_after
 from autograder.core.version import VERSION
 from autograder.course.lab import Lab, kit_digest
 from autograder.gradebook import own_tables
@@ -23,6 +23,7 @@ from autograder.submission.reader import read_submission
 
 if TYPE_CHECKING:
     from sqlalchemy.engine import Connection
+    from sqlalchemy.orm import Session
 
 
 def note_graded(connection: Connection, lab: Lab, student: str, notebook: Path) -> None:
@@ -50,9 +51,25 @@ def note_graded(connection: Connection, lab: Lab, student: str, notebook: Path) 
         own_tables.note_history(connection, lab.name, student, entry)
 
 
-def note_decided(connection: Connection, lab: str, student: str, decided: Decided) -> None:
-    """Add the answer to an appeal."""
-    own_tables.note_history(connection, lab, student, Entry(at=_now(), by=user(), decided=decided))
+def note_decided(talks: Session | Connection, lab: str, student: str, decided: Decided, given: float | None) -> None:
+    """Add the answer to an appeal, and the points that it gives, as one entry.
+
+    The points have to be given after this. They are then noted already, so `watch_people` adds no second entry.
+
+    Args:
+        talks: the gradebook, in a transaction.
+        lab: the lab.
+        student: the student.
+        decided: the answer.
+        given: the points that the check gets; None if its points stay.
+    """
+    entries = own_tables.history(talks, lab, student).get(student, [])
+    before = state_after(entries).points.get(decided.cell)
+    now = before if before is None or given is None else before.model_copy(update={"by_hand": given})
+    points = {} if now is None or now == before else {decided.cell: now}
+    if not points and decisions(entries).get(decided.cell) == decided:  # the same command once more
+        return
+    own_tables.note_history(talks, lab, student, Entry(at=_now(), by=user(), points=points, decided=decided))
 
 
 def watch_people() -> None:

@@ -271,7 +271,8 @@ def chosen(records: Sequence[Record], seed: str, number: int) -> list[tuple[Reco
     for kind in [*kinds * number, *LAST_KINDS * number]:
         if len(found) == number:
             break
-        pairs = [(record, question) for record in records for question in kind(record)]
+        found_by = ((record, question) for record in records for question in kind(record))
+        pairs = [(record, question) for record, question in found_by if question.is_drawn(record)]
         so_far = [(record, question.subject) for record, question in found]
         fresh = [(record, question) for record, question in pairs if (record, question.subject) not in so_far]
         texts = [question.text for _, question in found]

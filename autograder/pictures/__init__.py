@@ -5,7 +5,7 @@ what it shows. Check cells, lectures and the reports of failed checks use the sa
 """
 
 from autograder.core.results import Picture
-from autograder.pictures.arrivals import Traffic, arrivals
+from autograder.pictures.arrivals import Traffic, arrivals, drawn
 from autograder.pictures.graph import Endpoint, graph, qos
 from autograder.pictures.lifecycle import lifecycle, steps
 from autograder.pictures.timeline import Run, Runs, timeline
@@ -17,6 +17,7 @@ __all__ = [
     "Runs",
     "Traffic",
     "arrivals",
+    "drawn",
     "graph",
     "lifecycle",
     "qos",

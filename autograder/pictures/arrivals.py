@@ -43,11 +43,10 @@ def arrivals(
     every = [time for row in traffic for time in (*row.times, *([row.since] if row.since is not None else []))]
     zero = min(every, default=0.0) if start is None else start
     length = seconds or max(max(every, default=0.0) - zero, 0.1) * 1.02
-    left = 24 + min(
-        280.0, max((max(width_of(row.who), width_of(_said(row), SMALL)) for row in traffic), default=80.0) + 8
-    )
+    left = _left(traffic)
     bottom = 42 + _TOPIC_ROW * max(1, len(traffic))
-    thinned = _thinned(traffic, zero, length, _APART * length / (WIDTH - 24 - left))
+    shown = drawn(traffic, seconds=length, start=zero)
+    thinned = _thinned(traffic, shown, zero, length)
     canvas = Canvas(bottom + 2 * TEXT + (14 if not thinned else 20 + 1.5 * SMALL), WIDTH)
     canvas.words(8, 26, topic, bold=True)
     per_second = seconds_axis(canvas, left, 40, bottom, length)
@@ -60,12 +59,29 @@ def arrivals(
             x = left + (row.since - zero) * per_second
             canvas.line([(x, y + 6), (x, y + 52)], dashed=True)
             canvas.words(x + 5, y + 18, "starts", size=SMALL - 1)
-        for time in _apart(row.times, zero, length, _APART / per_second):
+        for time in shown[number]:
             x = left + (time - zero) * per_second
             canvas.line([(x, y + 22), (x, y + 48)], line=2.6)
     if thinned:
         canvas.words(14, bottom + 2 * TEXT + 16 + SMALL, thinned, size=SMALL, italic=True)
     return canvas.picture(_arrivals_in_words(topic, traffic, thinned))
+
+
+def drawn(traffic: Sequence[Traffic], *, seconds: float, start: float) -> list[list[float]]:
+    """Return the times of the strokes that `arrivals` draws in each row."""
+    least = _least(traffic, seconds)
+    return [_apart(row.times, start, seconds, least) for row in traffic]
+
+
+def _left(traffic: Sequence[Traffic]) -> float:
+    """Return where the rows begin, to the right of their labels."""
+    widths = (max(width_of(row.who), width_of(_said(row), SMALL)) for row in traffic)
+    return 24 + min(280.0, max(widths, default=80.0) + 8)
+
+
+def _least(traffic: Sequence[Traffic], length: float) -> float:
+    """Return the seconds that two strokes have to be apart."""
+    return _APART * length / (WIDTH - 24 - _left(traffic))
 
 
 def _apart(times: Sequence[float], zero: float, length: float, least: float) -> list[float]:
@@ -77,13 +93,14 @@ def _apart(times: Sequence[float], zero: float, length: float, least: float) -> 
     return found
 
 
-def _thinned(traffic: Sequence[Traffic], zero: float, length: float, least: float) -> str:
+def _thinned(traffic: Sequence[Traffic], shown: Sequence[Sequence[float]], zero: float, length: float) -> str:
     """Return a sentence about the strokes that are left out; empty if none is."""
     there = sum(len(_apart(row.times, zero, length, 0.0)) for row in traffic)
-    drawn = sum(len(_apart(row.times, zero, length, least)) for row in traffic)
-    if drawn == there:
+    strokes = sum(map(len, shown))
+    if strokes == there:
         return ""
-    return f"{drawn} of {there} messages are drawn: none that came within {least:.2g} s of the stroke before."
+    least = _least(traffic, length)
+    return f"{strokes} of {there} messages are drawn: none that came within {least:.2g} s of the stroke before."
 
 
 def _said(row: Traffic) -> str:

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from markupsafe import Markup
 from rapidfuzz import fuzz, utils
 
 from autograder.core.files import write_beside
@@ -68,15 +69,17 @@ def write_answers_page(path: Path, lab: str, cell: str, scheme: str, answers: Se
         path: the file for the page.
         lab: the lab.
         cell: the grade_id of the question.
-        scheme: the course's answer with its mark scheme.
+        scheme: the course's answer with its mark scheme, as Markdown. It is the course's own, so it may hold HTML.
         answers: the answers of the class.
     """
+    from nbconvert.filters import markdown2html
+
     comments = Counter(answer.comment for answer in answers if answer.comment)
     page = render(
         "answers.html",
         lab=lab,
         cell=cell,
-        scheme=scheme,
+        scheme=Markup(markdown2html(scheme)),
         count=len(answers),
         most=points(answers[0].grade.max_points),
         open=sum(answer.grade.points is None for answer in answers),

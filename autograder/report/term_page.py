@@ -78,6 +78,11 @@ class _Term:
         """Whether a student is no longer in the roster."""
         return bool(self.roster) and student not in self.roster
 
+    @property
+    def class_(self) -> list[str]:
+        """The students who have not left. Means and medians are about these."""
+        return [student for student in self.by_student if not self.left(student)]
+
     def total(self, student: str) -> float:
         """Return a student's weighted mean of all labs, in percent."""
         weight = sum(self.weights.values())
@@ -108,13 +113,14 @@ def write_term_page(
             nothing of theirs was ever graded.
     """
     term = _Term(entries, labs, weights, roster)
-    totals = [term.total(student) for student in term.by_student]
+    totals = [term.total(student) for student in term.class_]
     script = SCRIPT.read_text(encoding="utf-8")
     page = render(
         "term.html",
         title=title,
         written=f"{written.day} {written:%B %Y}",
         labs=[{"name": lab, "weight": f"weight {term.weights[lab]:g}"} for lab in term.labs],
+        count=len(totals),
         mean=points(statistics.fmean(totals)),
         median=points(statistics.median(totals)),
         appeals=appeals,
@@ -131,7 +137,7 @@ def write_term_page(
 def _behind(term: _Term) -> list[dict[str, str]]:
     last = term.labs[-_LAST:]
     means = {student: statistics.fmean(term.share(student, lab) for lab in last) for student in term.by_student}
-    median = statistics.median(means.values())
+    median = statistics.median(means[student] for student in term.class_)
     found = []
     for student, of_labs in sorted(term.by_student.items()):
         if not of_labs:

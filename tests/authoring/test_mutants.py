@@ -8,7 +8,7 @@ import mutants
 import pytest
 from places import ROOT
 
-from autograder.authoring.mutation.mutants import handed_in, reached
+from autograder.authoring.mutation.mutants import handed_in, reached, using
 from autograder.authoring.mutation.mutants import mutants as made_from
 from autograder.authoring.mutation.rules import Source, changes, swaps, text_changes, without_a_line
 from autograder.course.lab import load_lab
@@ -116,3 +116,17 @@ def test_every_decided_survivor_is_a_mutant_of_the_solution_as_it_is(name: str) 
     verdicts = mutants.decided(name)
     assert [key for key in verdicts if key not in keys] == []
     assert set(verdicts.values()) <= set(mutants.VERDICTS)
+
+
+LABS_WITH_FUNCTIONS = {
+    "lab2_executors": {"check_heartbeat": {"heartbeat"}, "check_adder": {"adder"}},
+    "lab5_qos": {"check_guard": {"controller", "guard"}, "check_car": {"car"}},
+}
+"""The answers that reach some checks of labs whose set-up has functions about single programs."""
+
+
+def test_a_function_of_the_set_up_that_uses_a_program_concerns_only_the_checks_that_call_it() -> None:
+    for name, wanted in LABS_WITH_FUNCTIONS.items():
+        lab = load_lab(ROOT, name)
+        found = {check.grade_id: using(lab, check) for check in lab.checks}
+        assert {check: found[check] for check in wanted} == wanted

@@ -48,6 +48,8 @@ def export(root: Path, form: str) -> tuple[int, dict[str, str], str]:
 
 
 def test_the_page_in_the_zip_shows_the_points_of_the_table(root: Path) -> None:
+    done = CliRunner().invoke(app, ["export", "canvas", "--course", str(root), "-o", str(root / "out")])
+    assert done.stdout == f"{root / 'out'} holds 2 students of {toy.LAB}.\n"
     status, pages, said = export(root, "canvas-feedback")
     assert status == 0 and "5 of 9 points so far" in pages["annlee_11_111_toy.html"]
     assert "In the roster" not in said
@@ -56,7 +58,7 @@ def test_the_page_in_the_zip_shows_the_points_of_the_table(root: Path) -> None:
     assert status == 0 and "In the roster, but nothing was graded: cem." in said
     assert CliRunner().invoke(app, ["report", "--course", str(root)]).exit_code == 0
     assert "In the roster, but nothing was graded: cem." in CoursePaths(root).class_page(toy.LAB).read_text()
-    assert "Answers that nobody has graded yet count 0. There are some in 2 of 2 submissions." in said
+    assert "Not graded yet and counted as 0: 2 answers in words in 2 of 2 submissions." in said
     by_hand.give(root, "annlee", "why", 3.5, "Well said.")
     assert ",8.5\n" in export(root, "canvas")[1][""]
     status, pages, said = export(root, "canvas-feedback")
@@ -85,3 +87,15 @@ def test_a_lab_that_changed_after_grading_does_not_hold_up_an_export(root: Path)
     by_hand.give(root, "annlee", "why", 3.5)
     status, _, said = export(root, "canvas-feedback")
     assert status == 3 and "run autograder grade toy again" in said
+
+
+def test_a_page_keeps_its_reports_if_it_is_renewed_with_another_version_of_the_kit(
+    root: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    page = CoursePaths(root).feedback_page("annlee", toy.LAB)
+    assert "3 of 3 points" in page.read_text()
+    monkeypatch.setattr("autograder.course.lab.kit_digest", lambda: "another")
+    (root / "solutions" / toy.LAB / f"{toy.LAB}.ipynb").touch()  # so that the lab is read again
+    by_hand.give(root, "annlee", "why", 3.5, "Well said.")
+    assert export(root, "canvas-feedback")[0] == 0
+    assert "Well said." in page.read_text() and "3 of 3 points" in page.read_text()

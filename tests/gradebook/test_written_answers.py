@@ -48,7 +48,7 @@ def test_a_group_gets_the_same_points_and_comment(tmp_path: Path, monkeypatch: p
 
     assert run("answers", toy.LAB, "why") is None
     page = CoursePaths(root).answers_page(toy.LAB, "why").read_text()
-    assert "autograder mark toy why POINTS ann bob --comment" in page and "Because.</div>" in page
+    assert "autograder mark toy why POINTS ann bob --comment" in page and "<p>Because.</p>" in page
     assert "3 of them are not graded yet" in page and "<script>" not in page
     for wrong in (("9", "ann"), ("3", "ann", "eve")):
         assert isinstance(run("mark", toy.LAB, "why", *wrong), KitError)

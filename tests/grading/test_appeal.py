@@ -76,8 +76,11 @@ def test_an_appeal_is_replayed_granted_and_becomes_a_sample_student(course: Cour
     refused = course.run("replay", course.file, "--times", 0, "--grant")
     assert "needs a reason" in str(refused.stderr_bytes)
     reason = "The check waited too short for you."
-    done = course.run("replay", course.file, "--times", 0, "--grant", "--reason", reason, "--sample", "slow_talker")
-    assert done.exit_code == 0, done.output
+    for _ in range(2):  # the second time changes nothing
+        done = course.run("replay", course.file, "--times", 0, "--grant", "--reason", reason, "--sample", "slow_talker")
+        assert done.exit_code == 0, done.output
+    taken = course.run("replay", course.file, "--times", 0, "--sample", "slow_talker")
+    assert "There is a sample student slow_talker already." in str(taken.stderr_bytes)
     assert {one.student: one.earned for one in read_grades(course.root)} == {"ann": 5, "bob": 2}
     feedback = course.paths.feedback_page("ann", toy.LAB).read_text()
     assert SENTENCE in feedback and f"<b>Answer (granted):</b> {reason}" in feedback and "5 of 9 points" in feedback
@@ -85,6 +88,7 @@ def test_an_appeal_is_replayed_granted_and_becomes_a_sample_student(course: Cour
     assert [change.why for event in events for change in event.changes] == [
         "graded for the first time", "overruled by hand"
     ]  # fmt: skip
+    assert len(events) == 2, "the points and the answer are one entry"
     assert events[-1].what == f"Appeal about check_talker granted: {reason}"
     folder = course.root / "tests" / "classes" / toy.LAB / "slow_talker"
     assert yaml.safe_load((folder / "expected.yaml").read_text())["base"] == "solution"

@@ -14,6 +14,7 @@ from autograder.grading.job import Job
 from autograder.grading.own_runs import run_recorded
 from autograder.own_run import questions, topic_questions
 from autograder.own_run.keys import key
+from autograder.own_run.question import Question
 from autograder.own_run.questions import chosen
 from autograder.own_run.record import Record, StateChange
 from autograder.pictures import Run, Traffic
@@ -141,3 +142,17 @@ def test_a_record_with_times_that_no_launch_has_is_refused() -> None:
     for time in (float("nan"), float("inf"), -1.0):
         with pytest.raises(ValidationError):
             Record(runs=(Run("beat", time, 1.0),))
+
+
+def test_no_question_is_asked_about_messages_that_the_picture_leaves_out() -> None:
+    burst = (0.0, 0.3, 0.6, 0.9, 0.916, 1.2, 1.5, 1.8, 2.1, 2.4, 2.7)
+    record = Record(traffic={"/beat": (Traffic("/robot publishes", burst),)})
+    assert any(about_916_ms(question) for question in questions.possible(record))
+    asked = [question for seed in range(30) for _, question in chosen([record], str(seed), 4)]
+    assert asked and "messages are drawn" in asked[0].picture(record).svg
+    assert not any(map(about_916_ms, asked))
+
+
+def about_916_ms(question: Question) -> bool:
+    """Whether a question is about a time that holds the one that the picture leaves out."""
+    return float(question.about.get("begin", 0)) < 0.916 < float(question.about.get("end", 3))

@@ -7,6 +7,8 @@ to affect a check still passes this check.
 from __future__ import annotations
 
 import ast
+import functools
+import re
 from collections.abc import Iterable, Iterator
 
 from autograder.authoring.mutation.rules import Mutant, Source, changes, swaps, text_changes, without_a_line
@@ -92,7 +94,8 @@ def handed_in(lab: Lab, mutant: Mutant) -> dict[str, str]:
 def reached(lab: Lab, answers: Iterable[str]) -> list[Cell]:
     """Return the cells to run for changed answers: the set-up, and the checks that may be affected.
 
-    A check may be affected if it uses the file of a changed answer, or a file that mentions such a file.
+    A check may be affected if it uses the file of a changed answer, or a file that mentions such a file. A function of
+    the set-up that uses such a file affects only the checks that call it.
     """
     files = {answer.grade_id: answer.file for answer in lab.answers.values() if answer.file is not None}
     names = set(answers) & files.keys()
@@ -105,9 +108,46 @@ def reached(lab: Lab, answers: Iterable[str]) -> list[Cell]:
                 names.add(other)
                 grown = True
     words = [word for name in names for word in (f'"{_word(files[name].name)}"', f"'{_word(files[name].name)}'")]
-    mentioning = {cell.grade_id for cell in lab.cells if any(word in cell.source for word in words)}
-    everything = any(cell.points is None and cell.grade_id in mentioning for cell in lab.cells)
-    return [cell for cell in lab.cells if cell.points is None or everything or cell.grade_id in mentioning]
+    functions = _functions_with(words, [cell.source for cell in lab.cells if cell.points is None])
+    if functions is None:
+        return list(lab.cells)
+    named = _any_of(words, functions)
+    return [cell for cell in lab.cells if cell.points is None or named.search(cell.source)]
+
+
+def _functions_with(words: list[str], set_up: list[str]) -> set[str] | None:
+    """Return the functions and classes of the set-up that mention one of the words, or a function that does.
+
+    None: something else of the set-up mentions them, so every check may be affected.
+    """
+    statements = [statement for source in set_up for statement in _statements(source)]
+    found: set[str] = set()
+    while True:
+        named = _any_of(words, found)
+        mentioning = {name for name, text in statements if named.search(text)}
+        if "" in mentioning:
+            return None
+        if mentioning <= found:
+            return found
+        found |= mentioning
+
+
+@functools.cache
+def _statements(source: str) -> list[tuple[str, str]]:
+    """Return the name and the text of each statement of a cell; the name is empty if it defines nothing."""
+    # Only IPython understands lines such as `%load_ext autograder`.
+    lines = ["" if line.startswith("%") else line for line in source.split("\n")]
+    return [
+        (
+            statement.name if isinstance(statement, ast.FunctionDef | ast.ClassDef) else "",
+            "\n".join(lines[statement.lineno - 1 : statement.end_lineno]),
+        )
+        for statement in ast.parse("\n".join(lines)).body
+    ]
+
+
+def _any_of(words: Iterable[str], names: Iterable[str]) -> re.Pattern[str]:
+    return re.compile("|".join([*map(re.escape, words), *(rf"\b{name}\b" for name in names)]) or r"(?!)")
 
 
 def _word(name: str) -> str:
