@@ -155,7 +155,7 @@ def told(entries: Sequence[Entry], cell: str = "") -> list[Event]:
         about = "" if entry.decided is None or cell not in ("", entry.decided.cell) else _appeal(entry.decided)
         what = ". ".join(filter(None, [_graded(before.graded, entry.graded), about]))
         if what or changes:
-            events.append(Event(entry.at, entry.by, what or "Points by hand", state.score, changes))
+            events.append(Event(entry.at, entry.by, what or ("Points by hand" if entry.points else "Handed in late"), state.score, changes))
     return events
 
 
@@ -183,7 +183,7 @@ def _changes(before: State, entry: Entry, cell: str) -> list[Change]:
             changes.append(Change(name, _points(was), _points(now), why))
     if entry.penalty is not None and entry.penalty != before.penalty:
         changes.append(
-            Change("", f"-{_number(before.penalty)}", f"-{_number(entry.penalty)}", "penalty for being late")
+            Change("", _number(0 - before.penalty), _number(0 - entry.penalty), "penalty for being late")
         )
     return changes
 

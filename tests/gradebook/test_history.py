@@ -112,7 +112,8 @@ def test_a_penalty_and_a_changed_kit_and_an_appeal_are_told() -> None:
     ]
     events = told(entries)
     assert events[1].changes == (Change("a", "2 of 5", "4 of 5", "changed kit"),)
-    assert events[2].changes == (Change("", "-0", "-1.5", "penalty for being late"),)
+    assert events[2].what == "Handed in late"
+    assert events[2].changes == (Change("", "0", "-1.5", "penalty for being late"),)
     assert (events[3].what, events[3].score) == ("Appeal about a refused: So.", "2.5 of 5")
     assert [event.changes[0].why for event in told(entries, "a") if event.changes] == [
         "graded for the first time", "changed kit"
