@@ -155,7 +155,8 @@ def told(entries: Sequence[Entry], cell: str = "") -> list[Event]:
         about = "" if entry.decided is None or cell not in ("", entry.decided.cell) else _appeal(entry.decided)
         what = ". ".join(filter(None, [_graded(before.graded, entry.graded), about]))
         if what or changes:
-            events.append(Event(entry.at, entry.by, what or ("Points by hand" if entry.points else "Handed in late"), state.score, changes))
+            what = what or ("Points by hand" if entry.points else "Handed in late")
+            events.append(Event(entry.at, entry.by, what, state.score, changes))
     return events
 
 
