@@ -289,6 +289,8 @@ def test_a_hidden_check_shows_a_student_no_picture() -> None:
 def test_a_picture_of_what_holds_says_what_it_shows() -> None:
     titles = ["The car reaches shop", "The car reaches park"]
     pictures = [timeline(Runs(BEATS)), timeline(Runs(BEATS[1:]))]
-    outcomes = [Outcome(status=Status.PASSED, title=one, picture=shown) for one, shown in zip(titles, pictures, strict=True)]
+    outcomes = [
+        Outcome(status=Status.PASSED, title=one, picture=shown) for one, shown in zip(titles, pictures, strict=True)
+    ]
     shown = check_html(CellResult(max_points=1, points=1, outcomes=outcomes))
     assert re.findall(r"A picture of your run: (.*?)</summary>", shown) == titles
