@@ -183,9 +183,7 @@ def _changes(before: State, entry: Entry, cell: str) -> list[Change]:
         if why:
             changes.append(Change(name, _points(was), _points(now), why))
     if entry.penalty is not None and entry.penalty != before.penalty:
-        changes.append(
-            Change("", _number(0 - before.penalty), _number(0 - entry.penalty), "penalty for being late")
-        )
+        changes.append(Change("", _number(0 - before.penalty), _number(0 - entry.penalty), "penalty for being late"))
     return changes
 
 
