@@ -148,8 +148,8 @@ def check_name(magic: str, name: str) -> None:
         module = name.removesuffix(".py")
         if module != name and _NODE_NAME.fullmatch(module):
             raise BadNameError(
-                f"`{name[:80]}` cannot name a file, because a Python file is written with `%%node {module}`. This is also"
-                f" the way to a module of your own: your other programs can then say `from {module} import …`."
+                f"`{name[:80]}` cannot name a file, because a Python file is written with `%%node {module}`. This is"
+                f" also the way to a module of your own: your other programs can then say `from {module} import …`."
             )
         raise BadNameError(
             f"`{name[:80]}` cannot name a file: use letters, digits, `-`, `_` and dots, no folder,"
