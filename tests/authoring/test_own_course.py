@@ -195,6 +195,7 @@ def test_outside_of_a_course_nbgrader_executes_nothing(environment: Environment,
     ("cell", "old", "new", "said"),
     [
         ("check_greeter", ").expect()", ").expct()", "there is no `expct`; `expect` may be meant"),
+        ("check_greeter", 'launch("greeter"', 'launch("greter"', "no cell `%%node greter`; `greeter` may be meant"),
         ("check_greeter", "ros.node", "ros.nod", "there is no `nod`; `node` may be meant"),
         ("check_greeter", "ros.node(", "one, two = ros.node('/one'), 2; one.expct(); ros.node(", "there is no `expct`"),
         ("check_greeter", "with launch(", "def own(ros):\n    ros.nod('/one')\n\nwith launch(", "there is no `nod`"),

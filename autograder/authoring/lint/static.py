@@ -25,6 +25,7 @@ from autograder.course.cells import (
     FOR_CHECKS,
     MARK,
     BadNameError,
+    CellFile,
     for_checks,
     grade_id_of,
     nbgrader_of,
@@ -167,12 +168,34 @@ def check_findings(lab: Lab) -> Iterator[Finding]:
         except SyntaxError as error:
             yield Finding(cell.grade_id, f"line {error.lineno}: {error.msg}.")
     known = {name for _, tree in trees for name in _bound(tree)} | set(dir(builtins)) | _OF_THE_NOTEBOOK
+    programs = {file.name for cell in lab.raw["cells"] if (file := _file(cell)) is not None and file.magic == "node"}
     for cell, tree in trees:
-        sentences = [*_unknown_names(tree, known), *_unknown_expectations(tree)]
+        sentences = [*_unknown_names(tree, known), *_unknown_expectations(tree), *_unknown_programs(tree, programs)]
         sentences += _score(tree, cell.points) if cell.points is not None else []
         for sentence in sentences:
             yield Finding(cell.grade_id, sentence)
     yield from _programs(lab)
+
+
+def _file(cell: dict[str, Any]) -> CellFile | None:
+    try:
+        return parse(source_of(cell)) if cell["cell_type"] == "code" else None
+    except BadNameError:
+        return None  # it has its own finding
+
+
+def _unknown_programs(tree: ast.AST, programs: set[str]) -> Iterator[str]:
+    """Yield sentences about programs that are launched by a name for which the lab has no cell."""
+    for node in ast.walk(tree):
+        if not isinstance(node, ast.Call) or not isinstance(node.func, ast.Name):
+            continue
+        if any(keyword.arg in (None, "package") for keyword in node.keywords):
+            continue  # a student's package makes the program, or only the run shows the keywords
+        names = {"launch": node.args, "Program": node.args[:1]}.get(node.func.id, [])
+        for name in names:
+            if isinstance(name, ast.Constant) and isinstance(name.value, str) and name.value not in programs:
+                near = _nearest(name.value, programs)
+                yield f"line {name.lineno}: the lab has no cell `%%node {name.value}`{near}."
 
 
 def _programs(lab: Lab) -> Iterator[Finding]:
