@@ -6,6 +6,7 @@ versions of nbgrader that have not been tested.
 
 from __future__ import annotations
 
+import datetime
 import functools
 import json
 from abc import abstractmethod
@@ -50,23 +51,35 @@ class CollectOwned(ExchangeCollect):  # type: ignore[misc]
     """Whether students have accounts."""
 
     def _path_to_record(self, path: str) -> dict[str, Any]:
-        record = super()._path_to_record(path)
+        name = Path(path).name
+        try:
+            record = super()._path_to_record(path)
+        except (ValueError, OverflowError):  # anybody can write anything where the date belongs
+            undated = datetime.datetime.min  # nbgrader compares it with the due date
+            return {"username": name.partition("+")[0], "filename": name, "timestamp": undated, "account": None}
         account = account_of(Path(path))
         self._accounts |= account == record["username"]
         return {**record, "account": account}
 
-    def _is_foreign(self, record: dict[str, Any]) -> bool:
-        return self._accounts and record["account"] not in ("", record["username"])
+    def _why_left_out(self, record: dict[str, Any]) -> str:
+        if record["account"] is None:
+            return "its name has no date that can be read"
+        if self._accounts and record["account"] not in ("", record["username"]):
+            return f"it belongs to the account {record['account']!r}"
+        return ""
 
     def _sort_by_timestamp(self, records: list[dict[str, Any]]) -> list[dict[str, Any]]:
-        for record in filter(self._is_foreign, records):
-            told = "%r belongs to the account %r; it is left out."
-            self.log.warning(told, record["filename"], record["account"])
-        return list(super()._sort_by_timestamp([one for one in records if not self._is_foreign(one)] or records))
+        kept = []
+        for record in records:
+            if why := self._why_left_out(record):
+                self.log.warning("%r is left out: %s.", record["filename"], why)
+            else:
+                kept.append(record)
+        return list(super()._sort_by_timestamp(kept)) or records
 
     def copy_files(self) -> None:
         """Copy the newest submission of each student."""
-        self.src_records = [record for record in self.src_records if not self._is_foreign(record)]
+        self.src_records = [record for record in self.src_records if not self._why_left_out(record)]
         super().copy_files()
 
 

@@ -56,6 +56,7 @@ def test_collect_takes_neither_the_work_of_another_account_nor_a_link(tmp_path: 
         ("bin", "bin+toy+2026-11-20 10:00:00 UTC+a", "own"),
         ("bin", forged, "forged"),
         ("bin", "sys+toy+2026-12-24 10:00:00 UTC+c", "forged"),
+        ("bin", "bin+toy+soon+e", "forged"),
     ):
         (inbound / name).mkdir(parents=True)
         (inbound / name / "toy.ipynb").write_text(work)
@@ -66,7 +67,8 @@ def test_collect_takes_neither_the_work_of_another_account_nor_a_link(tmp_path: 
     os.chown(inbound / "sys+toy+2026-12-25 10:00:00 UTC+d", *(pwd.getpwnam("bin")[2:4]), follow_symlinks=False)
 
     told = nbgrader(root, "collect", "toy")
-    assert f"'{forged}' belongs to the account 'bin'; it is left out." in told and "other.ipynb in bin+toy" in told
+    assert f"'{forged}' is left out: it belongs to the account 'bin'." in told and "other.ipynb in bin+toy" in told
+    assert "'bin+toy+soon+e' is left out: its name has no date that can be read." in told
     submitted = root / "build" / "submitted"
     assert {path.relative_to(submitted).as_posix() for path in submitted.glob("*/toy/*")} == {
         f"{name}/toy/{file}" for name in ("daemon", "bin") for file in ("toy.ipynb", "timestamp.txt")
