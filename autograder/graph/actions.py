@@ -45,6 +45,7 @@ class ActionSeen:
     def __init__(self, observer: Observer, name: str, action_type: type) -> None:
         """Create the client and begin to record."""
         self.name, self.action_type = name, action_type
+        self.sent = 0  # goals so far
         self.client = ActionClient(observer.node, action_type, name)
         self.feedback = observer.record(f"{name}/_action/feedback", action_type.Impl.FeedbackMessage)  # type: ignore[attr-defined]
         self.statuses = observer.record(f"{name}/_action/status", GoalStatusArray)
@@ -76,6 +77,8 @@ class Goal:
     """One goal and what the server has said about it so far; `send_goal` creates it."""
 
     action: ActionSeen
+    number: int
+    """Its place among the goals that were sent to this action, from 1."""
     accepted: bool | None = None
     """None until the server has answered."""
     status: str = "unknown"
@@ -195,7 +198,8 @@ def send_goal(
     """
     if not observer.wait(action.ready, within, give_up):
         raise ServiceMissing(action.name)
-    sent = Goal(action, _observer=observer, _give_up=give_up)
+    action.sent += 1
+    sent = Goal(action, action.sent, _observer=observer, _give_up=give_up)
     sent._send(goal)
     observer.wait(lambda: sent.accepted is not None, within, give_up)
     return sent
