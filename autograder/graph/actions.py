@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 import uuid
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -87,6 +88,8 @@ class Goal:
     """The result message; None until the goal has ended (an aborted goal has one too)."""
     agreed: bool | None = None
     """Whether the server agreed to cancel the goal; None until it has answered such a request."""
+    cancel_sent: float = 0.0
+    """When the last request to cancel it was sent, in seconds on the system clock; 0 before."""
     id: list[int] = field(default_factory=lambda: list(uuid.uuid4().bytes))
 
     _observer: Observer = field(kw_only=True)
@@ -172,6 +175,7 @@ class Goal:
         def answered(reply: Any) -> None:
             self.agreed = bool(reply.goals_canceling)
 
+        self.cancel_sent = time.time()
         self._on_executor(self._handle.cancel_goal_async, answered)
         self._observer.wait(lambda: self.agreed is not None, within, self._give_up)
         return bool(self.agreed)
