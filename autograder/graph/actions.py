@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 import uuid
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -45,6 +46,7 @@ class ActionSeen:
     def __init__(self, observer: Observer, name: str, action_type: type) -> None:
         """Create the client and begin to record."""
         self.name, self.action_type = name, action_type
+        self.sent = 0  # goals so far
         self.client = ActionClient(observer.node, action_type, name)
         self.feedback = observer.record(f"{name}/_action/feedback", action_type.Impl.FeedbackMessage)  # type: ignore[attr-defined]
         self.statuses = observer.record(f"{name}/_action/status", GoalStatusArray)
@@ -76,6 +78,8 @@ class Goal:
     """One goal and what the server has said about it so far; `send_goal` creates it."""
 
     action: ActionSeen
+    number: int
+    """Its place among the goals that were sent to this action, from 1."""
     accepted: bool | None = None
     """None until the server has answered."""
     status: str = "unknown"
@@ -84,6 +88,8 @@ class Goal:
     """The result message; None until the goal has ended (an aborted goal has one too)."""
     agreed: bool | None = None
     """Whether the server agreed to cancel the goal; None until it has answered such a request."""
+    cancel_sent: float = 0.0
+    """When the last request to cancel it was sent, in seconds on the system clock; 0 before."""
     id: list[int] = field(default_factory=lambda: list(uuid.uuid4().bytes))
 
     _observer: Observer = field(kw_only=True)
@@ -169,6 +175,7 @@ class Goal:
         def answered(reply: Any) -> None:
             self.agreed = bool(reply.goals_canceling)
 
+        self.cancel_sent = time.time()
         self._on_executor(self._handle.cancel_goal_async, answered)
         self._observer.wait(lambda: self.agreed is not None, within, self._give_up)
         return bool(self.agreed)
@@ -195,7 +202,8 @@ def send_goal(
     """
     if not observer.wait(action.ready, within, give_up):
         raise ServiceMissing(action.name)
-    sent = Goal(action, _observer=observer, _give_up=give_up)
+    action.sent += 1
+    sent = Goal(action, action.sent, _observer=observer, _give_up=give_up)
     sent._send(goal)
     observer.wait(lambda: sent.accepted is not None, within, give_up)
     return sent

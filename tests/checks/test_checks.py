@@ -608,6 +608,21 @@ def test_feedback_that_comes_after_the_result_counts(grade: Grade) -> None:
     assert result.points == 2.0, result
 
 
+def test_the_ends_of_two_goals_of_an_action_are_two_expectations(grade: Grade) -> None:
+    result = grade(
+        """\
+        from test_msgs.action import Fibonacci
+        with launch("counter") as ros:
+            for order in (1, 2):
+                ros.action("/count", Fibonacci).send_goal(Fibonacci.Goal(order=order)).expect_result()
+        ros.score(2)
+        """,
+        counter__py=COUNTER,
+    )
+    titles = [outcome.title for outcome in result.outcomes if "ends as" in outcome.title]
+    assert titles == ["The goal of `/count` ends as `succeeded`", "Goal 2 of `/count` ends as `succeeded`"]
+
+
 def test_an_action_is_followed_from_the_goal_to_its_end(grade: Grade) -> None:
     result = grade(
         """\

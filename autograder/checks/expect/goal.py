@@ -46,6 +46,11 @@ class SentGoal(Meanwhile):
         self.seen = seen
 
     @property
+    def _this(self) -> str:
+        # The goals of one action are told apart: each is another expectation.
+        return "the goal" if self.seen.number == 1 else f"goal {self.seen.number}"
+
+    @property
     def accepted(self) -> bool | None:
         """Whether the server accepted it; None until it has answered."""
         return self.seen.accepted
@@ -107,7 +112,7 @@ class SentGoal(Meanwhile):
             what blocks a callback.
         """
         goal = self.seen
-        title = f"The goal of `{goal.name}` ends as `{status}`"
+        title = f"{self._this.capitalize()} of `{goal.name}` ends as `{status}`"
         goal.wait_for_result(within)
         if goal.status == status and goal.result is not None:
             outcomes.passed(title, observed=goal.status)
@@ -154,7 +159,7 @@ class SentGoal(Meanwhile):
             `cancel-late`, and those of `expect_result`.
         """
         goal = self.seen
-        title = f"`{goal.name}` agrees to cancel the goal"
+        title = f"`{goal.name}` agrees to cancel {self._this}"
         goal.cancel(within)
         if not goal.agreed:
             scene = self._scene()
@@ -178,7 +183,7 @@ class SentGoal(Meanwhile):
         because += f"{taken}."
         self._expect_that(
             len(after) <= _STEPS,
-            f"`{goal.name}` ends a goal soon after it has agreed to cancel it",
+            f"`{goal.name}` ends {self._this} soon after it has agreed to cancel it",
             lambda: CANCEL_LATE(because),
             expected=f"at most {_STEPS} more feedback messages",
             observed=f"{len(after)}{taken}",
@@ -225,7 +230,7 @@ class SentGoal(Meanwhile):
             raise Misuse("expect_feedback: exactly=… already says at_least=… and at_most=….")
         least, most = (at_least, at_most) if exactly is None else (exactly, exactly)
         number = f"at least {least}" if most is None else f"{least}" if least == most else f"{least} to {most}"
-        title = f"Feedback of `{goal.name}` arrives ({number})"
+        title = f"Feedback about {self._this} of `{goal.name}` arrives ({number})"
 
         def came() -> bool:
             return goal.result is not None or (most is None and len(goal.heard) >= least)
@@ -262,7 +267,8 @@ class SentGoal(Meanwhile):
             self._observer.wait(lambda: not wrong_now(), _UNDER_WAY)
         if wrong := wrong_now():
             reason = diagnosis.why_wrong_feedback(self._scene(), goal.name) or CONTENT(wrong)
-            self._fail(f"The feedback of `{goal.name}` says what it should", reason, observed=wrong, hint=hint)
+            title = f"The feedback about {self._this} of `{goal.name}` says what it should"
+            self._fail(title, reason, observed=wrong, hint=hint)
 
     def _keep_their_rate(self, rate: float | None, tolerance: float, need: int, hint: str) -> None:
         goal = self.seen
@@ -282,7 +288,7 @@ class SentGoal(Meanwhile):
         measured = rates.in_words(goal.heard)
         came = measured if measured == "all at once" else f"at {measured}"
         reason = RATE(f"The feedback messages come {came} instead of {rate:.3g} Hz.")
-        title = f"Feedback of `{goal.name}` comes at {rate:.3g} Hz"
+        title = f"Feedback about {self._this} of `{goal.name}` comes at {rate:.3g} Hz"
         self._fail(title, reason, expected=f"{rate:.3g} Hz", observed=measured, hint=hint)
 
     def messages_during(self, topic: Topic) -> list[int]:
