@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from pathlib import Path
 
 import kilted
@@ -23,3 +25,11 @@ def test_what_holds_at_the_second_try_is_told_and_is_no_difference() -> None:
     assert kilted.table([("`page`", "b|c", found["b"])]).splitlines()[-1] == (
         "| `page` | b/c | does not hold (in 3 of 3 runs) |"
     )
+
+
+def test_the_copy_looks_for_its_own_libraries_and_not_for_those_of_the_course() -> None:
+    said = "import os; print(os.environ.get('LD_LIBRARY_PATH', ''))"
+    course = subprocess.run([sys.executable, "-c", said], capture_output=True, text=True, check=True).stdout
+    assert sys.prefix in course  # as for every program that is started in the course's environment
+    alone = [sys.executable, "-S", "-c", said]  # without the packages nothing sets it
+    assert sys.prefix not in subprocess.run(alone, env=kilted.environment(), capture_output=True, text=True).stdout

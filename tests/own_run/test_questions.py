@@ -22,6 +22,7 @@ from autograder.pictures import Run, Traffic
 CHECKS = {
     "lab2_executors": ("check_heartbeat", "check_mutex_reentrant", "check_two_mutex"),
     "lab4_lifecycle": ("check_sensor_second_life", "check_manager_up"),
+    "lab6_actions": ("check_taxi",),
 }
 
 

@@ -39,6 +39,8 @@ WORDS = {
     "heartbeatPeriod": "heartbeat_period",
 }
 """What Fast DDS 3, which comes with Kilted, calls otherwise than Fast DDS 2."""
+SET_BY_WHEELS = ("LD_LIBRARY_PATH", "_ROS_WHEELS_BOOTSTRAP_COMPLETE")
+"""What the wheels of an environment set when Python starts: where their libraries are, and that this is known."""
 
 
 def replaced(text: str, words: dict[str, str]) -> str:
@@ -46,6 +48,16 @@ def replaced(text: str, words: dict[str, str]) -> str:
     for old, new in words.items():
         text = text.replace(old, new)
     return text
+
+
+def environment() -> dict[str, str]:
+    """The environment of the copy's programs, without what the wheels have set for the course's own environment.
+
+    With it, the copy's Python would look for the libraries of Jazzy, and nothing of Kilted could be loaded.
+    """
+    kept = {name: value for name, value in os.environ.items() if name not in SET_BY_WHEELS}
+    path = os.pathsep.join([str(KIT / ".venv" / "bin"), os.environ.get("PATH", "")])
+    return {**kept, "PATH": path, "PYTHONPATH": "tests/support"}
 
 
 def copy_kit(kit: Path) -> None:
@@ -86,10 +98,8 @@ def set_up() -> None:
 
 def in_kit(*command: str) -> str:
     """What a program of the copy's environment prints, whatever its exit status is."""
-    path = os.pathsep.join([str(KIT / ".venv" / "bin"), os.environ.get("PATH", "")])
-    environment = {**os.environ, "PATH": path, "PYTHONPATH": "tests/support"}
     program = KIT / ".venv" / "bin" / command[0]
-    done = subprocess.run([program, *command[1:]], cwd=KIT, env=environment, capture_output=True, text=True)
+    done = subprocess.run([program, *command[1:]], cwd=KIT, env=environment(), capture_output=True, text=True)
     # A cell that raises takes all its statements with it, so the reason is worth a look.
     for line, place in pairwise(done.stderr.splitlines()):
         if line.startswith("a cell ended with"):
