@@ -100,7 +100,7 @@ class Launched(Protocol):
         """The observer of its graph."""
 
     def news(self) -> list[str]:
-        """Say in one sentence each what has happened to its programs since they were started."""
+        """Say in one sentence each what has happened to its programs; the end of a program is said once."""
 
     def stop(self) -> None:
         """End it."""

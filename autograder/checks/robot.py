@@ -9,6 +9,7 @@ from pathlib import Path
 from autograder.checks import current
 from autograder.checks.misuse import Misuse
 from autograder.checks.running_launch import RunningLaunch
+from autograder.checks.waiting import waits_for
 from autograder.core.output import tidy
 from autograder.graph.names import node_of
 from autograder.graph.observer import Observer
@@ -69,6 +70,8 @@ class Robot:
         """Note what the programs were started from."""
         self._running = running
         self._begun_with = {node.program: _written(node.program) for node in running.described}
+        self._told: list[RunningProgram] = []
+        """The programs of which it has been said that they have ended."""
         self.stop = stop
         here = current.check.front_end
         self.cell = here.number if here is not None else 0
@@ -79,6 +82,7 @@ class Robot:
         """Who watches its graph."""
         return self._running.observer
 
+    @waits_for("the programs' nodes")
     def wait_for_nodes(self) -> None:
         """Wait until each program that has not ended has a node."""
 
@@ -92,23 +96,28 @@ class Robot:
         self.observer.wait(there, _THERE_WITHIN)
 
     def news(self) -> list[str]:
-        """What has become of the programs since they were started, a sentence each."""
-        ended = [
-            f"{program.name} has ended, with exit status {program.exit_status()}; .log() says what it printed."
-            for _, program in self._running.programs
-            if not program.running() and program not in self._running.stopped
-        ]
-        changed = [
+        """What has become of the programs, a sentence each. The end of a program is told once."""
+        ended = [program for program in self._ended() if program not in self._told]
+        self._told += ended
+        return [*map(_end_of, ended), *self._changed()]
+
+    def _ended(self) -> list[RunningProgram]:
+        """Return the programs that have ended by themselves."""
+        programs = [program for _, program in self._running.programs]
+        return [program for program in programs if not program.running() and program not in self._running.stopped]
+
+    def _changed(self) -> list[str]:
+        return [
             f"The cell of {name} has been run again since: what runs is as it was before. Call .start() once more."
             for name, written in self._begun_with.items()
             if _written(name) != written
         ]
-        return ended + changed
 
     def __str__(self) -> str:
         """What runs, where it can be looked at, and how it is ended."""
         running = [program.name for _, program in self._running.programs if program.running()]
-        lines = self.news()
+        self._told = self._ended()
+        lines = [*map(_end_of, self._told), *self._changed()]
         if not running:
             return "\n".join([*lines, "Nothing runs any more."])
         nodes = ", ".join(self.observer.nodes()) or "none yet"
@@ -121,6 +130,10 @@ class Robot:
                 f"  in a terminal: {terminal}",
             ]
         )
+
+
+def _end_of(program: RunningProgram) -> str:
+    return f"{program.name} has ended, with exit status {program.exit_status()}; .log() says what it printed."
 
 
 def end_robot() -> None:

@@ -17,6 +17,9 @@ _SAY = (
     "restart of the kernel, and so are the cells of your programs."
 )
 
+STARTED = ("robot", "porter")
+"""The names that the labs' cells give to the programs that they start."""
+
 
 def load_ipython_extension(shell: Any) -> None:
     """Register magics and a hook that print a hint if something fails because the set-up cell was not run."""
@@ -42,5 +45,13 @@ def _not_known(_line: str) -> None:
 
 
 def _explain(result: Any) -> None:
-    if result is not None and isinstance(result.error_in_exec, NameError) and result.error_in_exec.name in NAMES:
+    if result is None or not isinstance(result.error_in_exec, NameError):
+        return
+    name = result.error_in_exec.name
+    if name in NAMES:
         print(_SAY)
+    elif name in STARTED:
+        print(
+            f"There is no `{name}` yet. Run the last cell above this one that makes it, with "
+            f"`{name} = launch(…).start()` or `{name} = launch_file(…).start()`. Then run this cell again."
+        )

@@ -8,6 +8,7 @@ const STEER_EVERY = 100; // ms between two commands while a key is down
 const TRAIL_KEPT = 3000; // points of a trail
 const MARKS_KEPT = 1000; // brakes, and touches
 const NEWS_KEPT = 4; // sentences that stay visible
+const LATE_AFTER = 2000; // ms without a message after which a sentence says so
 
 function element(parent, name, attributes = {}, text = "") {
   const svg = parent.namespaceURI === SVG || name === "svg";
@@ -18,8 +19,8 @@ function element(parent, name, attributes = {}, text = "") {
   return made;
 }
 
-// Draws the room once; gives a function that draws what moves.
-function drawRoom(box, room, cars) {
+// Draws the room once, with the cars where they were when the view began; gives a function that draws what moves.
+function drawRoom(box, room, cars, poses) {
   const { width, height } = room;
   const svg = element(box, "svg", { viewBox: `0 0 ${width} ${height}`, role: "img", class: "aw-map" });
   const title = element(svg, "title", {}, `A room of ${width} m by ${height} m, seen from above`);
@@ -59,15 +60,18 @@ function drawRoom(box, room, cars) {
   const turn = (group, [x, y, heading]) =>
     group.setAttribute("transform", `translate(${x} ${y}) rotate(${(heading * 180) / Math.PI})`);
   for (const pose of room.parked) turn(drawCar("aw-parked"), pose);
-  const bodies = []; // of each car whose place is known: none before the first message
+  const bodies = cars.map((_, number) => drawCar(`aw-car${number % 4}`));
   const names = cars.map((name) => element(svg, "text", { class: "aw-name" }, name));
+  const put = (number, pose) => {
+    turn(bodies[number], pose);
+    names[number].setAttribute("x", pose[0]);
+    names[number].setAttribute("y", height - pose[1] - wide);
+  };
+  poses.forEach((pose, number) => put(number, pose));
   const paths = cars.map(() => []);
   return (message) => {
     message.cars.forEach((car, number) => {
-      bodies[number] ??= drawCar(`aw-car${number % 4}`);
-      turn(bodies[number], car.pose);
-      names[number].setAttribute("x", car.pose[0]);
-      names[number].setAttribute("y", height - car.pose[1] - wide);
+      put(number, car.pose);
       if (message.whole) paths[number] = [];
       const [lastX, lastY] = paths[number].at(-1) ?? [];
       paths[number].push(...car.trail.filter(([x, y]) => x !== lastX || y !== lastY)); // standing adds nothing
@@ -132,13 +136,14 @@ function steering(pad, send) {
 }
 
 function render({ model, el }) {
-  const { room, cars, still, buttons: own } = model.get("scene");
+  const { room, cars, poses, still, buttons: own } = model.get("scene");
   el.classList.add("aw-view");
   // The picture below, which stands for this view where it cannot be shown, is not needed while this view is shown.
   const hidden = element(el, "style", {}, `.${still} { display: none; }`);
   const shadow = element(el, "div", { class: "aw-columns" });
   const left = element(shadow, "div", { class: "aw-left" });
-  const move = drawRoom(left, room, cars);
+  const move = drawRoom(left, room, cars, poses);
+  const waits = element(left, "div", { class: "aw-waits", role: "status" });
   const right = element(shadow, "div", { class: "aw-right" });
   let car = 0;
   const send = (content) => model.send({ car, ...content });
@@ -185,6 +190,13 @@ function render({ model, el }) {
   const log = element(el, "div", { role: "log", "aria-live": "polite", "aria-label": "What happens" });
   const news = element(log, "ul", { class: "aw-news" });
 
+  let came = 0; // when the last message came
+  const sayWhetherLate = () => {
+    if (!came) write(waits, "The cars are shown where they were when the cell ran. The view waits for the kernel.");
+    else if (Date.now() - came > LATE_AFTER) write(waits, "The picture stands still, because no message comes from the kernel.");
+    else write(waits, "");
+  };
+  sayWhetherLate();
   const show = (message) => {
     if (message.gone) {
       clearInterval(here);
@@ -193,6 +205,8 @@ function render({ model, el }) {
       el.append(hidden);
       return;
     }
+    came = Date.now();
+    sayWhetherLate();
     move(message);
     write(pause, message.paused ? "Go on" : "Pause");
     message.cars.forEach(({ speed, state }, number) => {
@@ -222,7 +236,11 @@ function render({ model, el }) {
   };
   model.on("msg:custom", show);
   send({ do: "begin" });
-  const here = setInterval(() => document.visibilityState === "visible" && send({ do: "here" }), HERE_EVERY);
+  const here = setInterval(() => {
+    if (document.visibilityState !== "visible") return;
+    send({ do: "here" });
+    sayWhetherLate();
+  }, HERE_EVERY);
   return () => {
     clearInterval(here);
     stop();

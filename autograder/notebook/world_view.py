@@ -158,7 +158,7 @@ class WorldView:
         return {"text/html": picture.html(), "text/plain": picture.alt}
 
     def _scene(self) -> dict[str, Any]:
-        """What does not change."""
+        """What does not change, and where the cars are now: a page shows them there until the first message comes."""
         world = self._world.simulation
         room = world.room
         places = [
@@ -166,6 +166,7 @@ class WorldView:
         ]
         return {
             "cars": self._names,
+            "poses": [list(car.pose) for car in world.driven.values()],
             "still": self._still_class,
             "buttons": self._buttons.words,
             "room": {

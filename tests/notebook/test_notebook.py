@@ -859,6 +859,7 @@ def test_without_the_set_up_cell_it_is_named(tmp_path: Path) -> None:
             shown = made.run(cell)
             assert "Run the first code cell of the notebook" in shown.text, shown
         assert "Run the first" not in made.run("unknown").text
+        assert "Run the last cell above this one that makes it" in made.run("robot.show()").text
         assert "NameError" in made.run("unknown").error
         made.run(SET_UP)
         write(made)

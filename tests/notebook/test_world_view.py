@@ -237,29 +237,35 @@ WITHOUT_A_KERNEL = """async (source) => {
   const { default: view } = await import(URL.createObjectURL(new Blob([source], { type: 'text/javascript' })));
   const room = { width: 6, height: 4, places: [], walls: [], boxes: [], parked: [], car: [0.4, 0.25] };
   const model = {
-    get: () => ({ room, cars: [''], still: 'still', buttons: [] }),
+    get: () => ({ room, cars: [''], poses: [[1, 3, 0]], still: 'still', buttons: [] }),
     send: () => {}, off: () => {},
     on: (_, show) => { model.show = show; },
   };
   view.render({ model, el: document.body });
   const bodies = () => [...document.querySelectorAll('.aw-body')].map(one => one.parentNode.getAttribute('transform'));
-  const seen = [bodies()];
+  const said = () => document.querySelector('.aw-waits').textContent;
+  const seen = [bodies(), said()];
   const car = { pose: [2, 1, 0], trail: [], rays: [], speed: 0, state: '' };
   for (const whole of [true, false]) {
     model.show({ cars: [car], whole, brakes: [], touches: [], running: {}, rates: [], news: [] });
-    seen.push(bodies());
+    seen.push(bodies(), said());
   }
   return seen;
 }"""
 
 
-def test_a_car_is_drawn_only_when_it_is_known_where_it_is(browser: Any) -> None:
-    """A busy machine may show the view for seconds before the first message comes; until then no car is in a corner."""
+def test_before_the_first_message_the_cars_stand_where_they_were_and_a_sentence_says_so(browser: Any) -> None:
+    """A busy machine may show the view for seconds before the first message comes."""
     source = (ROOT / "autograder" / "notebook" / "world_view.js").read_text()
     page = browser.new_page()
-    before, then, after = page.evaluate(WITHOUT_A_KERNEL, source)
+    before, waits, *then = page.evaluate(WITHOUT_A_KERNEL, source)
+    page.wait_for_function(
+        "() => document.querySelector('.aw-waits').textContent.includes('no message comes')",
+        timeout=START_SECONDS * 1000,
+    )
     page.close()
-    assert before == [] and then == after == ["translate(2 1) rotate(0)"]
+    assert before == ["translate(1 3) rotate(0)"] and "The view waits for the kernel" in waits
+    assert then == [["translate(2 1) rotate(0)"], ""] * 2
 
 
 SAVED_LIVE = """() => {
