@@ -29,7 +29,7 @@ project = "ROS 2 in Python"
 author = "The course kit's authors"
 language = "en"
 extensions = ["myst_nb", "sphinx_revealjs", "execution"]
-extensions += ["slides", "talk", "programs", "drawings", "claims", "reference", "tables"]
+extensions += ["slides", "talk", "programs", "drawings", "claims", "folds", "reference", "tables"]
 exclude_patterns = ["_*", "slides"]
 templates_path = ["_templates"]
 pygments_style = "default"
@@ -72,7 +72,7 @@ html_title = project
 html_theme_path = ["_theme"]
 html_static_path = ["_static"]
 html_css_files = ["course.css", "book.css"]
-html_js_files = ["paper.js"]
+html_js_files = ["folds.js"]
 html_copy_source = False
 html_use_index = True
 

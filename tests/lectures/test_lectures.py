@@ -190,6 +190,15 @@ def test_paper_shows_what_is_folded_and_is_white(site: Path, page: Any) -> None:
     assert page.evaluate(look) == ["dark", folded]
 
 
+@pytest.mark.parametrize("name", ["a-group-that-has-too-much-to-do", "spin-once-runs-one"])
+def test_a_link_opens_what_it_leads_to(site: Path, page: Any, name: str) -> None:
+    """The first one leads to a heading with a folded part below it, the second one into such a part."""
+    page.goto(f"file://{site}/book/02_executors.html")
+    assert page.locator("details.part").count() and not page.locator("details.part[open]").count()
+    page.evaluate(f"location.hash = '{name}'")
+    page.wait_for_selector(f"#{name} > details.part[open], details.part[open] #{name}", state="attached")
+
+
 @pytest.mark.parametrize("name", TALKS)
 def test_a_talk_can_be_given(site: Path, page: Any, name: str) -> None:
     """25 to 35 slides, each with notes, at most 12 lines of code, and no text below 2.5 % of the height."""
