@@ -25,6 +25,7 @@ CHECKS = {
     "lab2_executors": ("check_heartbeat", "check_mutex_reentrant", "check_two_mutex"),
     "lab4_lifecycle": ("check_sensor_second_life", "check_manager_up"),
     "lab6_actions": ("check_taxi",),
+    "lab8_bringup": ("check_recovery",),
 }
 
 
