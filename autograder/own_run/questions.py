@@ -230,9 +230,10 @@ def longest_transition(record: Record) -> Iterator[Question]:
 
 
 def transitions(record: Record) -> Iterator[Question]:
-    """Ask through how many transitions a lifecycle node went."""
+    """Ask through how many transitions a lifecycle node went, if the record has the beginning of each of them."""
     for node in sorted({change.node for change in record.changes}):
-        if len(pictures.steps(record.steps(node))) > SOME:
+        way = pictures.steps(record.steps(node))
+        if len(way) > SOME and all(step.label for step in way):
             yield Question(
                 kind="transitions",
                 about={"node": node},

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import pytest
 import replay
 import sample_class
@@ -23,6 +25,7 @@ CHECKS = {
     "lab2_executors": ("check_heartbeat", "check_mutex_reentrant", "check_two_mutex"),
     "lab4_lifecycle": ("check_sensor_second_life", "check_manager_up"),
     "lab6_actions": ("check_taxi",),
+    "lab8_bringup": ("check_recovery",),
 }
 
 
@@ -129,6 +132,17 @@ def test_nothing_is_asked_about_what_the_picture_cannot_show() -> None:
     )
     assert not list(topic_questions.sent_while_active(record)), "a message within 15 ms of the end of the active state"
     assert kinds(Record()) == set()
+
+
+def test_transitions_are_not_counted_if_the_beginning_of_the_first_one_was_missed() -> None:
+    way = ("unconfigured", "configuring", "inactive", "activating", "active", "deactivating", "inactive")
+    changes = tuple(
+        StateChange(node="/lidar", start=start, goal=goal, time=0.1 * number)
+        for number, (start, goal) in enumerate(pairwise(way))
+    )
+    (question,) = questions.transitions(Record(changes=changes))
+    assert key(Record(changes=changes), question) == replay.answer(Record(changes=changes), question) == "3"
+    assert not list(questions.transitions(Record(changes=changes[1:])))
 
 
 @pytest.mark.parametrize("first", (0.0, 0.01, 0.02, 0.03, 0.0466))
