@@ -24,6 +24,7 @@ from autograder.pictures import Run, Traffic
 CHECKS = {
     "lab1_nodes": ("check_listener",),
     "lab2_executors": ("check_heartbeat", "check_mutex_reentrant", "check_two_mutex"),
+    "lab3_remapping": ("check_names",),
     "lab4_lifecycle": ("check_sensor_second_life", "check_manager_up"),
     "lab6_actions": ("check_taxi",),
     "lab8_bringup": ("check_recovery",),

@@ -21,7 +21,16 @@ from autograder.own_run.record import Record
 from autograder.own_run.sheet import Asked, OwnRun
 from autograder.pictures import Endpoint, Run
 
-LABS = ("lab1_nodes", "lab2_executors", "lab4_lifecycle", "lab5_qos", "lab6_actions", "lab8_bringup")
+LABS = (
+    "lab1_nodes",
+    "lab2_executors",
+    "lab3_remapping",
+    "lab4_lifecycle",
+    "lab5_qos",
+    "lab6_actions",
+    "lab7_interfaces",
+    "lab8_bringup",
+)
 """Those with a part about one's own run."""
 RUNS = tuple(
     Run(name, begin + offset, begin + offset + 0.2, thread, f"exclusive group {thread}", "/robot", period=0.5)
