@@ -42,7 +42,7 @@ def asked_and_told() -> Picture:
         ("the caller", "param set rate 40.0", 5),
         ("check", "may it be set?", 1),
         ("the value", "is 40.0 from now on", 0),
-        ("follow", "what is made anew?", 2),
+        ("follow", "what must be updated?", 2),
     )
     for number, (head, below, look) in enumerate(steps):
         x = 20 + number * 224
