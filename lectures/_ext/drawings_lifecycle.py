@@ -75,8 +75,8 @@ def three_endings() -> Picture:
     canvas.words(740, 372, "(not SUCCESS)", size=16)
     return canvas.picture(
         "Three ways in which a transition callback ends. SUCCESS leads to the next state. FAILURE leads back to the "
-        "state before; only with shutdown, FAILURE leads to finalized, too. ERROR, or an exception, leads to on_error: if "
-        "that returns SUCCESS the node is unconfigured, otherwise it is finalized."
+        "state before; only with shutdown, FAILURE leads to finalized, too. ERROR, or an exception, leads to on_error: "
+        "if that returns SUCCESS the node is unconfigured, otherwise it is finalized."
     )
 
 
