@@ -100,9 +100,8 @@ hub: setup-dev ## take USERS=30 students at once through a lab on a real Jupyter
 kilted: setup-dev ## run the book's measured statements and the labs' solutions on ROS 2 Kilted, and print what differs
 	@$(RUN) python tests/tools/kilted.py $(ARGS)
 
-bench: setup-dev ## measure this grader against stock nbgrader, and how it scales with jobs, classes and Dask
+bench: setup-dev ## measure what grading costs, against stock nbgrader and by size; ARGS=--short, ARGS="--many 10000"
 	@$(RUN) python tests/tools/bench.py $(ARGS)
-	@$(RUN) python tests/tools/bench_scale.py
 
 lock: setup-dev ## pin the newest versions of pyproject.toml's dependencies, with hashes
 	@$(RUN) sh -euc 'compile="uv pip compile pyproject.toml --quiet --universal --python-version 3.11 --generate-hashes \

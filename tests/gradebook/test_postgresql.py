@@ -3,22 +3,19 @@
 from __future__ import annotations
 
 import os
-import shutil
 import subprocess
 import sys
-import tempfile
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
 import toy
 from places import ROOT, TESTS
+from postgresql_server import PROGRAMS, postgresql
 
 from autograder.course.lab import load_lab
 from autograder.gradebook.own_courses import TEMPLATE, trust
 
-PROGRAMS = max(Path("/usr/lib/postgresql").glob("*/bin"), default=None)  # where Debian puts them
 GRADER = """
 import sys
 from pathlib import Path
@@ -73,30 +70,8 @@ def server() -> Iterator[str]:
     pytest.importorskip("psycopg")
     if PROGRAMS is None:
         pytest.skip("no PostgreSQL server on this machine (Debian: apt-get install postgresql)")
-    with tempfile.TemporaryDirectory(prefix="pg-") as folder:
-        yield from serve(Path(folder))
-
-
-def serve(folder: Path) -> Iterator[str]:
-    user: dict[str, Any] = {}
-    if os.getuid() == 0:  # it refuses to run as root
-        user = {"user": "nobody"}
-        shutil.chown(folder, "nobody")
-        folder.chmod(0o755)
-    data = folder / "data"
-
-    def run(*command: str | Path) -> None:
-        done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=120, check=False, **user)
-        assert done.returncode == 0, done.stdout + done.stderr
-
-    run(PROGRAMS / "initdb", "-D", data, "-U", "grader", "-A", "trust", "-N", "-E", "UTF8", "--no-locale")
-    options = f"-k {folder} -h '' -F"
-    run(PROGRAMS / "pg_ctl", "-D", data, "-w", "-t", "100", "-l", folder / "log", "-o", options, "start")
-    try:
-        run(PROGRAMS / "createdb", "-h", folder, "-U", "grader", "gradebook")
-        yield f"postgresql+psycopg://grader@/gradebook?host={folder}"
-    finally:
-        run(PROGRAMS / "pg_ctl", "-D", data, "-m", "immediate", "stop")
+    with postgresql() as address:
+        yield address
 
 
 def python(code: str, *arguments: str | Path) -> str:

@@ -39,10 +39,17 @@ class Cluster:
             return str(json.loads(self._file.read_text())["address"])
         return ""
 
-    def worker(self, name: str, kit: Path = ROOT, jobs: int = 1) -> psutil.Process:
-        """Start a worker for so many jobs at once; it takes them as soon as it is known to the scheduler."""
+    def worker(self, name: str, kit: Path = ROOT, jobs: int = 1, core: int | None = None) -> psutil.Process:
+        """Start a worker for so many jobs at once; it takes them as soon as it is known to the scheduler.
+
+        Args:
+            name: its name.
+            kit: the folder of its kit.
+            jobs: how many it runs at once.
+            core: the only core on which it and its jobs run; None for all of them.
+        """
         options = ("--no-nanny", "--nthreads", str(jobs), "--name", name, "--local-directory", str(self._folder))
-        process = self._start(kit, "worker", self.address, *options)
+        process = self._start(kit, "worker", self.address, *options, core=core)
         until(lambda: name in self._known(), f"the worker {name} does not start")
         return psutil.Process(process.pid)
 
@@ -52,9 +59,10 @@ class Cluster:
         with Client(self.address, set_as_default=False) as client:
             return {str(worker["name"]) for worker in client.scheduler_info(n_workers=-1)["workers"].values()}
 
-    def _start(self, kit: Path, *command: str) -> subprocess.Popen[bytes]:
+    def _start(self, kit: Path, *command: str, core: int | None = None) -> subprocess.Popen[bytes]:
+        pinned = [] if core is None else ["taskset", "--cpu-list", str(core)]
         process = subprocess.Popen(
-            [*self._before, sys.executable, "-m", "dask", *command, "--no-dashboard"],
+            [*self._before, *pinned, sys.executable, "-m", "dask", *command, "--no-dashboard"],
             cwd=self._folder, env=os.environ | {"PYTHONPATH": str(kit)},
             stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
         )  # fmt: skip

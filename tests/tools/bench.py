@@ -1,220 +1,65 @@
-"""Measures `autograder grade` against stock `nbgrader autograde`, in one run, on the same submissions of lab 2.
+"""Measures every figure that the project aims at. `make bench`; `make bench ARGS=--short` for a few submissions only.
 
-`make bench`. The stock course has the same check cells, but its `launch` starts each program by subprocess in the
-kernel, and nbgrader runs one notebook after another. Hostile students are left out: stock execution would run them
-unprotected. Both must give the same points for every check.
+`ARGS="--many 500 10000"` measures instead what classes of these sizes cost besides their runs (`bench_many`), and with
+`--postgresql` on a server. Beside each figure stands how long a fixed loop took just then: where it takes longer, the
+machine was slower. `time make grade` and `time make test` on a fresh clone measure the other two figures.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
 import os
-import shutil
-import subprocess
 import sys
 import tempfile
 import time
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "support"))
 
+import bench_many
+import bench_scale
 import sample_class
+from bench_stock import BIN, LAB, Measured, ours, recording, stock, tame_students, timed
 from boxes import RUN_STDIN
-from cpu_meter import cpu_meter, shares_of_cpu
+from cpu_meter import shares_of_cpu
+from kernels import SET_UP, TALKER, Notebook
 from matplotlib.figure import Figure
-from rich.console import Console
-from rich.table import Table
 
-from autograder.core.results import Isolation, SubmissionResult
-from autograder.course.cells import grade_id_of
+from autograder.core.results import Isolation
 from autograder.course.lab import lab_names, load_lab
-from autograder.gradebook.own_courses import prepare_nbgrader
-from autograder.grading.store import ResultStore
 from autograder.sandbox.grading_sandbox import run_in_sandbox
 
-prepare_nbgrader()
-from nbgrader.api import Gradebook  # noqa: E402
+STUDENTS, STUDENTS_SHORT = 20, 3
+SIZES, JOBS, WORKERS = [10, 500], [1, 2, 4, 8, 16], [1, 2, 4]
+WATCHED = 1.0
+"""Seconds for which the warm check watches a topic on which nothing comes."""
+VERDICT = 'with launch("talker") as ros:\n    ros.topic("/chatter", String).expect_messages(at_least=1)\nros.score(1)'
+SILENCE = (
+    f'with launch() as ros:\n    ros.topic("/nothing", String).expect_silence(for_seconds={WATCHED})\nros.score(1)'
+)
 
-LAB = "lab2_executors"
-SET_UP = "setup"
-BIN = Path(sys.prefix) / "bin"
-# What a course without this kit's sandbox does: every program is a fresh process, its output goes to a file.
-PLAIN_LAUNCH = """
-import os, signal, subprocess, sys, tempfile
-from pathlib import Path
-from autograder.checks import current
-
-
-class PlainProgram:
-    def __init__(self, name, arguments, environment):
-        self.name, self.began = name, 0.0
-        self.file = tempfile.TemporaryFile("w+")
-        self.process = subprocess.Popen(
-            [sys.executable, f"{name}.py", *arguments], cwd="nodes", env={**os.environ, **environment},
-            stdin=subprocess.DEVNULL, stdout=self.file, stderr=subprocess.STDOUT)
-        self.pid = self.process.pid
-
-    def running(self):
-        return self.process.poll() is None
-
-    def exit_status(self):
-        return self.process.poll()
-
-    def wait(self, timeout):
-        try:
-            self.process.wait(timeout)
-        except subprocess.TimeoutExpired:
-            return False
-        return True
-
-    def signal(self, number):
-        self.process.send_signal(number)
-
-    def stop(self, grace=1.0):
-        self.process.terminate()
-        if not self.wait(grace):
-            self.process.kill()
-            self.process.wait()
-
-    def output(self):
-        self.file.seek(0)
-        return self.file.read()
-
-    def stopped_by(self):
-        return ""
-
-    def truncated(self):
-        return False
-
-    def events(self):
-        return []
-
-    def stacks(self, timeout=1.0):
-        return ""
+Figures = Iterator[tuple[str, str, str]]
+"""What is measured, what it was, and the aim."""
 
 
-class PlainPrograms:
-    def __init__(self):
-        self.programs = []
+def fixed_loop() -> float:
+    """CPU seconds of a loop that is always the same, of several the least."""
 
-    def start(self, program, args=(), env=None, cores=2):
-        self.programs.append(PlainProgram(program, args, env or {}))
-        return self.programs[-1]
+    def once() -> float:
+        began = time.process_time()
+        sum(number * number % 7 for number in range(1_000_000))
+        return time.process_time() - began
 
-    def group(self):
-        return self
-
-    def end(self):
-        for program in self.programs:
-            program.stop()
-        self.programs.clear()
-
-    close = end
+    return min(once() for _ in range(3))
 
 
-current.check._sandbox = PlainPrograms()
-"""
-
-
-@dataclass
-class Measured:
-    """What one way of grading took."""
-
-    seconds: float
-    cpu: float
-    points: dict[str, dict[str, float | None]]
-
-
-def timed(command: list[str | Path], course: Path) -> tuple[float, float]:
-    """Run a command in a course; return its wall-clock and CPU seconds, all its descendants included."""
-    environ = os.environ | {"PATH": f"{BIN}{os.pathsep}{os.environ['PATH']}"}
-    if command[0] == BIN / "nbgrader":  # stock: otherwise this environment leads it to the kit
-        environ["JUPYTER_NO_CONFIG"] = "1"
-    with cpu_meter() as (prefix, cpu_seconds):
-        began = time.monotonic()
-        done = subprocess.run([*prefix, *command], cwd=course, env=environ, capture_output=True, text=True, check=False)
-        seconds, cpu = time.monotonic() - began, cpu_seconds()
-    if done.returncode:
-        sys.exit(f"{' '.join(map(str, command))} failed:\n{done.stdout[-2000:]}\n{done.stderr[-4000:]}")
-    return seconds, cpu
-
-
-def course(folder: Path, *, plain: bool) -> Path:
-    """Make a course with lab 2 alone; a plain one starts programs by subprocess."""
-    source = folder / "solutions" / LAB / f"{LAB}.ipynb"
-    source.parent.mkdir(parents=True)
-    shutil.copyfile(sample_class.ROOT / "solutions" / LAB / source.name, source)
-    if plain:
-        notebook = json.loads(source.read_text())
-        cell = next(cell for cell in notebook["cells"] if grade_id_of(cell) == SET_UP)
-        cell["source"] = "".join(cell["source"]) + "\n" + PLAIN_LAUNCH
-        source.write_text(json.dumps(notebook))
-    return folder
-
-
-def tame_students(count: int) -> list[str]:
-    """So many of the sample class, evenly chosen, and nobody hostile; 0: all of them."""
-    tame = [name for name in sample_class.students(LAB) if name.startswith(("solution", "correct", "blank", "e", "m"))]
-    tame.remove("correct_own_module")  # the cell of the module is the notebook's last: stock nbgrader runs it too late
-    count = min(count or len(tame), len(tame))
-    return [tame[index * len(tame) // count] for index in range(count)]
-
-
-def ours(folder: Path, students: list[str]) -> Measured:
-    """Grade by this kit."""
-    root = course(folder, plain=False)
-    lab = load_lab(root, LAB)
-    for student in students:
-        sample_class.build_student(lab, student, root / "handed_in")
-    seconds, cpu = timed([BIN / "autograder", "grade", LAB, root / "handed_in", "--force"], root)
-    results = {student: SubmissionResult.load(ResultStore(root).path(LAB, student)) for student in students}
-    return Measured(
-        seconds, cpu, {name: {c.grade_id: c.points for c in result.checks} for name, result in results.items()}
-    )
-
-
-def stock(folder: Path, students: list[str], at_once: int) -> Measured:
-    """Grade by nbgrader's own pipeline, in as many courses side by side as are asked for: one gradebook takes one."""
-    shares = [students[number::at_once] for number in range(at_once) if students[number::at_once]]
-    roots = [course(folder / str(number), plain=True) for number in range(len(shares))]
-    lab = load_lab(roots[0], LAB)
-    source = "--CourseDirectory.source_directory=solutions"
-    for root, share in zip(roots, shares, strict=True):
-        for student in share:
-            sample_class.build_student(lab, student, root / "handed_in")
-            (root / "submitted" / student).mkdir(parents=True)
-            (root / "handed_in" / student).rename(root / "submitted" / student / LAB)
-        timed([BIN / "nbgrader", "generate_assignment", LAB, source], root)
-    began = time.monotonic()
-    with ThreadPoolExecutor(len(roots)) as pool:
-        took = list(pool.map(lambda root: timed([BIN / "nbgrader", "autograde", LAB, source], root), roots))
-    seconds = time.monotonic() - began
-    points: dict[str, dict[str, float | None]] = {}
-    for root, share in zip(roots, shares, strict=True):
-        with Gradebook(f"sqlite:///{root / 'gradebook.db'}") as gradebook:
-            for student in share:
-                notebooks = gradebook.find_submission(LAB, student).notebooks
-                points[student] = {grade.name: grade.auto_score for book in notebooks for grade in book.grades}
-    return Measured(seconds, sum(cpu for _, cpu in took), points)
-
-
-def recording(root: Path, students: list[str]) -> Measured:
-    """Record results that are there already, as after a gradebook was lost: nbgrader's stage and the feedback."""
-    shutil.rmtree(root / "build" / "autograded")
-    (root / "gradebook" / "gradebook.db").unlink()
-    seconds, cpu = timed([BIN / "autograder", "grade", LAB, root / "handed_in"], root)
-    return Measured(seconds, cpu, {student: {} for student in students})
-
-
-def alone(folder: Path, lab_name: str) -> Measured:
+def alone(lab_name: str) -> Measured:
     """Check one complete solution, as a student or an instructor does who waits for it."""
-    lab = load_lab(sample_class.ROOT, lab_name)
-    path = sample_class.build_student(lab, "solution", folder) / f"{lab_name}.ipynb"
-    seconds, cpu = timed([BIN / "autograder", "check", path, "--course", sample_class.ROOT], sample_class.ROOT)
+    with tempfile.TemporaryDirectory(prefix="bench-") as folder:
+        path = sample_class.build_student(load_lab(sample_class.ROOT, lab_name), "solution", Path(folder))
+        command: list[str | Path] = [BIN / "autograder", "check", path / f"{lab_name}.ipynb"]
+        seconds, cpu = timed([*command, "--course", sample_class.ROOT], sample_class.ROOT)
     return Measured(seconds, cpu, {})
 
 
@@ -229,48 +74,33 @@ def observers(launches: int, seconds: float) -> float:
     return float(run.stdout.split()[0])
 
 
-def rows(mine: Measured, recorded: Measured, one: Measured, many: Measured, size: int) -> Iterator[tuple[str, ...]]:
-    """The figures that the project aims at, with what was measured."""
-    yield "throughput, stock one after another", f"{one.seconds / mine.seconds:.1f} x", "25 x"
-    yield "throughput, stock as many at once as fill the machine", f"{many.seconds / mine.seconds:.1f} x", "5 x"
-    yield "CPU seconds a submission", f"{mine.cpu / size:.2f} (stock {one.cpu / size:.2f})", "2.0"
-    yield "nbgrader's stage with feedback, CPU seconds a submission", f"{recorded.cpu / size:.2f}", "0.2"
+def against_stock(students: list[str]) -> Figures:
+    """Grade the same submissions by this kit and by stock nbgrader.
 
-
-def main() -> int:
-    """Run the command; return its exit status."""
-    parser = argparse.ArgumentParser()
-    parser.add_argument("--students", type=int, default=20, help="how many of the class, evenly chosen; 0: all")
-    options = parser.parse_args()
-    students = tame_students(options.students)
+    Raises:
+        SystemExit: the two give different points.
+    """
     size, cores = len(students), len(os.sched_getaffinity(0))
-    console = Console(width=None if sys.stdout.isatty() else 120, highlight=False)
     with tempfile.TemporaryDirectory(prefix="bench-") as name:
         folder = Path(name)
         with shares_of_cpu() as parts:
             mine = ours(folder / "ours", students)
         recorded = recording(folder / "ours", students)
+        programs = parts["students' programs"] / size + observers(9, 1.2)
+        floor = programs + recorded.cpu / size
+        parts["not seen: ended between two looks"] = max(0.0, mine.cpu - sum(parts.values()))
+        yield "CPU seconds a submission", f"{mine.cpu / size:.2f}", "1.9"
+        shares = ", ".join(f"{part} {seconds / size:.2f}" for part, seconds in parts.items())
+        yield "of that, by part", f"{shares}; picture: {plot(parts, size)}", ""
+        over, above = mine.cpu / size / floor, mine.cpu / size / programs
+        yield "over the floor: programs, nine observers, gradebook", f"{over:.2f} x of {floor:.2f} s", "1.5 x"
+        yield "over the same floor without the gradebook", f"{above:.2f} x of {programs:.2f} s", ""
+        yield "nbgrader and feedback, CPU seconds a submission", f"{recorded.cpu / size:.2f}", "0.2"
         one = stock(folder / "stock", students, 1)
+        yield "throughput against stock, one after another", f"{one.seconds / mine.seconds:.1f} x", "25 x"
+        yield "CPU seconds a submission, stock", f"{one.cpu / size:.2f}", ""
         many = stock(folder / "many", students, min(size, 2 * cores))
-        solutions = {lab: alone(folder, lab) for lab in lab_names(sample_class.ROOT)}
-    parts["not seen: ended between two looks"] = max(0.0, mine.cpu - sum(parts.values()))
-    table = Table("", "measured", "aim", box=None)
-    for row in rows(mine, recorded, one, many, size):
-        table.add_row(*row)
-    for lab, measured in solutions.items():
-        table.add_row(f"complete solution alone, {lab}", f"{measured.seconds:.1f} s, {measured.cpu:.1f} CPU s", "7 s")
-    floor = parts["students' programs"] / size + observers(9, 1.2)
-    over = mine.cpu / size / floor
-    table.add_row(
-        "CPU over the floor: programs, and the observers of nine launches", f"{over:.1f} x of {floor:.2f} s", "1.5 x"
-    )
-    load = os.getloadavg()[1]
-    console.print(f"{size} submissions of {LAB}, {cores} cores, load {load:.0f}: {', '.join(students)}")
-    console.print(table)
-    console.print("CPU seconds a submission by part: " + ", ".join(f"{n} {s / size:.2f}" for n, s in parts.items()))
-    console.print(
-        f"By CPU alone: {60 * cores * size / mine.cpu:.1f} submissions a minute. Picture: {plot(parts, size)}"
-    )
+        yield "throughput against stock that fills the machine", f"{many.seconds / mine.seconds:.1f} x", "5 x"
     different = [
         f"{student}: {check}: {points} here, {theirs.points[student].get(check)} there"
         for theirs in (one, many)
@@ -278,8 +108,69 @@ def main() -> int:
         for check, points in checks.items()
         if points != theirs.points[student].get(check)
     ]
-    console.print("The points are the same everywhere." if not different else "\n".join(different))
-    return 1 if different else 0
+    if different:
+        sys.exit("\n".join(different))
+    yield "points of all checks, here and in stock", "the same", "the same"
+
+
+def in_a_notebook() -> Figures:
+    """Run checks in a kernel, as students do."""
+    with tempfile.TemporaryDirectory(prefix="bench-") as folder:
+        notebook = Notebook(Path(folder))
+        try:
+            cells = [notebook.run(cell) for cell in (SET_UP, TALKER, VERDICT)]
+            assert "✓ passed" in cells[-1].text, cells[-1]
+            warm = [notebook.run(SILENCE) for _ in range(3)]
+            assert all("✓ passed" in shown.text for shown in warm), warm[0]
+        finally:
+            notebook.close()
+    yield "fresh kernel to the first verdict", f"{sum(shown.seconds for shown in cells):.2f} s", "0.5 s"
+    least = min(shown.seconds for shown in warm) - WATCHED
+    yield f"a warm check over its evidence, {WATCHED:g} s of silence", f"{least:.2f} s", "0.2 s"
+
+
+def complete(labs: list[str]) -> Figures:
+    """Check the solution of each lab, alone."""
+    for lab in labs:
+        one = alone(lab)
+        aim = "10 s" if lab.startswith("lab7") else "7 s"
+        yield f"complete solution alone, {lab}", f"{one.seconds:.1f} s, {one.cpu:.1f} CPU s", aim
+
+
+def scaling(sizes: list[int], jobs: list[int], workers: list[int], students: int) -> Figures:
+    """Grade classes of several sizes, with several jobs at once, and on several Dask workers."""
+    runs: dict[tuple[str, int, int], bench_scale.Run] = {}
+    wanted = [("size", size, 0) for size in sizes]
+    wanted += [("jobs", students, count) for count in jobs] + [("dask", students, count) for count in workers]
+    for kind, size, number in wanted:
+        runs[kind, size, number] = run = bench_scale.measured(kind, size, number)
+        yield f"{kind} {size if kind == 'size' else number}", str(run), ""
+    if len(sizes) > 1:
+        small, large = (runs["size", size, 0] for size in (min(sizes), max(sizes)))
+        ratio = (large.cpu / large.size) / (small.cpu / small.size)
+        yield f"CPU seconds of each of {large.size} over those of {small.size}", f"{ratio:.2f}", "1.0"
+    for count in workers if 1 in workers else []:
+        share = runs["dask", students, 1].seconds / runs["dask", students, count].seconds / count
+        yield f"throughput of {count} Dask workers over {count} times that of one", f"{share:.2f}", "0.9"
+    yield "picture", f"{bench_scale.plot(list(runs.values()))}", ""
+
+
+def figures(options: argparse.Namespace) -> Figures:
+    """Measure what was asked for."""
+    cores = len(os.sched_getaffinity(0))
+    if options.many:
+        for size in options.many:
+            yield from bench_many.figures(size, options.postgresql)
+        return
+    yield from in_a_notebook()
+    yield from complete([LAB] if options.short else lab_names(sample_class.ROOT))
+    yield from against_stock(tame_students(options.students or (STUDENTS_SHORT if options.short else STUDENTS)))
+    if not options.short:
+        sizes, jobs, dask = (
+            default if chosen is None else chosen
+            for chosen, default in ((options.sizes, SIZES), (options.jobs, JOBS), (options.dask, WORKERS))
+        )
+        yield from scaling(sizes, jobs, [count for count in dask if count <= cores], options.students or STUDENTS)
 
 
 def plot(parts: dict[str, float], size: int) -> Path:
@@ -290,11 +181,35 @@ def plot(parts: dict[str, float], size: int) -> Path:
     axes.bar_label(bars, fmt="%.2f", padding=3)
     axes.invert_yaxis()
     axes.set_xlabel("CPU seconds a submission")
-    path = sample_class.ROOT / "build" / "bench.svg"
+    path = bench_scale.BUILD / "bench.svg"
     path.parent.mkdir(exist_ok=True)
     figure.savefig(path)
     return path
 
 
+def main() -> None:
+    """Run the command."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--short", action="store_true", help="a few submissions of lab 2 only")
+    parser.add_argument("--students", type=int, default=0, help=f"submissions of lab 2; default: {STUDENTS}")
+    parser.add_argument("--sizes", type=int, nargs="*", help="sizes of classes; default: 10 500")
+    parser.add_argument("--jobs", type=int, nargs="*", help="jobs at once; default: 1 2 4 8 16")
+    parser.add_argument("--dask", type=int, nargs="*", help="Dask workers, at most one a core; default: 1 2 4")
+    parser.add_argument("--many", type=int, nargs="+", default=[], help="sizes of classes with recorded results")
+    parser.add_argument("--postgresql", action="store_true", help="with --many: the gradebook is on a server")
+    options = parser.parse_args()
+    scaled = [options.sizes, options.jobs, options.dask]
+    if options.postgresql and not options.many:
+        parser.error("--postgresql belongs to --many")
+    if options.many and (options.short or options.students or any(one is not None for one in scaled)):
+        parser.error("--many measures classes with recorded results only, so the other options do not apply")
+    if options.short and any(one is not None for one in scaled):
+        parser.error("--short measures no classes of several sizes, jobs or workers")
+    cores = len(os.sched_getaffinity(0))
+    print(f"{cores} cores, load {os.getloadavg()[0]:.0f}; in brackets: CPU seconds of a fixed loop", flush=True)
+    for what, found, aim in figures(options):
+        print(f"{what}: {found}{f', aim {aim}' if aim else ''} [{fixed_loop():.3f}]", flush=True)
+
+
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

@@ -1,28 +1,24 @@
 """Measures how grading scales: with the jobs at once, with the size of the class, and on a Dask cluster.
 
-`make bench` runs it. What is measured is kept in build/bench_scale.json, so that a part can be measured alone (such as
-`--sizes 500 --jobs`), and the picture build/bench_scale.svg shows all of it. A class is the same ten sample students of
-lab 2 again and again, so that classes of every size cost the same for each.
+For `make bench`; the picture build/bench_scale.svg shows what one run of it measured. A class is the same ten sample
+students of lab 2 again and again, so that classes of every size cost the same for each.
 """
 
 from __future__ import annotations
 
-import argparse
 import contextlib
 import datetime
-import json
 import os
 import sys
 import tempfile
 import threading
-from collections.abc import Iterator
-from dataclasses import asdict, dataclass, field
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "support"))
 
-import bench
+import bench_stock
 import matplotlib
 import psutil
 import sample_class
@@ -38,6 +34,8 @@ LOOK_EVERY = 3.0
 """Seconds between two looks at the memory: adding it up costs CPU, too."""
 BUILD = sample_class.ROOT / "build"
 MIB = 1024 * 1024
+JOBS_A_CORE = 5
+"""On a Dask worker, as `autograder grade` takes them on a machine."""
 
 
 @dataclass
@@ -54,30 +52,38 @@ class Run:
     """MiB of the command alone, from the beginning to the end."""
     together: float = 0.0
     """MiB of all processes, at most; shared pages count once."""
+    workers: int = 0
+    """Of the Dask cluster; 0 without one."""
     date: str = ""
     load: float = 0.0
     """Of the machine in the last minute of it: above the number of cores, something else ran, too."""
 
     def __str__(self) -> str:
         """A line for people."""
-        quarter = max(1, len(self.command) // 4)
-        early, late = self.command[quarter : 2 * quarter] or [0.0], self.command[-quarter:] or [0.0]
+        early, late = early_and_late(self.command)
         return (
             f"{self.kind}: {self.size} submissions, {self.jobs} at once: {60 * self.size / self.seconds:.1f} a minute,"
-            f" {self.cpu / self.size:.2f} CPU s each; the command has {sum(early) / len(early):.0f} MiB in the second"
-            f" quarter and {sum(late) / len(late):.0f} in the last, everything at most {self.together:.0f}"
+            f" {self.cpu / self.size:.2f} CPU s each; the command has {early:.0f} MiB in the second"
+            f" quarter and {late:.0f} in the last, everything at most {self.together:.0f}"
             f" ({self.date}, load {self.load:.0f})"
         )
 
 
+def early_and_late(looks: list[float]) -> tuple[float, float]:
+    """The means of the second quarter, when everything is loaded, and of the last."""
+    quarter = max(1, len(looks) // 4)
+    early, late = looks[quarter : 2 * quarter] or [0.0], looks[-quarter:] or [0.0]
+    return sum(early) / len(early), sum(late) / len(late)
+
+
 def hand_in(root: Path, size: int) -> Path:
     """Write a class into a course and return its folder."""
-    lab, folder = load_lab(root, bench.LAB), root / f"class of {size}"
-    mix = bench.tame_students(MIX)
+    lab, folder = load_lab(root, bench_stock.LAB), root / f"class of {size}"
+    mix = bench_stock.tame_students(MIX)
     for number in range(size):
         made = sample_class.build_student(lab, mix[number % MIX], root / "made")
         folder.mkdir(exist_ok=True)
-        made.rename(folder / f"s{number:03d}")
+        made.rename(folder / f"s{number:05d}")
     return folder
 
 
@@ -114,27 +120,56 @@ def graded(kind: str, root: Path, size: int, jobs: int, *options: str) -> Run:
     """Grade a class of a course from the beginning."""
     source = hand_in(root, size)
     with memory() as looks:
-        seconds, cpu = bench.timed(
-            [bench.BIN / "autograder", "grade", bench.LAB, source, "--force", "--jobs", str(jobs), *options], root
+        seconds, cpu = bench_stock.timed(
+            [
+                bench_stock.BIN / "autograder",
+                "grade",
+                bench_stock.LAB,
+                source,
+                "--force",
+                "--jobs",
+                str(jobs),
+                *options,
+            ],
+            root,
         )
     return Run(
         kind, size, jobs, round(seconds, 1), round(cpu, 1), [round(alone) for alone, _ in looks],
-        round(max((all_ for _, all_ in looks), default=0.0)), f"{datetime.date.today()}", round(os.getloadavg()[0], 1),
+        round(max((all_ for _, all_ in looks), default=0.0)), date=f"{datetime.date.today()}",
+        load=round(os.getloadavg()[0], 1),
     )  # fmt: skip
 
 
-def on_dask(root: Path, size: int, jobs: int) -> Run:
-    """Grade a class on a cluster of one worker, whose CPU time counts, too."""
+def on_dask(root: Path, size: int, workers: int) -> Run:
+    """Grade a class on a cluster of so many workers, each with a core of its own; their CPU time counts, too."""
+    cores = sorted(os.sched_getaffinity(0))[:workers]
     with cpu_meter() as (before, cpu), cluster(root, before) as dask:
-        dask.worker("one", jobs=jobs)
+        for core in cores:
+            dask.worker(f"core {core}", jobs=JOBS_A_CORE, core=core)
         began = cpu()
-        run = graded("dask", root, size, jobs, "--scheduler", dask.address)
+        run = graded("dask", root, size, JOBS_A_CORE * workers, "--scheduler", dask.address)
+        run.workers = workers
         run.cpu += cpu() - began if before else 0.0  # without a control group it was the whole machine's already
     return run
 
 
-def plot(runs: list[Run], path: Path) -> None:
-    """Draw what was measured, the latest run of each kind, size and number of jobs."""
+def measured(kind: str, size: int, number: int) -> Run:
+    """Grade a class.
+
+    Args:
+        kind: what is varied: `jobs`, `size` or `dask`.
+        size: the number of submissions.
+        number: the jobs at once, or the workers on Dask.
+    """
+    with tempfile.TemporaryDirectory(prefix="bench-") as folder:
+        root = bench_stock.course(Path(folder) / "course", plain=False)
+        return on_dask(root, size, number) if kind == "dask" else graded(kind, root, size, number)
+
+
+def plot(runs: Sequence[Run]) -> Path:
+    """Draw what was measured; return where the picture is."""
+    path = BUILD / "bench_scale.svg"
+    path.parent.mkdir(exist_ok=True)
     matplotlib.rcParams |= {"svg.fonttype": "none", "svg.hashsalt": "scale", "font.size": 9}
     figure = Figure(figsize=(8, 2.8), layout="constrained")
     by_jobs, by_size, where = figure.subplots(1, 3)
@@ -147,41 +182,9 @@ def plot(runs: list[Run], path: Path) -> None:
     bars = by_size.bar([f"{run.size}" for run in sizes], [run.cpu / run.size for run in sizes], color="#0072B2")
     by_size.bar_label(bars, fmt="%.2f")
     by_size.set(title="CPU seconds a submission", xlabel="submissions in the class", ylim=(0, None))
-    for run in (run for run in runs if run.kind == "dask"):
-        here = [one for one in jobs if (one.size, one.jobs) == (run.size, run.jobs)][-1:]
-        pair = [*here, run]
-        names = ["Dask" if one.kind == "dask" else "local" for one in pair]
-        bars = where.bar(names, [60 * one.size / one.seconds for one in pair], color="#0072B2")
-        where.bar_label(bars, [f"{one.cpu / one.size:.2f} CPU s each" for one in pair])
-    where.set(title="Submissions a minute", xlabel="one machine, as many jobs", ylim=(0, None))
+    dask = sorted((run for run in runs if run.kind == "dask"), key=lambda run: run.workers)
+    bars = where.bar([f"{run.workers}" for run in dask], [60 * run.size / run.seconds for run in dask], color="#0072B2")
+    where.bar_label(bars, [f"{run.cpu / run.size:.2f} CPU s each" for run in dask])
+    where.set(title="Submissions a minute", xlabel="Dask workers, each on a core of its own", ylim=(0, None))
     figure.savefig(path, metadata={"Date": None})
-
-
-def main() -> None:
-    """Run the command."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--jobs", type=int, nargs="*", default=[1, 2, 4, 8, 16], help="jobs at once")
-    parser.add_argument("--students", type=int, default=20, help="submissions with which jobs and Dask are measured")
-    parser.add_argument("--sizes", type=int, nargs="*", default=[10, 50, 100], help="sizes of classes")
-    parser.add_argument("--dask", type=int, nargs="*", default=[8], help="jobs at once on a Dask cluster")
-    asked = parser.parse_args()
-    kept = BUILD / "bench_scale.json"
-    known: list[dict[str, Any]] = json.loads(kept.read_text()) if kept.is_file() else []
-    runs = {(run.kind, run.size, run.jobs): run for run in (Run(**one) for one in known)}
-    wanted = [("size", size, 0) for size in asked.sizes]
-    wanted += [("jobs", asked.students, jobs) for jobs in asked.jobs]
-    wanted += [("dask", asked.students, jobs) for jobs in asked.dask]
-    BUILD.mkdir(exist_ok=True)
-    for kind, size, jobs in wanted:
-        with tempfile.TemporaryDirectory(prefix="bench-") as folder:
-            root = bench.course(Path(folder) / "course", plain=False)
-            run = on_dask(root, size, jobs) if kind == "dask" else graded(kind, root, size, jobs)
-        runs[kind, size, jobs] = run
-        print(run, flush=True)
-        kept.write_text(json.dumps([asdict(one) for one in runs.values()], indent=1))
-    plot(list(runs.values()), BUILD / "bench_scale.svg")
-    print(BUILD / "bench_scale.svg")
-
-
-if __name__ == "__main__":
-    main()
+    return path
