@@ -107,7 +107,7 @@ class Observer:
         """Called at intervals in the thread that waits."""
         self._closing = False
         self._error: Exception | None = None
-        """Why it receives nothing any more."""
+        """What ended the thread that spins."""
         self._thread = threading.Thread(target=self._spin, name="observer", daemon=True)
         self._thread.start()
 
@@ -125,17 +125,25 @@ class Observer:
         raise KitError("The observer does not find itself in the ROS graph.", "Run the command again.")
 
     def _spin(self) -> None:
-        error: Exception = RuntimeError("its ROS context was shut down")
         try:
             self._executor.spin()
         except ExternalShutdownException:
             pass  # caused by shutting down all contexts, as rclpy does at Ctrl-C
         except Exception as raised:
-            if self._context.ok():  # otherwise it was about to wait when the context was shut down, which raises errors
-                error = raised
-        # If the executor is shut down just as it begins to wait, it raises an error that does not matter.
-        if not self._closing:
-            self._error = error
+            # If the context or the executor is shut down just as it begins to wait, it raises an error that does not
+            # matter.
+            if self._context.ok() and not self._closing:
+                self._error = raised
+
+    def _failure(self) -> Exception | None:
+        """Return why the observer receives nothing any more, or None.
+
+        The context is asked and not the thread that spins. At Ctrl-C, rclpy 7.1 wakes the executor first and shuts the
+        context down after that (`signal_handler.cpp`), so the executor may wait again and never end.
+        """
+        if self._error is None and not self._closing and not self._context.ok():
+            return RuntimeError("its ROS context was shut down")
+        return self._error
 
     def close(self) -> None:
         """Leave the domain. The thread is joined because a daemon thread that spins at exit would abort the process."""
@@ -186,8 +194,8 @@ class Observer:
                 deadline = began + within + self.patience.more(began, within)
             else:
                 self.patience.withheld.measure()
-            if self._error is not None:  # otherwise the silence would be blamed on the program
-                raise KitError(f"The observer hears nothing any more: {self._error!r}.", "Run it again.")
+            if (failure := self._failure()) is not None:  # otherwise the silence would be blamed on the program
+                raise KitError(f"The observer hears nothing any more: {failure!r}.", "Run it again.")
             late = now >= deadline or self._closing or give_up()
             if ready():
                 return True

@@ -385,6 +385,13 @@ def test_an_observer_that_hears_nothing_any_more_says_so(talking: Observer, monk
         talking.wait(lambda: False, 30)
 
 
+def test_an_observer_whose_executor_sleeps_on_after_its_context_was_shut_down_says_so(talking: Observer) -> None:
+    """As when rclpy wakes the executor at Ctrl-C just before it shuts the context down, and it waits again."""
+    talking.node.context.handle.shutdown()  # only rcl's part, which wakes nobody
+    with pytest.raises(KitError, match=r"hears nothing any more: RuntimeError.'its ROS context was shut down'"):
+        talking.wait(lambda: False, 30)
+
+
 def test_an_observer_that_is_shut_down_with_all_of_rclpy_says_so() -> None:
     """As by an interrupt once somebody has called rclpy.init() in a cell: from then on rclpy takes the signals."""
     script = """
