@@ -14,7 +14,7 @@ class Taxi(Node):
         super().__init__("taxi")
         self.declare_parameter("block", 0.5)  # seconds
         self.block = self.get_parameter("block").value
-        self.handles = []
+        self.current = None  # the handle of the goal that is being driven
         self.lock = threading.Lock()
         self.server = ActionServer(
             self,
@@ -31,24 +31,22 @@ class Taxi(Node):
     def accepted(self, goal_handle):
         """Handle an accepted goal; `goal_handle.execute()` starts to execute it."""
         with self.lock:
-            for handle in self.handles:
-                if handle.is_active:
-                    handle.abort()
-            self.handles = [goal_handle]
+            old, self.current = self.current, goal_handle
+            if old is not None and old.is_active:
+                old.abort()
             goal_handle.execute()
 
     def execute(self, goal_handle):
         driven = []
         while len(driven) < goal_handle.request.order:
             time.sleep(self.block)
+            driven.append(len(driven) + 1)  # the block that was being driven counts, too
             with self.lock:
-                if not goal_handle.is_active:
-                    return Fibonacci.Result(sequence=driven)
-                driven.append(len(driven) + 1)
+                if self.current is not goal_handle:
+                    break
                 goal_handle.publish_feedback(Fibonacci.Feedback(sequence=driven))
-        with self.lock:
-            if goal_handle.is_active:
-                goal_handle.succeed()
+                if len(driven) == goal_handle.request.order:
+                    goal_handle.succeed()
         return Fibonacci.Result(sequence=driven)
 
 
