@@ -119,12 +119,15 @@ def checked(
         audience: the reader for whom the report is printed while the checks run; None prints no report.
     """
     from autograder.grading.runner import run_submission, workers_for_one
-    from autograder.report.terminal import LiveReport
+    from autograder.report.terminal import LiveReport, console
 
     student = notebook.parent.resolve().name
     with LiveReport([check.grade_id for check in lab.checks], audience, book) as report:
         result = run_submission(notebook, student, lab, settings, workers=workers_for_one(), follower=report)
         report.finish(result)
+    if audience and lab.points_by_hand:
+        more = f"The answers in words, which a person grades, give up to {lab.points_by_hand:g} more."
+        console().print(more, highlight=False)
     return result
 
 

@@ -90,5 +90,5 @@ def _checks(packed: Path, lab: str, isolation: Isolation | None, course: Path | 
     if gap:
         console().print()
     console().print(summary_view(result))
-    read = sum(answer.points or 0.0 for answer in found.answers.values())
-    return total(result) + (f" from checks; {read:g} more are for answers that a person grades" if read else "")
+    by_hand = found.points_by_hand
+    return total(result) + (f" from checks; {by_hand:g} more are for answers that a person grades" if by_hand else "")

@@ -99,6 +99,11 @@ class Lab:
     """The digests that each cell had in all versions of the lab that students have received, by grade_id."""
 
     @property
+    def points_by_hand(self) -> float:
+        """The points of the answers that a person grades."""
+        return sum(answer.points or 0.0 for answer in self.answers.values())
+
+    @property
     def checks(self) -> tuple[Cell, ...]:
         """The cells that give points."""
         return tuple(cell for cell in self.cells if cell.points is not None)

@@ -68,6 +68,7 @@ def hand_in(root: Path, student: str, talker: str) -> Path:
 def test_check_passes_with_status_0(root: Path) -> None:
     status, out, _ = run(root, "check", "--course", ".", "class/ann/toy.ipynb")
     assert status == 0 and "toy: 5 of 5 points" in out
+    assert "The answers in words, which a person grades, give up to 4 more." in out
 
 
 def test_cells_that_look_around_are_no_part_of_the_check(root: Path, tmp_path: Path) -> None:
