@@ -110,12 +110,16 @@ class Lab:
 
     def is_as_given_out(self, grade_id: str, source: str) -> bool:
         """Return whether a cell is as in a version of the lab that students have received, the current one or not."""
-        with_hidden_lines = () if grade_id in self.answers else self.raw["cells"]
-        current = [cell for cell in (*self.released, *with_hidden_lines) if grade_id_of(cell) == grade_id]
-        digest = cell_digest(source)
-        return digest in self.given_out.get(grade_id, ()) or digest in [
-            cell_digest(source_of(cell)) for cell in current
-        ]
+        return cell_digest(source) in self._digests_given_out.get(grade_id, ())
+
+    @cached_property
+    def _digests_given_out(self) -> dict[str, set[str]]:
+        """The digests that each cell has or had, by grade_id. An author's cell has the hidden lines as well."""
+        digests = {grade_id: set(earlier) for grade_id, earlier in self.given_out.items()}
+        with_hidden_lines = [cell for cell in self.raw["cells"] if grade_id_of(cell) not in self.answers]
+        for cell in (*self.released, *with_hidden_lines):
+            digests.setdefault(grade_id_of(cell), set()).add(cell_digest(source_of(cell)))
+        return digests
 
     @property
     def max_points(self) -> float:
