@@ -134,7 +134,8 @@ class SubmissionExporter(NotebookExporter):  # type: ignore[misc]
         course, told = self.parent.coursedir, resources["nbgrader"]
         carry(path.parent, Path(course.format_path(course.autograded_directory, told["student"], lab.name)))
         resources["metadata"] = {"name": lab.name, "path": str(Path(filename).parent)}
-        return self.from_notebook_node(nbformat.from_dict(submission.notebook), resources=resources, **kwargs)
+        notebook = nbformat.from_dict(lab.clean_notebook(submission.sources))
+        return self.from_notebook_node(notebook, resources=resources, **kwargs)
 
 
 class AttachResults(NbGraderPreprocessor):  # type: ignore[misc]

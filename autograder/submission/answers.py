@@ -77,8 +77,6 @@ class Submission:
     """SHA-256 over the answers, the student's other files, the problems, the lab and the kit."""
     readable: bool = True
     """Whether there is a notebook of this lab to grade; if not, `problems` says why."""
-    notebook: dict[str, Any] = field(default_factory=dict)
-    """The released notebook with the student's answers in it."""
 
 
 def take_answers(cells: list[dict[str, Any]], lab: Lab, submission: Submission) -> None:
