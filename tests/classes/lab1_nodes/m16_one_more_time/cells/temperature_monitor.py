@@ -1,0 +1,30 @@
+%%node temperature_monitor
+import rclpy
+from rclpy.executors import ExternalShutdownException
+from rclpy.node import Node
+from sensor_msgs.msg import Temperature
+
+
+class TemperatureMonitor(Node):
+    def __init__(self):
+        super().__init__("temperature_monitor")
+        self.create_subscription(Temperature, "temperature", self.judge, 10)
+
+    def judge(self, message):
+        if message.temperature > 30:
+            self.get_logger().warning(f"too hot: {message.temperature:.2f}")
+        elif message.temperature < -20:
+            self.get_logger().warning(f"sensor broken? {message.temperature:.2f}")
+
+
+def main():
+    rclpy.init()
+    try:
+        rclpy.spin(TemperatureMonitor())
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    finally:
+        rclpy.try_shutdown()
+
+
+main()
