@@ -14,7 +14,7 @@ from std_srvs.srv import Trigger
 class Arm(Node):
     def __init__(self):
         super().__init__("arm")
-        self.beats = 0
+        self.beats, self.over = 0, threading.Event()
         self.heartbeat = self.create_publisher(Int32, "heartbeat", 10)
         self.create_timer(0.1, self.beat)
         self.create_service(Trigger, "grip", self.on_grip)
@@ -31,8 +31,7 @@ class Arm(Node):
 
     def beat_on(self):
         # the timer cannot beat now
-        while rclpy.ok():
-            time.sleep(0.1)
+        while not self.over.wait(0.1):
             self.beat()
 
 

@@ -1,6 +1,4 @@
 %%node car_manager
-import time
-
 import rclpy
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
@@ -81,7 +79,7 @@ def main():
     try:
         while rclpy.ok():
             manager.car_state.publish(String(data=manager.round()))
-            time.sleep(0.2)
+            rclpy.spin_once(manager, timeout_sec=0.2)
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
     rclpy.try_shutdown()
