@@ -39,9 +39,6 @@ _POLLS_A_WAIT = 10
 RECORDED = 128 * 1024 * 1024
 """The bytes of messages that one observer keeps; later messages are dropped."""
 
-_GIVE_UP_EVERY = 0.1
-"""The seconds between two checks of whether a wait is hopeless."""
-
 _ANSWERS = 20
 """The number of answers that an observer keeps, in case one of them causes an error in a check."""
 
@@ -191,7 +188,6 @@ class Observer:
 
     def _wait(self, ready: Callable[[], object], began: float, within: float, give_up: Callable[[], bool]) -> bool:
         deadline = began + within
-        given_up, ask_again_at = False, began
         while True:
             now = time.monotonic()
             if now >= deadline:
@@ -200,9 +196,7 @@ class Observer:
                 self.patience.withheld.measure()
             if (failure := self._failure()) is not None:  # otherwise the silence would be blamed on the program
                 raise KitError(f"The observer hears nothing any more: {failure!r}.", "Run it again.")
-            if now >= ask_again_at:  # not after each message, because most answers need the graph
-                given_up, ask_again_at = give_up(), now + _GIVE_UP_EVERY
-            late = now >= deadline or self._closing or given_up
+            late = now >= deadline or self._closing or give_up()
             if ready():
                 return True
             if late:
