@@ -9,7 +9,7 @@ from __future__ import annotations
 import contextlib
 import threading
 import time
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable
 from typing import Any
 
@@ -25,7 +25,7 @@ from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from autograder.core import interrupts
 from autograder.core.errors import KitError
-from autograder.graph.names import full_name
+from autograder.graph.names import UNKNOWN_NODE, full_name
 from autograder.graph.patience import Patience
 from autograder.graph.recording import Bag, Recording, quiet_profile
 
@@ -43,6 +43,9 @@ _ANSWERS = 20
 """The number of answers that an observer keeps, in case one of them causes an error in a check."""
 
 OBSERVER_NAME = "grading_observer"
+
+_EVENTS = "/parameter_events"
+"""The topic on which every node of rclpy and of rclcpp has a publisher, unless it is told to have none."""
 
 
 class ForgedGraph(Exception):
@@ -234,7 +237,36 @@ class Observer:
             if "empty node name" in str(error):  # rcl does not allow a program to create such a node
                 raise ForgedGraph from error
             raise
-        return found
+        if self.node.count_publishers(_EVENTS) >= len(found):
+            return found
+        return self._without_left_over(found)
+
+    def _without_left_over(self, found: list[tuple[str, str]]) -> list[tuple[str, str]]:
+        """Leave out the nodes that have no publisher, so that a node whose process has ended is not on the graph.
+
+        A process that ends announces this to DDS, and before that it tells which nodes it still has. The middleware
+        reads the two in different threads. If it reads the older news last, it lists the node forever, without any
+        publisher (seen with rclpy 7.1 in 1 of 80 processes; `GraphCache::update_participant_entities` in
+        rmw_dds_common adds a participant that it does not know).
+        """
+        ends = _read(self.node.get_publishers_info_by_topic, _EVENTS)
+        there = Counter((end.node_name, end.node_namespace) for end in ends)
+        if any(end.node_name == UNKNOWN_NODE for end in ends):  # of two nodes of one name in one process
+            return found
+        left_over = Counter(found) - there
+        kept = []
+        for name in found:
+            if left_over[name] and (there[name] or not self._publishes(*name)):
+                left_over[name] -= 1
+            else:
+                kept.append(name)
+        return kept
+
+    def _publishes(self, name: str, namespace: str) -> bool:
+        """Whether a node of this name has any publisher, also where its `/parameter_events` has another name."""
+        with contextlib.suppress(RuntimeError, ValueError):  # as in `_services_of`
+            return bool(self.node.get_publisher_names_and_types_by_node(name, namespace))
+        return False
 
     def topics(self) -> dict[str, list[str]]:
         """Return the topics with their type names, except those that only the observer uses."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import runpy
 import signal
 import subprocess
 import sys
@@ -18,6 +19,7 @@ import pytest
 import rclpy
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from places import ROOT
 from rclpy.context import Context
 from rclpy.duration import Duration
 from rclpy.qos import (
@@ -28,6 +30,8 @@ from rclpy.qos import (
     QoSReliabilityPolicy,
     qos_check_compatible,
 )
+from rclpy.serialization import serialize_message
+from rmw_dds_common.msg import Gid, NodeEntitiesInfo, ParticipantEntitiesInfo
 from std_msgs.msg import Int64
 
 from autograder.checks.concurrency import Concurrency
@@ -414,3 +418,44 @@ observer.close()
 """
     said = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=180, check=False)
     assert "The observer hears nothing any more: RuntimeError('its ROS context was shut down')." in said.stdout, said
+
+
+def test_a_node_that_the_middleware_lists_although_its_process_has_left_is_not_on_the_graph(observer: Observer) -> None:
+    """What is told of a participant that DDS has already removed is made here by hand: the race is rare."""
+    contexts = [Context(), Context()]
+    for context in contexts:
+        rclpy.init(context=context, domain_id=observer.domain_id)
+    node, second = [rclpy.create_node("talker", context=context) for context in contexts]
+    forge = runpy.run_path(str(ROOT / "tests" / "attacks" / "graded" / "_rmw.py"))["publisher"]
+    tell = forge(node, b"ros_discovery_info", "rmw_dds_common", "ParticipantEntitiesInfo")
+    late = ParticipantEntitiesInfo(gid=Gid(data=[0] * 15 + [1]))
+    late.node_entities_info_seq = [NodeEntitiesInfo(node_namespace="/", node_name=name) for name in ("talker", "left")]
+    assert observer.wait(lambda: observer.nodes() == ["/talker", "/talker"], 20)
+
+    def listed() -> bool:
+        tell(serialize_message(late))
+        names = [name for name, _ in observer.node.get_node_names_and_namespaces()]
+        return names.count("talker") == 3 and "left" in names
+
+    assert observer.wait(listed, 20)
+    assert observer.nodes() == ["/talker", "/talker"]
+    second.destroy_node()
+    assert observer.wait(lambda: observer.nodes() == ["/talker"], 20)
+    node.destroy_node()
+    assert observer.wait(lambda: observer.nodes() == [], 20)
+    for context in contexts:
+        context.shutdown()
+
+
+def test_one_of_two_nodes_of_one_name_in_one_process_stays_on_the_graph_when_the_other_is_destroyed(
+    observer: Observer,
+) -> None:
+    context = Context()
+    rclpy.init(context=context, domain_id=observer.domain_id)
+    nodes = [rclpy.create_node("talker", context=context) for _ in range(2)]
+    assert observer.wait(lambda: observer.nodes() == ["/talker", "/talker"], 20)
+    nodes[1].destroy_node()
+    assert observer.wait(lambda: observer.nodes() == ["/talker"], 20)
+    nodes[0].destroy_node()
+    assert observer.wait(lambda: observer.nodes() == [], 20)
+    context.shutdown()
