@@ -214,6 +214,13 @@ def test_outside_of_a_course_nbgrader_executes_nothing(environment: Environment,
             '"six": 1}',
             'gives points for "six", but there is no such part',
         ),
+        (  # the last part would break if the first one failed
+            "check_greeter",
+            'with ros.part("the text"):',
+            'with ros.part("the text"):\n        came = 5\n    with ros.part("five times a second"):\n'
+            '        ros.require(came, "It came", because="It did not come.")\n    with ros.part("the text"):',
+            "`came` is set only in a block above, which ends early if something in it fails",
+        ),
         ("check_greeter", '("/greeter")', '("greeter")', "takes full names, but `greeter` does not begin with a slash"),
         ("check_facts", "table.score(2)", "", "it has no score"),
         ("check_facts", "table.score(2)", "table.score(2", "was never closed"),
