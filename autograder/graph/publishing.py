@@ -57,6 +57,14 @@ class Stream:
         # `_take_timer` lets the error of a canceled timer end the spinning.
         self._on = False
 
+    def assert_liveliness(self) -> None:
+        """Assert the liveliness of the publisher without a message, as a node does that has nothing to say.
+
+        With manual liveliness, a best-effort subscription is not told (seen with Fast DDS: the assertion is part of a
+        heartbeat, which only reliable subscriptions get).
+        """
+        self._publisher.assert_liveliness()
+
     def _send(self) -> None:
         if self._on:
             self._publisher.publish(self._message)

@@ -1,0 +1,83 @@
+import rclpy
+from camera_hardware import CameraHardware
+from rclpy.executors import ExternalShutdownException
+from rclpy.lifecycle import LifecycleNode, TransitionCallbackReturn
+from sensor_msgs.msg import Image
+from std_msgs.msg import String
+
+
+class CameraDriver(LifecycleNode):
+    def __init__(self):
+        super().__init__("camera_driver")
+        self.declare_parameter("device", "/dev/zero")
+        self.declare_parameter("fps", 10.0)
+        self.camera = None
+        self.images = None
+        self.shutter = None
+        self.status = self.create_publisher(String, "status", 10)
+        self.create_timer(0.1, self.tell_status)
+
+    def on_configure(self, state):
+        if self.images is None:
+            self.images = self.create_lifecycle_publisher(Image, "image", 10)
+        camera = CameraHardware(self, self.get_parameter("device").value)
+        try:
+            camera.open()
+        except OSError as error:
+            self.get_logger().warning(f"not configured: {error}")
+            return TransitionCallbackReturn.FAILURE
+        self.camera = camera
+        self.shutter = self.create_timer(1.0 / self.get_parameter("fps").value, self.send_image, autostart=False)
+        return TransitionCallbackReturn.SUCCESS
+
+    def on_activate(self, state):
+        try:
+            self.camera.read()
+        except OSError as error:
+            self.get_logger().error(f"the camera is broken: {error}")
+            return TransitionCallbackReturn.ERROR
+        self.shutter.reset()
+        return super().on_activate(state)
+
+    def on_deactivate(self, state):
+        self.shutter.cancel()
+        return super().on_deactivate(state)
+
+    def on_cleanup(self, state):
+        return self.give_back()
+
+    def on_shutdown(self, state):
+        return self.give_back()
+
+    def on_error(self, state):
+        return self.give_back()
+
+    def give_back(self):
+        if self.shutter is not None:
+            self.destroy_timer(self.shutter)
+            self.shutter = None
+        if self.images is not None:
+            self.destroy_lifecycle_publisher(self.images)
+            self.images = None
+        if self.camera is not None:
+            self.camera.close()
+            self.camera = None
+        return TransitionCallbackReturn.SUCCESS
+
+    def send_image(self):
+        self.images.publish(Image(height=8, width=8, encoding="mono8", step=8, data=self.camera.read()))
+
+    def tell_status(self):
+        self.status.publish(String(data="closed" if self.camera is None else "open"))
+
+
+def main():
+    rclpy.init()
+    node = CameraDriver()
+    try:
+        rclpy.spin(node)
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+
+
+main()
