@@ -9,12 +9,13 @@ import inspect
 import json
 import re
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from autograder.authoring import requirements
+from autograder.authoring.lint.unset_names import bound, left_unset
 from autograder.checks.answers import Answers
 from autograder.checks.building import Package
 from autograder.checks.launch import Launch
@@ -167,11 +168,11 @@ def check_findings(lab: Lab) -> Iterator[Finding]:
             trees.append((cell, ast.parse("\n".join(lines))))
         except SyntaxError as error:
             yield Finding(cell.grade_id, f"line {error.lineno}: {error.msg}.")
-    known = {name for _, tree in trees for name in _bound(tree)} | set(dir(builtins)) | _OF_THE_NOTEBOOK
+    known = {name for _, tree in trees for name in bound(tree)} | set(dir(builtins)) | _OF_THE_NOTEBOOK
     programs = {file.name for cell in lab.raw["cells"] if (file := _file(cell)) is not None and file.magic == "node"}
     for cell, tree in trees:
         sentences = [*_unknown_names(tree, known), *_unknown_expectations(tree), *_unknown_programs(tree, programs)]
-        sentences += [*_score(tree, cell.points), *_left_unset(tree.body, set())] if cell.points is not None else []
+        sentences += [*_score(tree, cell.points), *left_unset(tree.body, set())] if cell.points is not None else []
         for sentence in sentences:
             yield Finding(cell.grade_id, sentence)
     yield from _programs(lab)
@@ -207,20 +208,6 @@ def _programs(lab: Lab) -> Iterator[Finding]:
                     ast.parse(file.text if file else "")
                 except SyntaxError as error:
                     yield Finding(answer.grade_id, f"{whose} is not valid Python, line {error.lineno}: {error.msg}.")
-
-
-def _bound(tree: ast.AST) -> Iterator[str]:
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Name) and not isinstance(node.ctx, ast.Load):
-            yield node.id
-        elif isinstance(node, (ast.FunctionDef, ast.ClassDef)):
-            yield node.name
-        elif isinstance(node, ast.arg):
-            yield node.arg
-        elif isinstance(node, ast.alias):
-            yield (node.asname or node.name).partition(".")[0]
-        elif isinstance(node, ast.ExceptHandler) and node.name:
-            yield node.name
 
 
 def _unknown_names(tree: ast.AST, known: set[str]) -> Iterator[str]:
@@ -272,7 +259,7 @@ def _nouns_of(tree: ast.AST) -> dict[str, type]:
     for name, value in _assigned(tree):
         values.setdefault(name, []).append(value)
     # A name that is also bound in another way, by a loop or as an argument, may be another object there.
-    times = Counter(_bound(tree))
+    times = Counter(bound(tree))
     for name, of in values.items():
         nouns = {_noun_of(value, names) for value in of}
         noun = nouns.pop() if len(nouns) == 1 and times[name] == len(of) else None
@@ -367,60 +354,6 @@ def _part_titles(tree: ast.Module, worth: dict[str, float], score_line: int) -> 
             yield f'line {node.lineno}: the score gives no points for the part "{title}".'
     for title in worth.keys() - named if not computed else ():
         yield f'line {score_line}: the score gives points for "{title}", but there is no such part.'
-
-
-def _left_unset(body: Sequence[ast.stmt], known: set[str]) -> Iterator[str]:
-    """Yield sentences about names that are set only in a `with` block, which a failure ends early, and used after it.
-
-    What is below an `if` that asks for a name which the block sets last is left out: it is not reached then.
-
-    Args:
-        body: the statements of a cell or of a block.
-        known: names that are set before them. Those that the statements set are added.
-    """
-    for number, statement in enumerate(body):
-        if isinstance(statement, ast.With):
-            made = {name for item in statement.items if item.optional_vars for name in _bound(item.optional_vars)}
-            inside = {name for one in statement.body for name in _set_in(one)}
-            yield from _used_after(body[number + 1 :], inside - known - made, inside & known)
-            yield from _left_unset(statement.body, known | made)
-        elif isinstance(statement, (ast.For, ast.If)):
-            yield from _left_unset(statement.body, known | set(_set_in(statement)))
-        known |= set(_set_in(statement))
-
-
-def _used_after(body: Sequence[ast.stmt], unset: set[str], guards: set[str]) -> Iterator[str]:
-    for statement in body:
-        if isinstance(statement, ast.If) and guards & {one.id for one in _names_in(statement.test)}:
-            continue
-        for name in sorted(unset & {one.id for one in _names_in(statement)}):
-            first = min(
-                (one for one in _names_in(statement) if one.id == name), key=lambda one: (one.lineno, one.col_offset)
-            )
-            if isinstance(first.ctx, ast.Load):
-                yield (
-                    f"line {first.lineno}: `{name}` is set only in a block above, which ends early if something in it"
-                    " fails. Set it before the block."
-                )
-            unset = unset - {name}
-
-
-def _set_in(statement: ast.stmt) -> Iterator[str]:
-    """Yield the names that a statement sets, without those that exist only in a comprehension."""
-    return (one.id for one in _names_in(statement) if isinstance(one.ctx, ast.Store))
-
-
-def _names_in(tree: ast.AST) -> Iterator[ast.Name]:
-    """Yield the names in a statement, without those of a comprehension's or a lambda's own."""
-    if isinstance(tree, ast.Name):
-        yield tree
-    hidden: set[str] = set()
-    if isinstance(tree, (ast.ListComp, ast.SetComp, ast.DictComp, ast.GeneratorExp)):
-        hidden = {name for one in tree.generators for name in _bound(one.target)}
-    elif isinstance(tree, (ast.Lambda, ast.FunctionDef)):
-        hidden = {one.arg for one in ast.walk(tree.args) if isinstance(one, ast.arg)}
-    for child in ast.iter_child_nodes(tree):
-        yield from (one for one in _names_in(child) if one.id not in hidden)
 
 
 def _is_call(node: ast.AST, method: str) -> bool:
