@@ -16,6 +16,8 @@ from typing import Any
 _AGAIN = 0.1
 """Seconds after which a waiting interrupt is tried again, because the cell's own code may run again by then."""
 _KIT = __name__.partition(".")[0]
+_SENDS_VALUE = "finish_displayhook"
+"""The function of IPython's display hook that sends the value of a cell, which has been formatted before."""
 
 
 class Interrupted(KeyboardInterrupt):
@@ -79,10 +81,15 @@ class CellInterrupts:
         signal.default_int_handler(number, frame)
 
     def _in_cell(self, frame: FrameType | None) -> bool:
-        """Return whether the cell's own code runs, or code that it called. During an import the answer is False."""
+        """Return whether the cell's own code runs, or code that it called. During an import the answer is False.
+
+        So it is while IPython sends the cell's value, because a verdict that is shown must not be taken back.
+        """
         while frame is not None:
             if frame.f_globals is self._variables:
                 return True
+            if frame.f_code.co_name == _SENDS_VALUE:
+                return False
             module = str(frame.f_globals.get("__name__"))
             if module.partition(".")[0] == _KIT or frame.f_code.co_filename.startswith("<frozen importlib"):
                 return False
