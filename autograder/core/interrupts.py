@@ -83,7 +83,7 @@ class CellInterrupts:
     def _in_cell(self, frame: FrameType | None) -> bool:
         """Return whether the cell's own code runs, or code that it called. During an import the answer is False.
 
-        So it is while IPython sends the cell's value, because a verdict that is shown must not be taken back.
+        The answer is also False while IPython sends the cell's value, because a verdict that a student sees must stand.
         """
         while frame is not None:
             if frame.f_globals is self._variables:
