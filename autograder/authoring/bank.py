@@ -219,7 +219,7 @@ def check(root: Path, lab_name: str, settings: Settings) -> Compared:
     too_busy: Counter[str] = Counter()
     with (
         Steps(len(jobs), Console(file=sys.stderr, highlight=False)) as steps,
-        closing(run_jobs(Local(settings.at_once), jobs, steps.started)) as ran,
+        closing(run_jobs(Local(settings.at_once, settings.further), jobs, steps.started)) as ran,
     ):
         for result in ran:
             steps.finished(result)

@@ -52,9 +52,7 @@ def grade(
     ] = None,
     force: ForceOption = False,
     isolation: IsolationOption = Isolation.FULL,
-    jobs: Annotated[
-        int, typer.Option(min=0, help="How many submissions run at once; 0: depends on the number of CPUs.")
-    ] = 0,
+    jobs: Annotated[int, typer.Option(min=0, help="How many submissions run at once; 0: depends on the CPUs.")] = 0,
     seed: SeedOption = None,
     as_json: JsonOption = False,
     scheduler: Annotated[

@@ -233,6 +233,21 @@ class Withheld:
         return sum(kept * min(1.0, (end - when) / (end - begin)) for begin, end, _, kept in self._pieces if end > when)
 
 
+def idle() -> float:
+    """Return for how many seconds the CPUs that this process may use had nothing to do, on average, since the start.
+
+    The result is always 0 if this is not known, or if a quota limits what this process and its descendants compute.
+    """
+    mine = os.sched_getaffinity(0)
+    if cpus() < len(mine):
+        return 0.0
+    with contextlib.suppress(OSError, IndexError, ValueError):
+        lines = [line.split() for line in read_text("/proc/stat").splitlines() if line.startswith("cpu")]
+        free = [int(fields[4]) + int(fields[5]) for fields in lines if fields[0] in {f"cpu{number}" for number in mine}]
+        return sum(free) / _TICKS / len(mine)
+    return 0.0
+
+
 def cpus() -> float:
     """Return how many CPUs this process and its descendants may use together; less than 1 if the quota is small."""
     given = os.environ.get(_CPUS)

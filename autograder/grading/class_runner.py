@@ -52,7 +52,7 @@ def run_class(
         KitError: the course's executor cannot be used.
         KeyboardInterrupt: the run was interrupted. All runs have been stopped, and finished results are kept.
     """
-    executor = executors.chosen(settings.executor or read_settings(root).executor, settings.at_once)
+    executor = executors.chosen(settings.executor or read_settings(root).executor, settings)
     stores = _Stores(root, lab, settings, tried, canaries)
     results: dict[str, SubmissionResult] = {}
     jobs: dict[str, Job] = {}

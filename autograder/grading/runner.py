@@ -49,6 +49,11 @@ class Settings:
         """How many submissions run at the same time. A run mostly waits for messages, so a core can handle several."""
         return self.jobs or max(1, min(20, round(5 * cpus())))
 
+    @property
+    def further(self) -> int:
+        """How many further submissions may run while the CPUs have too little to do."""
+        return 0 if self.jobs else self.at_once // 2
+
 
 def stored(
     student: str, submission: Submission, lab: Lab, settings: Settings, store: ResultStore

@@ -56,7 +56,7 @@ class Course:
                 for number, result in enumerate(super().run(jobs, started)):
                     yield course.meddle(number, result)
 
-        monkeypatch.setitem(EXECUTORS, "local", lambda _, at_once: Noting(at_once))
+        monkeypatch.setitem(EXECUTORS, "local", lambda _, settings: Noting(settings.at_once))
         self.wrong_answers(WRONG)
 
     @property
@@ -426,7 +426,9 @@ def test_the_known_answers_of_the_labs_get_the_points_that_they_must(name: str) 
     lab = load_lab(ROOT, name)
     canaries = Canaries(lab, known_answers(ROOT, lab), Settings())
     jobs = canaries.among({})
-    results = {result.student: result for result in executors.chosen("local", 2).run(jobs, lambda _: None)}
+    results = {
+        result.student: result for result in executors.chosen("local", Settings(jobs=2)).run(jobs, lambda _: None)
+    }
     assert all(check.points is not None for result in results.values() for check in result.checks)
     for result in results.values():
         canaries.take(result)

@@ -1,20 +1,23 @@
-"""Another executor of jobs is a class, a line that makes it known, and a setting of the course's."""
+"""Executors: how many jobs run at once, and how another executor is made known and chosen."""
 
 from __future__ import annotations
 
+import itertools
 import subprocess
 import sys
+import time
 from collections.abc import Callable, Generator, Sequence
 from pathlib import Path
 
 import pytest
 import toy
 
+from autograder.core.cpu_use import idle
 from autograder.core.errors import KitError
 from autograder.core.results import Isolation, SubmissionResult
-from autograder.course.lab import Lab, load_lab
+from autograder.course.lab import Cell, Lab, load_lab
 from autograder.grading.class_runner import run_class
-from autograder.grading.executors import EXECUTORS, Local
+from autograder.grading.executors import EXECUTORS, Local, local
 from autograder.grading.job import Job
 from autograder.grading.runner import Settings
 
@@ -30,7 +33,7 @@ print(run_in_worker(Job.model_validate_json(sys.stdin.read())).model_dump_json()
 class Elsewhere:
     """Runs each job in another Python, in another folder, which gets nothing but the job."""
 
-    def __init__(self, address: str, at_once: int) -> None:
+    def __init__(self, address: str, settings: Settings) -> None:
         self.folder = address
 
     def run(self, jobs: Sequence[Job], started: Callable[[str], None]) -> Generator[SubmissionResult, None, None]:
@@ -87,3 +90,66 @@ def test_a_job_that_cannot_be_run_costs_no_other_its_result(lab: Lab, tmp_path: 
     results = {result.student: result for result in Local(2).run([good, bad], lambda _: None)}
     assert results["ann"].points == 2.0
     assert all(check.points is None for check in results["bob"].checks)
+
+
+MEETS = """
+import threading, time
+from pathlib import Path
+here, deadline = Path({folder!r}), time.monotonic() + {seconds}
+(here / {me!r}).touch()
+while len(list(here.iterdir())) < 2 and time.monotonic() < deadline:
+    threading.Event().wait(0.02)
+met = len(list(here.iterdir())) > 1
+(here / {me!r}).unlink() if {leaves} else None
+with answers("answers.yaml") as table:
+    table.expect_answer("met", met)
+table.score(2)
+"""
+
+
+def two_jobs(lab: Lab, folder: Path, met: bool, seconds: float, leaves: bool) -> list[Job]:
+    """Return two jobs that get their points if they run at the same time, or if they do not."""
+    folder.mkdir()
+    setup = [cell for cell in lab.cells if cell.points is None]
+    return [
+        Job(
+            student=who, lab=lab.name, digest="", isolation=Isolation.NONE, seed=1,
+            files={"answers.yaml": f"met: {str(met).lower()}\n"},
+            cells=[*setup, Cell(grade_id="check", points=2.0, source=MEETS.format(
+                folder=str(folder), me=who, seconds=seconds, leaves=leaves))],
+        )
+        for who in ("ann", "bob")
+    ]  # fmt: skip
+
+
+def test_a_further_job_runs_while_the_cpus_are_idle(lab: Lab, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(local, "idle", itertools.count(0.0, 1000.0).__next__)  # an idle machine cannot be had here
+    jobs = two_jobs(lab, tmp_path / "here", met=True, seconds=120, leaves=False)
+    assert [result.points for result in Local(1, further=1).run(jobs, lambda _: None)] == [2.0, 2.0]
+
+
+@pytest.mark.parametrize("further", [0, 1])
+def test_no_further_job_runs_while_the_cpus_are_busy(
+    lab: Lab, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, further: int
+) -> None:
+    monkeypatch.setattr(local, "idle", lambda: 0.0)
+    jobs = two_jobs(lab, tmp_path / "here", met=False, seconds=6, leaves=True)
+    assert [result.points for result in Local(1, further).run(jobs, lambda _: None)] == [2.0, 2.0]
+
+
+def test_no_job_begins_after_the_end(lab: Lab, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(local, "idle", lambda: 0.0)
+    first, second = two_jobs(lab, tmp_path / "here", met=False, seconds=0, leaves=True)
+    third = second.model_copy(update={"student": "eve"})
+    begun: list[str] = []
+    ran = Local(1, further=2).run([first, second, third], begun.append)
+    next(ran)
+    known = len(begun)
+    ran.close()
+    assert len(begun) <= known + 1  # one may have begun before the end
+
+
+def test_a_quota_leaves_no_cpu_idle(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert 0.0 <= idle() <= time.clock_gettime(time.CLOCK_BOOTTIME)
+    monkeypatch.setenv("AUTOGRADER_CPUS", "0.5")
+    assert idle() == 0.0

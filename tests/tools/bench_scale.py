@@ -61,8 +61,9 @@ class Run:
     def __str__(self) -> str:
         """A line for people."""
         early, late = early_and_late(self.command)
+        at_once = f"{self.jobs} at once" if self.jobs else "as many at once as the cores carry"
         return (
-            f"{self.kind}: {self.size} submissions, {self.jobs} at once: {60 * self.size / self.seconds:.1f} a minute,"
+            f"{self.kind}: {self.size} submissions, {at_once}: {60 * self.size / self.seconds:.1f} a minute,"
             f" {self.cpu / self.size:.2f} CPU s each; the command has {early:.0f} MiB in the second"
             f" quarter and {late:.0f} in the last, everything at most {self.together:.0f}"
             f" ({self.date}, load {self.load:.0f})"

@@ -10,6 +10,7 @@ from autograder.core.results import SubmissionResult
 from autograder.grading.executors.dask import Dask
 from autograder.grading.executors.local import Local
 from autograder.grading.job import Job
+from autograder.grading.runner import Settings
 
 
 class Executor(Protocol):
@@ -29,15 +30,15 @@ class Executor(Protocol):
         """
 
 
-EXECUTORS: dict[str, Callable[[str, int], Executor]] = {
+EXECUTORS: dict[str, Callable[[str, Settings], Executor]] = {
     "dask": lambda address, _: Dask(address),
-    "local": lambda _, at_once: Local(at_once),
+    "local": lambda _, settings: Local(settings.at_once, settings.further),
 }
 """For each name that may come before `://` in a course's setting `executor`, the function that makes the executor from
-the address after it and the number of jobs that run at the same time."""
+the address after it and the settings of the run."""
 
 
-def chosen(setting: str, at_once: int) -> Executor:
+def chosen(setting: str, settings: Settings) -> Executor:
     """Return the executor that a course's setting names.
 
     Raises:
@@ -49,7 +50,7 @@ def chosen(setting: str, at_once: int) -> Executor:
             f"There is no executor {setting!r}, which course.toml or the command names.",
             f"Executors: {', '.join(EXECUTORS)}.",
         )
-    return EXECUTORS[name](address, at_once)
+    return EXECUTORS[name](address, settings)
 
 
 __all__ = ["EXECUTORS", "Executor", "chosen"]

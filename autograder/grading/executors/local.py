@@ -3,13 +3,21 @@
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, as_completed
 
+from autograder.core.cpu_use import idle
 from autograder.core.errors import KitError
 from autograder.core.results import SubmissionResult
 from autograder.grading.job import Job
 from autograder.grading.supervisor import run_in_worker, unknown
+from autograder.sandbox.grading_sandbox import Stopped
+
+_IDLE, _BUSY = 0.3, 0.15
+"""If more than the first share of all CPU time is unused, one more job may run; below the second share, one fewer."""
+_LOOK = 2.0
+"""Seconds over which this share is measured. The job that started last then uses its part of the CPUs, too."""
 
 
 class Local:
@@ -20,21 +28,25 @@ class Local:
 
     Args:
         at_once: the number of jobs that run at the same time.
+        further: the number of further jobs that may run while the CPUs have too little to do. How many jobs keep them
+            busy depends on the answers, because a run mostly waits, and waits longest for programs that send nothing.
     """
 
-    def __init__(self, at_once: int) -> None:
-        """Store the argument without starting anything."""
-        self._at_once = at_once
+    def __init__(self, at_once: int, further: int = 0) -> None:
+        """Store the arguments without starting anything."""
+        self._at_once, self._further = at_once, further
 
     def run(self, jobs: Sequence[Job], started: Callable[[str], None]) -> Generator[SubmissionResult, None, None]:
         """Run jobs as described in `Executor.run`."""
         stop = threading.Event()
+        room = _Room(self._at_once, stop)
 
         def run(job: Job) -> SubmissionResult:
-            started(job.student)
-            return run_in_worker(job, stop)
+            with room:
+                started(job.student)
+                return run_in_worker(job, stop)
 
-        pool = ThreadPoolExecutor(self._at_once, thread_name_prefix="submission")
+        pool = ThreadPoolExecutor(self._at_once + self._further, thread_name_prefix="submission")
         try:
             futures = {pool.submit(run, job): job for job in jobs}
             for future in as_completed(futures):
@@ -42,6 +54,54 @@ class Local:
         finally:
             stop.set()
             pool.shutdown(cancel_futures=True)
+
+
+class _Room:
+    """Decides how many jobs run at the same time: at least a certain number, and more while the CPUs are idle.
+
+    Args:
+        at_once: this number.
+        stop: an event after which no job may begin.
+    """
+
+    def __init__(self, at_once: int, stop: threading.Event) -> None:
+        """Begin without any job."""
+        self._at_once, self._stop = at_once, stop
+        self._most, self._running = at_once, 0
+        self._ended = threading.Condition()
+        self._looked, self._idle = time.monotonic(), idle()
+
+    def __enter__(self) -> None:
+        """Wait until one more job may run.
+
+        Raises:
+            Stopped: the event was set.
+        """
+        with self._ended:
+            while self._running >= self._most and not self._stop.is_set():
+                self._ended.wait(_LOOK / 2)
+                self._look()
+            if self._stop.is_set():
+                raise Stopped
+            self._running += 1
+
+    def __exit__(self, *_: object) -> None:
+        """Note that a job has ended."""
+        with self._ended:
+            self._running -= 1
+            self._ended.notify()
+
+    def _look(self) -> None:
+        now = time.monotonic()
+        took = now - self._looked
+        if took < _LOOK:
+            return
+        before, self._looked, self._idle = self._idle, now, idle()
+        share = (self._idle - before) / took
+        if share > _IDLE and self._running == self._most:
+            self._most += 1
+        elif share < _BUSY:
+            self._most = max(self._at_once, self._most - 1)
 
 
 def _result_of(future: Future[SubmissionResult], job: Job) -> SubmissionResult:
