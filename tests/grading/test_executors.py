@@ -137,6 +137,16 @@ def test_no_further_job_runs_while_the_cpus_are_busy(
     assert [result.points for result in Local(1, further).run(jobs, lambda _: None)] == [2.0, 2.0]
 
 
+def test_jobs_begin_in_their_order(lab: Lab, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(local, "idle", lambda: 0.0)
+    first, _ = two_jobs(lab, tmp_path / "here", met=False, seconds=0, leaves=True)
+    jobs = [first.model_copy(update={"student": f"s{number}"}) for number in range(6)]
+    begun: list[str] = []
+    assert len(list(Local(1, further=2).run(jobs, begun.append))) == 6
+    assert set(begun[:3]) == {"s0", "s1", "s2"}  # threads that begin at the same moment have no order
+    assert begun[3:] == ["s3", "s4", "s5"]
+
+
 def test_no_job_begins_after_the_end(lab: Lab, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(local, "idle", lambda: 0.0)
     first, second = two_jobs(lab, tmp_path / "here", met=False, seconds=0, leaves=True)

@@ -68,28 +68,33 @@ class _Room:
         """Begin without any job."""
         self._at_once, self._stop = at_once, stop
         self._most, self._running = at_once, 0
-        self._ended = threading.Condition()
+        self._came, self._begun = 0, 0
+        self._changed = threading.Condition()
         self._looked, self._idle = time.monotonic(), idle()
 
     def __enter__(self) -> None:
-        """Wait until one more job may run.
+        """Wait until one more job may run, and no earlier one waits: the neighbours of a canary are known by the order.
 
         Raises:
             Stopped: the event was set.
         """
-        with self._ended:
-            while self._running >= self._most and not self._stop.is_set():
-                self._ended.wait(_LOOK / 2)
+        with self._changed:
+            turn = self._came
+            self._came += 1
+            while (turn != self._begun or self._running >= self._most) and not self._stop.is_set():
+                self._changed.wait(_LOOK / 2)
                 self._look()
             if self._stop.is_set():
                 raise Stopped
+            self._begun += 1
             self._running += 1
+            self._changed.notify_all()
 
     def __exit__(self, *_: object) -> None:
         """Note that a job has ended."""
-        with self._ended:
+        with self._changed:
             self._running -= 1
-            self._ended.notify()
+            self._changed.notify_all()
 
     def _look(self) -> None:
         now = time.monotonic()
