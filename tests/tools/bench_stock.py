@@ -153,9 +153,9 @@ def course(folder: Path, *, plain: bool) -> Path:
 def tame_students(count: int) -> list[str]:
     """So many of the sample class, evenly chosen, and nobody hostile; 0: all of them."""
     tame = [name for name in sample_class.students(LAB) if name.startswith(("solution", "correct", "blank", "e", "m"))]
-    # The cell of the module is the notebook's last, which stock nbgrader runs too late. Nothing outside of the other
-    # two shows that they take the number of threads from the machine; only this kit looks inside.
-    for name in ("correct_own_module", "m11_a_tenth_a_part", "m16_cpu_count"):
+    # The cell of the module is the notebook's last, which stock nbgrader runs too late. Nothing outside of the others
+    # shows that they take the number of threads from the machine; only this kit looks inside.
+    for name in ("correct_own_module", "m07_a_sixth_a_part", "m11_a_tenth_a_part", "m16_cpu_count"):
         tame.remove(name)
     count = min(count or len(tame), len(tame))
     return [tame[index * len(tame) // count] for index in range(count)]
