@@ -8,8 +8,8 @@ reads anything, as if it had been newly started: users, processes, network, IPC,
 Usage: python -m autograder.sandbox.fork_server FD IDLE. FD is one end of a SOCK_SEQPACKET pair. After IDLE seconds
 without a request or a running fork, the server ends. A request is JSON that contains the module and its arguments, and
 is sent with descriptors: a socket, and the standard input, output and error of the fork. That socket is the fork's
-lifeline: when its other end is closed, the fork and everything that it started are ended. On this socket, the server's
-child reports when the fork has begun, and its exit status after everything has ended.
+lifeline: when its other end is closed, the fork and everything that it started are ended. On this socket, the fork
+reports that it has begun, and its parent, which is the server's child, its exit status after everything has ended.
 """
 
 from __future__ import annotations
@@ -159,14 +159,14 @@ def _become_first_process(life_line: socket.socket, streams: list[int], launcher
         os._exit(1)
     if first == 0:
         prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
+        with contextlib.suppress(OSError):
+            life_line.send(BEGUN)  # not by its parent, which may be later than what the module writes
         life_line.close()
         _furnish()
         spare_launcher.ask(launchers)
         _fork_main_process()
         return
     launchers.close()
-    with contextlib.suppress(OSError):
-        life_line.send(BEGUN)
     handle = os.pidfd_open(first)
     for number in range(3):
         os.close(number)
