@@ -252,14 +252,16 @@ class SubmissionResult(_Model):
         """What an instructor should look at, from all checks; each flag is listed once."""
         return list(dict.fromkeys(flag for check in self.checks for flag in check.flags))
 
-    def without_pictures(self) -> SubmissionResult:
-        """Return a copy without pictures, which take most of the memory, for code that holds the results of a class."""
-        checks = [
-            check.model_copy(
-                update={"outcomes": [outcome.model_copy(update={"picture": None}) for outcome in check.outcomes]}
-            )
-            for check in self.checks
-        ]
+    def brief(self) -> SubmissionResult:
+        """Return a copy that says which points were lost and why, for code that holds the results of a whole class.
+
+        It has no passed expectations, pictures and logs, which take most of the memory. The stored result has them.
+        """
+        checks = []
+        for check in self.checks:
+            lost = [outcome for outcome in check.outcomes if outcome.status is not Status.PASSED]
+            outcomes = [outcome.model_copy(update={"picture": None}) for outcome in lost]
+            checks.append(check.model_copy(update={"outcomes": outcomes, "logs": []}))
         return self.model_copy(update={"checks": checks})
 
     def save(self, path: Path) -> None:

@@ -136,7 +136,7 @@ class ClassRun:
     """The results of grading a class."""
 
     results: list[SubmissionResult]
-    """The results without their pictures, which only the stored results contain."""
+    """The results in brief; the stored results are whole."""
     collected: Collected
     """What was taken in, and what was left out."""
     unrecorded: dict[str, str]

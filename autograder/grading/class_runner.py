@@ -31,7 +31,7 @@ def run_class(
     tried: bool = False,
     canaries: Canaries | None = None,
 ) -> dict[str, SubmissionResult]:
-    """Run a class, several submissions at once, and return the results by student, without their pictures.
+    """Run a class, several submissions at once, and return the results by student, in brief.
 
     Each result is stored as soon as it is known, so that an interrupted run loses only the submissions that were
     running. If a run fails or hangs, the others are not affected. At the end, checks whose programs were kept from the
@@ -42,7 +42,7 @@ def run_class(
         root: the course's folder. The results are stored in its `build/results`.
         lab: the lab to which the submissions belong.
         settings: how the submissions are run.
-        on_result: a function that is called in this thread with each result as it arrives.
+        on_result: a function that is called in this thread with each whole result as it arrives.
         on_start: a function that is called in any thread with each student whose submission starts to run.
         tried: whether the results do not count yet. They are then stored separately, and a later run uses them.
         canaries: known answers that run among the class. Until all of them have run, results are stored separately.
@@ -61,7 +61,7 @@ def run_class(
         if isinstance(told, Job):
             jobs[student] = told
             continue
-        results[student] = told.without_pictures()
+        results[student] = told.brief()
         on_result(told)
     mixed = canaries.among(jobs) if canaries is not None and stores.watched(jobs) else list(jobs.values())
     try:
@@ -71,7 +71,7 @@ def run_class(
                     canaries.take(result)
                     continue
                 stores.save(result)
-                results[result.student] = result.without_pictures()
+                results[result.student] = result.brief()
                 on_result(result)
     except BaseException:
         if canaries is not None:

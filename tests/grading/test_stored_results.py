@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 import toy
 
-from autograder.core.results import CheckResult, Picture, Status, SubmissionResult
+from autograder.core.results import CheckResult, NodeLog, Picture, Status, SubmissionResult
 from autograder.course.lab import load_lab
 from autograder.grading import runner, supervisor
 from autograder.grading.class_runner import run_class
@@ -44,23 +44,31 @@ def test_a_result_of_another_seed_is_not_taken(tmp_path: Path) -> None:
     assert graded(None) == second
 
 
-def test_pictures_are_in_the_file_and_not_in_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_pictures_and_what_passed_are_in_the_file_and_not_in_memory(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     root = toy.make_course(tmp_path / "course")
     lab = load_lab(root, toy.LAB)
     notebook = toy.hand_in(tmp_path, "ann", lab.clean_notebook({"talker": "%%node talker\nhello\n"})["cells"])
 
     def drawn(job: Job, *_: object) -> SubmissionResult:
         result = toy.judge(job)
-        result.checks[0].outcomes[0].picture = Picture(svg="<svg/>", alt="what was heard")
+        for check in result.checks:
+            check.outcomes[0].picture = Picture(svg="<svg/>", alt="what was heard")
+            check.logs = [NodeLog(program="talker", text="what was printed")]
         return result
 
     monkeypatch.setattr(local, "run_in_worker", drawn)
     shown: list[SubmissionResult] = []
     for _ in range(2):  # once run, once taken from the file
         held = run_class({"ann": notebook}, root, lab, Settings(seed=1), shown.append)["ann"]
-        assert held.checks[0].outcomes[0].title and "svg" not in held.model_dump_json()
+        passed, failed = held.checks
+        assert (passed.status, passed.outcomes) == (Status.PASSED, [])
+        assert failed.status is Status.FAILED and "something else" in failed.outcomes[0].because
+        assert "svg" not in held.model_dump_json() and "printed" not in held.model_dump_json()
     stored = ResultStore(root).last(toy.LAB, "ann")
-    assert shown == [stored, stored] and stored is not None and "svg" in stored.model_dump_json()
+    assert shown == [stored, stored] and stored is not None
+    assert stored.checks[0].outcomes and stored.checks[0].outcomes[0].picture and stored.checks[0].logs
 
 
 @pytest.mark.parametrize("points", [-1.0, -0.01, 2.01, float("nan"), float("inf")])
