@@ -151,7 +151,7 @@ class OfferedService:
         """When each answered request arrived and was answered, in seconds on the system clock, like message stamps."""
         self._observer = observer
         self._answer = answer
-        self._delay = delay
+        self.delay = delay
         # The service has its own group, so that the observer receives messages and requests while a response waits.
         self._group = ReentrantCallbackGroup()
         self._service = observer.node.create_service(srv_type, name, self._handle, callback_group=self._group)
@@ -160,7 +160,7 @@ class OfferedService:
         arrived = time.time()
         self.requests.append(request)
         self._observer.notify()
-        if self._delay:
+        if self.delay:
             # Awaiting frees the observer's only thread; with a sleep, it would not take messages that arrive meanwhile.
             later: Future = Future(executor=self._observer.node.executor)
 
@@ -168,7 +168,7 @@ class OfferedService:
                 later.set_result(None)
                 self._observer.node.executor.wake()  # a result alone does not wake an executor that waits
 
-            timer = threading.Timer(self._delay, time_is_up)
+            timer = threading.Timer(self.delay, time_is_up)
             timer.daemon = True
             timer.start()
             await later

@@ -158,6 +158,17 @@ class Server(Meanwhile):
         elif name not in running.offered:
             raise Misuse(f'ros.server("{name}"): the check does not offer it; give its type and an answer.')
 
+    def answer_after(self, delay: float) -> None:
+        """Answer the requests that arrive from now on after another delay.
+
+        Args:
+            delay: seconds from the arrival of a request to its answer.
+
+        Example:
+            `ros.server("/gate").answer_after(1.5)`
+        """
+        self._running.offered[self.name].delay = delay
+
     def requests(self) -> list[Any]:
         """Requests that have reached it so far.
 
