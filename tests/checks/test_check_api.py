@@ -28,7 +28,7 @@ OFFERED = {
     "node": "expect expect_log expect_parameter expect_parameter_refused parameters set_parameter",
     "lifecycle": "available_transitions expect_state expect_transitions state transition",
     "service": "call call_many expect kept_waiting",
-    "server": "expect_messages_during requests served",
+    "server": "answer_after expect_messages_during requests served",
     "action": "expect_one_at_a_time send_goal",
     "goal": """
         accepted changes feedback heard result status
