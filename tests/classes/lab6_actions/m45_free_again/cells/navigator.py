@@ -1,7 +1,6 @@
 %%node navigator
 import math
 import threading
-import time
 
 import rclpy
 from rclpy.action import ActionServer, CancelResponse, GoalResponse
@@ -34,6 +33,7 @@ class Navigator(Node):
         self.create_timer(0.1, lambda: self.publisher.publish(Float64(data=self.position)))
         self.lock = threading.Lock()
         self.busy = False
+        self.step_over = threading.Event()  # nothing sets it: a step takes its whole 0.1 s
         self.server = ActionServer(
             self,
             NestedMessage,
@@ -62,7 +62,7 @@ class Navigator(Node):
         target, step = goal.float64_value, 0.1 * goal.float32_value
         way = abs(target - self.position)
         while self.position != target:
-            time.sleep(0.1)
+            self.step_over.wait(0.1)
             if goal_handle.is_cancel_requested:
                 break
             left = target - self.position
