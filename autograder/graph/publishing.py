@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from typing import Any
 
@@ -41,6 +42,9 @@ class Stream:
         self._publisher: Any = None
         self._timer: Any = None
         self._on = False
+        self.last = 0.0
+        """When the last message was sent, in seconds on the system clock, like message stamps. A busy machine sends it
+        long before `stop` is called."""
 
     def start(self) -> None:
         """Start or resume sending. If no subscription matches, this is recorded as a failed outcome."""
@@ -67,6 +71,7 @@ class Stream:
 
     def _send(self) -> None:
         if self._on:
+            self.last = time.time()
             self._publisher.publish(self._message)
 
 
