@@ -34,7 +34,7 @@ class Navigator(Node):
         self.create_timer(0.1, lambda: self.publisher.publish(Float64(data=self.position)))
         self.lock = threading.Lock()
         self.busy = False
-        self.free_at = 0.0  # the brakes need some time
+        self.free_at = 0.0  # near its garage, the car rests after a stop
         self.server = ActionServer(
             self,
             NestedMessage,
@@ -57,7 +57,7 @@ class Navigator(Node):
 
     def execute(self, goal_handle):
         goal = goal_handle.request.nested_field
-        target, step = goal.float64_value, 0.1 * goal.float32_value
+        target, step = goal.float64_value, 0.1 * min(goal.float32_value, 5.0)  # no car is faster here
         way = abs(target - self.position)
         while self.position != target:
             time.sleep(0.1)
@@ -69,7 +69,7 @@ class Navigator(Node):
             goal_handle.publish_feedback(feedback_of(left, 100.0 * (way - left) / way))
         if goal_handle.is_cancel_requested:
             goal_handle.canceled()
-            self.free_at = time.monotonic() + 0.5
+            self.free_at = time.monotonic() + (3.0 if self.position < 2.0 else 0.0)
         else:
             goal_handle.succeed()
         with self.lock:
