@@ -31,7 +31,7 @@ class MutexReentrant(Node):
         self.activity.publish(String(data=f"{name} end"))
 
     def run_alone(self, name, seconds):
-        locked = self.lock.acquire(timeout=self.period)  # never wait for ever
+        locked = self.lock.acquire(timeout=self.period)  # and no longer
         self.run(name, seconds)
         if locked:
             self.lock.release()
