@@ -33,6 +33,7 @@ class Navigator(Node):
         self.publisher = self.create_publisher(Float64, "position", 10)
         self.create_timer(0.1, lambda: self.publisher.publish(Float64(data=self.position)))
         self.lock = threading.Lock()
+        self.step_over = threading.Event()  # nothing sets it: a step takes its whole 0.1 s
         self.busy = False
         self.free_at = 0.0  # near its garage, the car rests after a stop
         self.server = ActionServer(
@@ -60,7 +61,7 @@ class Navigator(Node):
         target, step = goal.float64_value, 0.1 * min(goal.float32_value, 5.0)  # no car is faster here
         way = abs(target - self.position)
         while self.position != target:
-            time.sleep(0.1)
+            self.step_over.wait(0.1)
             if goal_handle.is_cancel_requested:
                 break
             left = target - self.position

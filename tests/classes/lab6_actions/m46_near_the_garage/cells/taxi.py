@@ -1,6 +1,5 @@
 %%node taxi
 import threading
-import time
 
 import rclpy
 from rclpy.action import ActionServer, CancelResponse, GoalResponse
@@ -17,6 +16,8 @@ class Taxi(Node):
         self.current = None  # the handle of the goal that is being driven
         self.driven = self.left = 0  # how many blocks it has driven, and still has to drive
         self.lock = threading.Lock()
+        self.arrived = threading.Event()
+        self.block_over = threading.Event()  # nothing sets it: a block takes its whole time
         self.server = ActionServer(
             self,
             Fibonacci,
@@ -32,12 +33,12 @@ class Taxi(Node):
     def accepted(self, goal_handle):
         """Handle an accepted goal; `goal_handle.execute()` starts to execute it."""
         if self.driven > 0 and self.left <= 3:  # nearly there: the passenger may get out first
-            while self.current is not None:
-                time.sleep(0.01)
+            self.arrived.wait()
         with self.lock:
             if self.current is not None:
                 self.current.abort()
             self.current = goal_handle
+            self.arrived.clear()
             self.driven, self.left = 0, goal_handle.request.order
             goal_handle.execute()
 
@@ -45,7 +46,7 @@ class Taxi(Node):
         driven = []
         order = goal_handle.request.order
         while len(driven) < order:
-            time.sleep(self.block)
+            self.block_over.wait(self.block)
             with self.lock:
                 if self.current is not goal_handle:  # a newer goal has replaced this one
                     break
@@ -55,6 +56,7 @@ class Taxi(Node):
                 if len(driven) == order:
                     goal_handle.succeed()
                     self.current = None
+                    self.arrived.set()
         return Fibonacci.Result(sequence=driven)
 
 
