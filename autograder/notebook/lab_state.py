@@ -15,7 +15,7 @@ from autograder.reasons import Refused
 from autograder.report import words
 from autograder.report.words import Verdict
 from autograder.submission.copies import answers_in, named_file
-from autograder.submission.notebook_file import cells_of, released_files
+from autograder.submission.notebook_file import last_saved
 
 _PART = 2
 """The level of the headings of a lab's parts."""
@@ -135,8 +135,8 @@ def lab_state(notebook: Path, reports: Mapping[str, Report], runs: Mapping[str, 
         UnreadableError: the file is not a notebook.
     """
     state = LabState()
-    cells = cells_of(notebook)
-    texts, state.notes = _texts(cells, released_files(notebook))
+    cells, files_of_answers, _ = last_saved(notebook)
+    texts, state.notes = _texts(cells, files_of_answers)
     title, part, newest = "", "", 0
     seen: set[str] = set()
     for cell in cells:

@@ -10,7 +10,7 @@ from typing import Any
 from autograder.course.cells import blank_mark_of, cell_digest, grade_id_of, nbgrader_of, source_of
 from autograder.notebook.program_folder import Written
 from autograder.submission.copies import DELETE_COPIES, AnswerCells, answers_in, named_file, told_of_given_copies
-from autograder.submission.notebook_file import UnreadableError, cells_of, released_files
+from autograder.submission.notebook_file import UnreadableError, last_saved
 
 
 @dataclass(frozen=True)
@@ -50,11 +50,10 @@ class SavedNotebook:
         self.saved_at = 0.0
         self.readable = False
         try:
-            self.saved_at = path.stat().st_mtime
-            raw = cells_of(path)
-            answers = answers_in(raw, released_files(path))
-        except (OSError, UnreadableError):
+            raw, files, self.saved_at = last_saved(path)
+        except UnreadableError:
             return
+        answers = answers_in(raw, files)
         self.readable = True
         self._ids = {str(cell.get("id", "")) for cell in raw}
         self._answers = {answer.file_name: answer for answer in answers if answer.file_name}

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import json
+from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
-from autograder.core.files import read_plain
+from autograder.core.files import read_plain, signature
 from autograder.core.results import Outcome, Status
 from autograder.course.cells import grade_id_of
 from autograder.reasons import Group, Kind, Reason
@@ -48,18 +49,40 @@ def cells_of(path: Path) -> list[dict[str, Any]]:
     return _cells(_bytes(path))
 
 
-def released_files(path: Path) -> dict[str, str]:
-    """Return the file names of a released notebook's answers by grade_id; empty if the notebook does not list them.
+class LastSaved(NamedTuple):
+    """A notebook as it was last saved."""
+
+    cells: list[dict[str, Any]]
+    released_files: dict[str, str]
+    """The file names of a released notebook's answers by grade_id; empty if the notebook does not list them."""
+    at: float
+    """When it was saved, as seconds since the epoch."""
+
+
+def last_saved(path: Path) -> LastSaved:
+    """Read a notebook as it was last saved, also while JupyterLab is saving it.
+
+    JupyterLab empties the file before it writes the new text. Until the new text is complete, a copy of the old one is
+    beside the file (`atomic_writing` in jupyter_server). If there is no copy, the new text has become complete.
 
     Raises:
         UnreadableError: the file is not a notebook.
     """
+    for file in (path, path.with_name(f".~{path.name}")):
+        with suppress(UnreadableError):
+            return _last_saved(file)
+    return _last_saved(path)
+
+
+def _last_saved(path: Path) -> LastSaved:
+    state = signature(path)
     content = _bytes(path)
-    _cells(content)
+    cells = _cells(content)
     metadata = json.loads(content.decode("utf-8-sig")).get("metadata")
     mark = metadata.get("autograder") if isinstance(metadata, dict) else None
     answers = mark.get("answers") if isinstance(mark, dict) else None
-    return {str(key): str(name) for key, name in answers.items()} if isinstance(answers, dict) else {}
+    files = {str(key): str(name) for key, name in answers.items()} if isinstance(answers, dict) else {}
+    return LastSaved(cells, files, state[3] / 1e9 if state else 0.0)
 
 
 def grade_ids_in(path: Path) -> set[str]:

@@ -17,6 +17,7 @@ from typing import Any
 
 import pytest
 from IPython.core.interactiveshell import InteractiveShell
+from jupyter_server.services.contents.fileio import atomic_writing
 from kernels import SET_UP, START, TALKER, Notebook
 from places import ROOT
 
@@ -545,6 +546,19 @@ def test_a_missing_program_is_said_at_once(notebook: Notebook) -> None:
     unknown = notebook.run(listening.replace("sleeper", "sleper"))
     assert "no cell of the saved notebook begins with `%%node sleper`" in unknown.error
     assert "Traceback" not in unknown.error and not unknown.text
+
+
+def test_a_notebook_is_known_while_jupyterlab_saves_it(notebook: Notebook) -> None:
+    notebook.save(answer(TALKER))
+    with atomic_writing(str(notebook.path)) as file:  # it is empty until the end of this block
+        unknown = notebook.run('with launch("talkr") as ros:\n    print(ros.topic("/chatter", String).listen())').error
+        assert "no cell of the saved notebook begins with `%%node talkr`" in unknown
+        lab = notebook.run("%lab")
+        assert "not valid JSON" not in lab.text and not lab.error
+        assert not notebook.path.read_text()
+        file.write("{")  # a part of the new text
+        file.flush()
+        assert "no cell of the saved notebook" in notebook.run('with launch("talkr") as ros:\n    pass').error
 
 
 def test_a_table_that_was_not_written_is_said_as_well(notebook: Notebook) -> None:
