@@ -20,6 +20,7 @@ from typing import Any
 import nbformat
 import pytest
 import yaml
+from kernels import own_sockets
 from nbclient import NotebookClient
 from places import ROOT
 
@@ -66,7 +67,7 @@ def held(sources: list[str], folder: Path) -> dict[str, bool]:
     path = os.pathsep.join([str(LECTURES / "_lib"), os.environ.get("PYTHONPATH", "")])
     client = NotebookClient(
         notebook, timeout=300, startup_timeout=STARTS_WITHIN, allow_errors=True, kernel_name="python3",
-        resources={"metadata": {"path": str(folder)}},
+        config=own_sockets(), resources={"metadata": {"path": str(folder)}},
     )  # fmt: skip
     client.execute(env={**os.environ, "PYTHONPATH": path, "LECTURES": str(LECTURES)})
     for cell in notebook.cells:

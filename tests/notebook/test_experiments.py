@@ -7,6 +7,7 @@ import shutil
 from pathlib import Path
 
 import nbformat
+from kernels import own_sockets
 from nbclient import NotebookClient
 from places import ROOT
 
@@ -21,7 +22,7 @@ def run(lab: str, folder: Path, cells: tuple[str, ...], repair: tuple[str, str])
     for cell in notebook.cells:
         cell.source = cell.source.replace(*repair)
     NotebookClient(
-        notebook, timeout=600, startup_timeout=300, kernel_name="python3",
+        notebook, timeout=600, startup_timeout=300, kernel_name="python3", config=own_sockets(),
         resources={"metadata": {"path": str(folder / lab)}},
     ).execute()  # fmt: skip
     return [

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import tempfile
 import threading
 import time
 from dataclasses import dataclass, field
@@ -12,9 +13,18 @@ from typing import Any
 
 from jupyter_client.blocking import BlockingKernelClient
 from jupyter_client.manager import KernelManager
+from traitlets.config import Config
 
 START = 180
 """Far beyond what a kernel, or a cell, takes on a busy machine, in seconds."""
+
+
+def own_sockets() -> Config:
+    """The settings of a kernel that uses files and no ports.
+
+    Ports would be chosen before the kernel starts, and another program could take one of them in the meantime.
+    """
+    return Config({"KernelManager": {"transport": "ipc", "ip": f"{tempfile.mkdtemp(prefix='kernel-')}/socket"}})
 
 
 @dataclass
@@ -39,7 +49,7 @@ class Notebook:
     def __init__(self, place: Path, name: str = "lab", **environment: str) -> None:
         self.path = place / f"{name}.ipynb"
         self.save()
-        self._manager = KernelManager(kernel_name="python3")
+        self._manager = KernelManager(kernel_name="python3", config=own_sockets())
         self._manager.start_kernel(
             cwd=str(place), env={**os.environ, "JPY_SESSION_NAME": str(self.path), **environment}
         )

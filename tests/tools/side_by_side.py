@@ -25,6 +25,7 @@ from pathlib import Path
 from typing import Any
 
 HERE = Path(__file__).resolve().parent
+sys.path.append(str(HERE.parent / "support"))
 SOLUTIONS = HERE.parents[1] / "solutions"
 USERS = (12001, 12002, 12003, 12004)
 LOOK = 0.25
@@ -132,6 +133,7 @@ async def run_notebook(path: Path, domains: int, only: str) -> None:
         only: a pattern for the ids of the cells that are run; empty for all.
     """
     import nbformat
+    from kernels import own_sockets
     from nbclient import NotebookClient
 
     notebook = nbformat.read(path, as_version=4)
@@ -141,7 +143,7 @@ async def run_notebook(path: Path, domains: int, only: str) -> None:
     notebook.cells.insert(0, cell(recorder))
     client = NotebookClient(
         notebook, timeout=None, startup_timeout=600, allow_errors=True, kernel_name="python3",
-        resources={"metadata": {"path": path.parent}},
+        config=own_sockets(), resources={"metadata": {"path": path.parent}},
     )  # fmt: skip
     await client.async_execute(env={**os.environ, "JPY_SESSION_NAME": str(path)})
     wrong = []
@@ -157,11 +159,16 @@ async def run_notebook(path: Path, domains: int, only: str) -> None:
 
 async def kill_kernels(folder: Path, over: Callable[[], bool]) -> None:
     """Start kernels with a robot, and kill each in the midst of it."""
-    from jupyter_client.manager import start_new_async_kernel
+    from jupyter_client.manager import AsyncKernelManager
+    from kernels import own_sockets
 
     folder.mkdir()
     while not over():
-        manager, client = await start_new_async_kernel(cwd=str(folder))
+        manager = AsyncKernelManager(kernel_name="python3", config=own_sockets())
+        await manager.start_kernel(cwd=str(folder))
+        client = manager.client()
+        client.start_channels()
+        await client.wait_for_ready(timeout=600)
         for source in ("%load_ext autograder", TALKER, START):
             await client.execute_interactive(source, output_hook=lambda _: None)
         await manager.shutdown_kernel(now=True)
