@@ -18,6 +18,8 @@ _SHORT = 0.1
 _TOLERATED = 0.5
 """The seconds of CPU time that a long wait may lack; a short one may lack a quarter of its length. Some lack is normal
 on every machine."""
+_NORMAL = 0.05
+"""The share of a measurement's time that is withheld on every machine now and then."""
 _SHARE, _SHARE_ALONE = 0.25, 0.5
 """A measurement is trusted if no more than this share of its time was withheld, first on a shared machine and then for
 a check that runs alone. Medians are reliable as long as no more than half of the time was withheld."""
@@ -37,7 +39,7 @@ class Patience:
         self._stretch = math.inf if alone else STRETCH
         self._share = _SHARE_ALONE if alone else _SHARE
         self._lacked = 0.0
-        """The largest number of seconds that a failed wait lacked since the last decision."""
+        """The largest number of seconds that a failed wait or a measurement lacked since the last decision."""
         self._in_vain = 0.0
         """The seconds that the failed waits since the last decision took together."""
         self._since = time.monotonic()
@@ -65,6 +67,22 @@ class Patience:
             if lacked > min(_TOLERATED, within / 4):
                 self._lacked = max(self._lacked, lacked)
             self._in_vain += now - began
+
+    def was_slow(self, since: float, gap: float, allowed: float) -> None:
+        """Record that something took place less often than it should, and what it lacked if it had to wait for a CPU.
+
+        A loop that sleeps makes its gaps longer by all that is withheld from it. It lacks this time if its gaps would
+        have been short enough without it.
+
+        Args:
+            since: when this began, on the monotonic clock.
+            gap: the seconds between two times that it took place.
+            allowed: the longest gap that would do, in seconds.
+        """
+        kept = self.kept(since)
+        share = kept / (time.monotonic() - since)
+        if share > _NORMAL and gap * (1 - share) <= allowed < gap:
+            self._lacked = max(self._lacked, kept)
 
     def kept(self, when: float) -> float:
         """Return for how many seconds a process could not run since a moment on the monotonic clock."""

@@ -322,6 +322,26 @@ def test_a_wait_that_lacks_its_time_is_told_and_one_that_had_it_is_not(monkeypat
     assert patience.decided() == 0.0
 
 
+@pytest.mark.parametrize(
+    ("gap", "kept", "lacks"),
+    [
+        (0.196, 4.8, True),  # a loop with 0.1 s of sleep, at a quarter of a CPU
+        (0.2, 0.1, False),  # a loop with 0.2 s of sleep, on a quiet machine
+        (0.3, 3.0, False),  # a loop with 0.3 s of sleep, on a busy one
+        (0.126, 0.1, False),  # hardly too slow, on a quiet machine
+        (0.1, 4.8, False),  # as it should be
+    ],
+)
+def test_a_pace_lacks_its_time_if_it_would_be_right_without_what_was_withheld(
+    monkeypatch: pytest.MonkeyPatch, gap: float, kept: float, lacks: bool
+) -> None:
+    patience, began = Patience(alone=True), time.monotonic() - 10.0
+    monkeypatch.setattr(patience, "kept", lambda when: kept if when == began else 0.0)
+    patience.was_slow(began, gap, 0.125)
+    assert (patience.decided() > 0) == lacks
+    assert patience.decided() == 0.0
+
+
 @pytest.fixture
 def talking(observer: Observer) -> Iterator[Observer]:
     """An observer in whose domain somebody publishes numbers all the time."""

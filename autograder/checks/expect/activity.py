@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import statistics
+import time
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -347,6 +348,9 @@ class Activity(Meanwhile):
             self._wait_for_runs(names, runs + 1, title, 0.0, hint)  # so many gaps lie between one run more
         told = ", ".join(f"{name} every {statistics.median(gaps):.2f} s" for name, gaps in late.items() if gaps)
         self._sure_if(all(gaps and statistics.median(gaps) < period for gaps in late.values()))
+        for gaps in filter(None, late.values()):
+            since = time.monotonic() - sum(gaps)
+            self._observer.patience.was_slow(since, statistics.median(gaps), (1 + tolerance) * period)
         self._expect_that(
             not late,
             title,

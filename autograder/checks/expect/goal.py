@@ -285,6 +285,9 @@ class SentGoal(Meanwhile):
             self._wait(lambda: right() or over(), WITHIN)
             if right():
                 return
+        if rates.too_slow(goal.heard, rate):
+            gap, allowed = rates.median_gap(goal.heard), (1 + tolerance) / rate
+            self._observer.patience.was_slow(goal.heard[0].received, gap, allowed)
         measured = rates.in_words(goal.heard)
         came = measured if measured == "all at once" else f"at {measured}"
         reason = RATE(f"The feedback messages come {came} instead of {rate:.3g} Hz.")

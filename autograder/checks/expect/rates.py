@@ -31,9 +31,9 @@ def _gaps(received: Sequence[Received], every: bool) -> list[float]:
     return [(b.stamp - a.stamp) / (max(1, b.sequence - a.sequence) if every else 1) for a, b in pairs]
 
 
-def median_gap(received: Sequence[Received]) -> float:
+def median_gap(received: Sequence[Received], every: bool = True) -> float:
     """Seconds between two messages as they were published; 0 if there are fewer than two."""
-    return statistics.median(_gaps(received, every=True) or [0.0])
+    return statistics.median(_gaps(received, every) or [0.0])
 
 
 def at_rate(received: Sequence[Received], rate: float, tolerance: float, every: bool = True) -> bool:

@@ -329,6 +329,9 @@ class Topic(Sources):
                 break  # nobody else slowed it down
         last = wanted.counted()[-need:]
         if not right():
+            if rates.too_slow(last, rate, every):
+                gap, allowed = rates.median_gap(last, every), (1 + tolerance) / rate
+                self._observer.patience.was_slow(last[0].received if last else until - within, gap, allowed)
             self._sure_if(not rates.too_slow(last, rate, every))
             measured = rates.in_words(last, every)
             bursts = " on the average, and several come close together" * rates.together(last, every)
