@@ -28,7 +28,7 @@ class Caller(Node):
     def on_request(self, _):
         """Call the gate, and publish the message of its response on `reply`."""
         now = time.monotonic()
-        bounced = now - self.last_request < 0.25  # the same click twice
+        bounced = now - self.last_request < 0.5  # the same click twice
         self.last_request = now
         if bounced:
             return
