@@ -13,89 +13,73 @@ class CameraDriver(LifecycleNode):
         self.declare_parameter("device", "/dev/zero")
         self.declare_parameter("fps", 10.0)
         self.camera = None
-        self.image_pub = None
-        self.timer = None
-        self.status_pub = self.create_publisher(String, "status", 10)
-        self.status_timer = self.create_timer(0.1, self.on_status_timer)
+        self.image_publisher = None
+        self.frame_timer = None
+        self.status_publisher = self.create_publisher(String, "status", 10)
+        self.status_timer = self.create_timer(0.1, self.publish_status)
 
-    # transitions
+    def publish_status(self):
+        self.status_publisher.publish(String(data="closed" if self.camera is None else "open"))
+
+    def publish_frame(self):
+        self.image_publisher.publish(
+            Image(height=8, width=8, encoding="mono8", step=8, data=self.camera.read())
+        )
 
     def on_configure(self, state):
         camera = CameraHardware(self, self.get_parameter("device").value)
         try:
             camera.open()
         except OSError as error:
-            self.get_logger().warning("cannot open: %s" % error)
+            self.get_logger().warning(f"cannot open the camera: {error}")
             return TransitionCallbackReturn.FAILURE
         self.camera = camera
-        self.image_pub = self.create_lifecycle_publisher(Image, "image", 10)
+        self.image_publisher = self.create_lifecycle_publisher(Image, "image", 10)
         return TransitionCallbackReturn.SUCCESS
 
     def on_activate(self, state):
         try:
             self.camera.read()
         except OSError as error:
-            self.get_logger().error("broken: %s" % error)
+            self.get_logger().error(f"the camera is broken: {error}")
             return TransitionCallbackReturn.ERROR
-        if self.image_pub is None:  # taken away by deactivate
-            self.image_pub = self.create_lifecycle_publisher(Image, "image", 10)
-        self.timer = self.create_timer(1.0 / self.get_parameter("fps").value, self.on_timer)
+        if self.image_publisher is None:
+            self.image_publisher = self.create_lifecycle_publisher(Image, "image", 10)
+        self.frame_timer = self.create_timer(1.0 / self.get_parameter("fps").value, self.publish_frame)
         return super().on_activate(state)
 
     def on_deactivate(self, state):
-        self.stop_timer()
-        result = super().on_deactivate(state)
-        self.remove_publisher()
-        return result
+        self.stop()
+        done = super().on_deactivate(state)
+        self.destroy_lifecycle_publisher(self.image_publisher)
+        self.image_publisher = None
+        return done
 
     def on_cleanup(self, state):
-        self.power_off()
-        self.remove_publisher()
+        self.release()
         return TransitionCallbackReturn.SUCCESS
 
     def on_shutdown(self, state):
-        self.stop_timer()
-        self.power_off()
-        self.remove_publisher()
+        self.release()
         return TransitionCallbackReturn.SUCCESS
 
     def on_error(self, state):
-        self.stop_timer()
-        self.power_off()
-        self.remove_publisher()
+        self.release()
         return TransitionCallbackReturn.SUCCESS
 
-    # helpers
+    def stop(self):
+        if self.frame_timer is not None:
+            self.destroy_timer(self.frame_timer)
+            self.frame_timer = None
 
-    def stop_timer(self):
-        if self.timer is not None:
-            self.destroy_timer(self.timer)
-            self.timer = None
-
-    def power_off(self):
+    def release(self):
+        self.stop()
+        if self.image_publisher is not None:
+            self.destroy_lifecycle_publisher(self.image_publisher)
+            self.image_publisher = None
         if self.camera is not None:
             self.camera.close()
-            self.camera = None
-
-    def remove_publisher(self):
-        if self.image_pub is not None:
-            self.destroy_lifecycle_publisher(self.image_pub)
-            self.image_pub = None
-
-    # callbacks
-
-    def on_timer(self):
-        msg = Image()
-        msg.header.stamp = self.get_clock().now().to_msg()
-        msg.height = 8
-        msg.width = 8
-        msg.encoding = "mono8"
-        msg.step = 8
-        msg.data = self.camera.read()
-        self.image_pub.publish(msg)
-
-    def on_status_timer(self):
-        self.status_pub.publish(String(data="closed" if self.camera is None else "open"))
+            self.camera = None  # off
 
 
 def main():
