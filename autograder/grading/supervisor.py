@@ -12,7 +12,7 @@ from typing import Protocol
 
 from pydantic import ValidationError
 
-from autograder.core.results import CheckResult, Outcome, SubmissionResult
+from autograder.core.results import CheckResult, Isolation, Outcome, SubmissionResult
 from autograder.course.lab import Cell
 from autograder.grading import trusted_result
 from autograder.grading.builds import with_interfaces
@@ -153,6 +153,30 @@ def run_in_workers(job: Job, workers: int, follower: Follower | None = None) -> 
     result = _result(job, checks, began)
     again = trusted_result.open_checks(job, result)
     return result if again is None else _again(again, result, follower)
+
+
+def parts(job: Job) -> list[Job]:
+    """Return jobs that together have the checks of a job, and that may run at the same time (`run_in_workers`).
+
+    Without full isolation, a build is not kept for the next part that needs it, so such a job remains whole.
+    """
+    if job.alone or (job.interfaces and job.isolation is not Isolation.FULL):
+        return [job]
+    return [
+        job.model_copy(update={"cells": [cell for cell in job.cells if cell.points is None or cell in share]})
+        for share in _shares(job)
+    ]
+
+
+def of_parts(job: Job, results: Sequence[SubmissionResult], began: float) -> SubmissionResult:
+    """Return the result of a job from the results of its parts.
+
+    Args:
+        job: the whole job.
+        results: the results of all its parts.
+        began: when the first part began, on the monotonic clock.
+    """
+    return _result(job, [check for result in results for check in result.checks], began)
 
 
 def _shares(job: Job) -> list[list[Cell]]:

@@ -6,12 +6,13 @@ import threading
 import time
 from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, as_completed
+from dataclasses import dataclass, field
 
 from autograder.core.cpu_use import idle
 from autograder.core.errors import KitError
 from autograder.core.results import SubmissionResult
 from autograder.grading.job import Job
-from autograder.grading.supervisor import run_in_worker, unknown
+from autograder.grading.supervisor import of_parts, parts, run_in_worker, unknown
 from autograder.sandbox.grading_sandbox import Stopped
 
 _IDLE, _BUSY = 0.3, 0.15
@@ -26,8 +27,11 @@ class Local:
     Threads are sufficient, because everything that takes time or may fail happens in the sandboxes. Each sandbox is a
     separate process tree that ends with the thread that started it, however this process ends.
 
+    The last jobs are run in parts, because otherwise the CPUs have little to do while the longest of them ends. An
+    earlier job is run as a whole, because a part costs more than a check in the middle of a job.
+
     Args:
-        at_once: the number of jobs that run at the same time.
+        at_once: the number of jobs, or parts of jobs, that run at the same time.
         further: the number of further jobs that may run while the CPUs have too little to do. How many jobs keep them
             busy depends on the answers, because a run mostly waits, and waits longest for programs that send nothing.
     """
@@ -41,19 +45,39 @@ class Local:
         stop = threading.Event()
         room = _Room(self._at_once, stop)
 
-        def run(job: Job) -> SubmissionResult:
+        def run(part: Job, run_of: _JobRun) -> SubmissionResult:
             with room:
-                started(job.student)
-                return run_in_worker(job, stop)
+                if not run_of.began:
+                    run_of.began = time.monotonic()
+                    started(part.student)
+                return run_in_worker(part, stop)
 
         pool = ThreadPoolExecutor(self._at_once + self._further, thread_name_prefix="submission")
         try:
-            futures = {pool.submit(run, job): job for job in jobs}
+            futures: dict[Future[SubmissionResult], tuple[Job, _JobRun]] = {}
+            for number, job in enumerate(jobs):
+                pieces = parts(job) if number >= len(jobs) - self._at_once else [job]
+                run_of = _JobRun(job, len(pieces))
+                futures |= {pool.submit(run, part, run_of): (part, run_of) for part in pieces}
             for future in as_completed(futures):
-                yield _result_of(future, futures.pop(future))  # a future that is kept also keeps its result in memory
+                part, run_of = futures.pop(future)  # a future that is kept also keeps its result in memory
+                run_of.results.append(_result_of(future, part))
+                if len(run_of.results) == run_of.parts:
+                    yield of_parts(run_of.job, run_of.results, run_of.began)
         finally:
             stop.set()
             pool.shutdown(cancel_futures=True)
+
+
+@dataclass
+class _JobRun:
+    """A job of which one or more parts run."""
+
+    job: Job
+    parts: int
+    began: float = 0.0
+    """When the first part began, on the monotonic clock; 0 before that."""
+    results: list[SubmissionResult] = field(default_factory=list)
 
 
 class _Room:
