@@ -160,11 +160,12 @@ def parts(job: Job) -> list[Job]:
 
     Without full isolation, a build is not kept for the next part that needs it, so such a job remains whole.
     """
-    if job.alone or (job.interfaces and job.isolation is not Isolation.FULL):
+    shares = _shares(job)
+    if len(shares) < 2 or job.alone or (job.interfaces and job.isolation is not Isolation.FULL):
         return [job]
     return [
         job.model_copy(update={"cells": [cell for cell in job.cells if cell.points is None or cell in share]})
-        for share in _shares(job)
+        for share in shares
     ]
 
 

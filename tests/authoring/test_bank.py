@@ -131,7 +131,9 @@ class Judge:
                 status=Status.FAILED, title="It speaks", code=self.code, part="it says hello", because="It is silent."
             )
         )
-        told.checks[0] = told.checks[0].model_copy(update={"points": 1.5, "parts": parts, "outcomes": outcomes})
+        for check in told.checks:
+            if check.grade_id == "check_talker":
+                check.points, check.parts, check.outcomes = 1.5, parts, outcomes
         return told
 
 

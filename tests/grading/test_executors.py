@@ -136,6 +136,37 @@ def test_no_further_job_runs_while_the_cpus_are_busy(
     assert [result.points for result in Local(1, further).run(jobs, lambda _: None)] == [2.0, 2.0]
 
 
+def of_one_job(lab: Lab, folder: Path, met: bool, seconds: float, leaves: bool) -> Job:
+    """Return a job with two checks that start programs; each gets its points if both run at once, or if not."""
+    ann, bob = two_jobs(lab, folder, met, seconds, leaves)
+    checks = [
+        Cell(grade_id=one.student, points=2.0, source=f"with launch():\n    pass\n{one.checks[0].source}")
+        for one in (ann, bob)
+    ]
+    return ann.model_copy(update={"cells": [cell for cell in ann.cells if cell.points is None] + checks})
+
+
+def test_the_checks_of_the_last_jobs_run_at_the_same_time(lab: Lab, tmp_path: Path) -> None:
+    begun: list[str] = []
+    (result,) = Local(2).run([of_one_job(lab, tmp_path / "here", met=True, seconds=120, leaves=False)], begun.append)
+    assert [(check.grade_id, check.points) for check in result.checks] == [("ann", 2.0), ("bob", 2.0)]
+    assert begun == ["ann"]
+
+
+def test_the_checks_of_an_earlier_job_run_one_after_the_other(lab: Lab, tmp_path: Path) -> None:
+    early = of_one_job(lab, tmp_path / "here", met=False, seconds=3, leaves=True)
+    late = [early.model_copy(update={"student": f"s{number}", "cells": lab.cells[:1]}) for number in range(2)]
+    results = {result.student: result for result in Local(2).run([early, *late], lambda _: None)}
+    assert results.keys() == {"ann", "s0", "s1"}
+    assert [check.points for check in results["ann"].checks] == [2.0, 2.0]
+
+
+def test_the_checks_of_a_job_that_is_run_again_alone_run_one_after_the_other(lab: Lab, tmp_path: Path) -> None:
+    job = of_one_job(lab, tmp_path / "here", met=False, seconds=3, leaves=True).model_copy(update={"alone": True})
+    (result,) = Local(2).run([job], lambda _: None)
+    assert [check.points for check in result.checks] == [2.0, 2.0]
+
+
 def test_jobs_begin_in_their_order(lab: Lab, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(local, "idle", lambda: 0.0)
     first, _ = two_jobs(lab, tmp_path / "here", met=False, seconds=0, leaves=True)

@@ -107,9 +107,10 @@ def hand_in(folder: Path, student: str, cells: list[dict[str, Any]] | str) -> Pa
 def judge(job: Job) -> SubmissionResult:
     """Stand in for the worker: a check passes if its file holds the solution; `die` in it means no result."""
     checks = []
-    for number, trusted in enumerate(c for c in job.cells if c.points is not None):
-        text = job.files.get("talker.py" if number == 0 else "answers.yaml", "")
-        passed = ("hello" if number == 0 else "42") in text
+    for trusted in job.checks:
+        name, right = ("talker.py", "hello") if trusted.grade_id == "check_talker" else ("answers.yaml", "42")
+        text = job.files.get(name, "")
+        passed = right in text
         status = Status.UNKNOWN if "die" in text else Status.PASSED if passed else Status.FAILED
         outcomes = [
             Outcome(
