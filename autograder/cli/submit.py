@@ -43,11 +43,14 @@ def submit(
     from autograder.course.paths import course_root, trusted_course
     from autograder.notebook.hand_in import look_over
     from autograder.report.terminal import console, plain
-    from autograder.submission.notebook_file import NOTEBOOK_BYTES
+    from autograder.submission.notebook_file import NOTEBOOK_BYTES, UnreadableError, last_saved
     from autograder.submission.reader import lab_of
 
     found = lab_of(notebook, lab, trusted_course(course))
-    content = notebook.read_bytes()
+    try:
+        content = last_saved(notebook).content
+    except UnreadableError:  # the warnings say what is wrong with it
+        content = notebook.read_bytes()
     if len(content) > NOTEBOOK_BYTES:
         size = f"{notebook} is larger than {NOTEBOOK_BYTES // 1024**2} MiB, and would not be accepted."
         raise KitError(

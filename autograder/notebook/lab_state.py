@@ -135,8 +135,9 @@ def lab_state(notebook: Path, reports: Mapping[str, Report], runs: Mapping[str, 
         UnreadableError: the file is not a notebook.
     """
     state = LabState()
-    cells, files_of_answers, _ = last_saved(notebook)
-    texts, state.notes = _texts(cells, files_of_answers)
+    saved = last_saved(notebook)
+    cells = saved.cells
+    texts, state.notes = _texts(cells, saved.released_files)
     title, part, newest = "", "", 0
     seen: set[str] = set()
     for cell in cells:

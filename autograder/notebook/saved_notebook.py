@@ -50,10 +50,11 @@ class SavedNotebook:
         self.saved_at = 0.0
         self.readable = False
         try:
-            raw, files, self.saved_at = last_saved(path)
+            saved = last_saved(path)
         except UnreadableError:
             return
-        answers = answers_in(raw, files)
+        raw, self.saved_at = saved.cells, saved.at
+        answers = answers_in(raw, saved.released_files)
         self.readable = True
         self._ids = {str(cell.get("id", "")) for cell in raw}
         self._answers = {answer.file_name: answer for answer in answers if answer.file_name}

@@ -52,6 +52,8 @@ def cells_of(path: Path) -> list[dict[str, Any]]:
 class LastSaved(NamedTuple):
     """A notebook as it was last saved."""
 
+    content: bytes
+    """The bytes of the file."""
     cells: list[dict[str, Any]]
     released_files: dict[str, str]
     """The file names of a released notebook's answers by grade_id; empty if the notebook does not list them."""
@@ -82,13 +84,13 @@ def _last_saved(path: Path) -> LastSaved:
     mark = metadata.get("autograder") if isinstance(metadata, dict) else None
     answers = mark.get("answers") if isinstance(mark, dict) else None
     files = {str(key): str(name) for key, name in answers.items()} if isinstance(answers, dict) else {}
-    return LastSaved(cells, files, state[3] / 1e9 if state else 0.0)
+    return LastSaved(content, cells, files, state[3] / 1e9 if state else 0.0)
 
 
 def grade_ids_in(path: Path) -> set[str]:
-    """Return the grade_ids in a notebook; empty if the notebook cannot be read."""
+    """Return the grade_ids in a notebook as it was last saved; empty if the notebook cannot be read."""
     try:
-        return {grade_id_of(cell) for cell in _cells(_bytes(path))} - {""}
+        return {grade_id_of(cell) for cell in last_saved(path).cells} - {""}
     except UnreadableError:
         return set()
 

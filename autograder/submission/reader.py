@@ -18,7 +18,7 @@ from autograder.core.files import signature
 from autograder.course.lab import Lab, lab_names, load_lab
 from autograder.reasons import Group, Kind
 from autograder.submission.answers import Submission, take_answers, take_files, take_own_files
-from autograder.submission.notebook_file import UnreadableError, cells_of, grade_ids_in, problem
+from autograder.submission.notebook_file import UnreadableError, grade_ids_in, last_saved, problem
 
 MORE_PROBLEMS = Kind("more-problems", "the notebook has more problems than are listed", Group.NOTEBOOK)
 
@@ -27,7 +27,7 @@ PROBLEMS_KEPT = 100
 
 
 def read_submission(path: Path, lab: Lab) -> Submission:
-    """Read a submitted notebook. Every problem is added to `problems`, and none is raised.
+    """Read a submitted notebook as it was last saved. Every problem is added to `problems`, and none is raised.
 
     If the file has not changed, the same object is returned again, because grading a class needs it several times.
     """
@@ -39,7 +39,7 @@ def _read(path: Path, _signature: object, lab: Lab) -> Submission:
     submission = Submission(sources={answer.grade_id: answer.blank for answer in lab.answers.values()})
     cells: list[dict[str, Any]] = []
     try:
-        cells = cells_of(path)
+        cells = last_saved(path).cells
         take_answers(cells, lab, submission)
     except UnreadableError as error:
         submission.problems.append(error.problem)

@@ -21,6 +21,7 @@ import psutil
 import pytest
 import toy
 from junitparser import JUnitXml
+from jupyter_server.services.contents.fileio import atomic_writing
 from kill_anything import in_shared_memory
 from places import ROOT
 
@@ -418,8 +419,28 @@ def test_check_goes_on_when_the_notebook_is_saved(root: Path, tmp_path: Path) ->
         for _ in range(2):
             while "to be saved" not in (line := process.stderr.readline()):
                 assert line, "it ended"
-            shutil.copy(right, tmp_path / "saved").replace(notebook)  # as Jupyter does: never half a notebook
+            with atomic_writing(str(notebook)) as file:  # as JupyterLab saves it
+                file.write(right.read_text())
     finally:
         process.send_signal(signal.SIGINT)
         out, _ = process.communicate(timeout=600)
     assert out.index("toy: 2 of 5 points") < out.index("toy: 5 of 5 points")
+
+
+def test_a_notebook_is_checked_and_handed_in_while_jupyterlab_saves_it(root: Path, tmp_path: Path) -> None:
+    notebook, packed = tmp_path / "toy.ipynb", tmp_path / "handed in" / "toy.ipynb"
+    notebook.write_text(text := hand_in(root, "ida", "print('hello')").read_text())
+    with atomic_writing(str(notebook)) as file:
+        file.write("{")  # a part of the new text
+        file.flush()
+        status, out, _ = run(root, "check", str(notebook), "--course", ".")
+        assert (status, "toy: 5 of 5 points" in out) == (0, True), out
+        renamed = notebook.rename(tmp_path / "mine.ipynb")
+        notebook.with_name(".~toy.ipynb").rename(tmp_path / ".~mine.ipynb")
+        status, out, _ = run(root, "submit", str(renamed), "--course", ".", "--output", str(packed.parent))
+        assert (status, "5 of 5" in out, "JSON" in out) == (0, True, False), out
+        assert packed.read_text() == text
+        (tmp_path / ".~mine.ipynb").rename(notebook.with_name(".~toy.ipynb"))
+        renamed.rename(notebook)
+        file.write(text[1:])
+    assert notebook.read_text() == text and not notebook.with_name(".~toy.ipynb").exists()
