@@ -128,7 +128,8 @@ def run_in_workers(job: Job, workers: int, follower: Follower | None = None) -> 
 
     This is possible because checks do not depend on each other. A person waits less for a single submission, because a
     check mostly waits for messages. In a class, many submissions run at the same time anyway, so one worker for each is
-    cheaper, except for the last ones (`parts`). Checks that use no package of interfaces do not wait until these are built.
+    cheaper, except for the last ones (`parts`). Checks that use no package of interfaces do not wait until these are
+    built.
 
     Args:
         job: the submission and its checks.
