@@ -31,6 +31,9 @@ DUPLICATE_NODE = Kind("duplicate-node", "several nodes have one name", Group.NAM
 TOPIC_PRESENT = Kind("topic-present", "somebody uses the topic", Group.NAMES)
 NOTHING_STARTED = Kind("nothing-started", "the launch has no program", Group.PROGRAM)
 NO_NODE = Kind("no-node", "programs run, and no node is on the graph", Group.NAMES)
+NOT_ON_GRAPH = Kind(
+    "not-on-graph", "a program has made a node, and the node is not on the graph of its launch", Group.NAMES
+)
 NAMESPACE = Kind("namespace", "a node of this name is there in another namespace", Group.NAMES)
 WRONG_NODE = Kind("wrong-node", "the end is there and belongs to another node", Group.NAMES)
 WRONG_END = Kind("wrong-end", "only the other end is there", Group.NAMES)
@@ -106,9 +109,16 @@ def _given_as_a_parameter(scene: Scene, insides: Sequence[Inside], wanted: str) 
 
 def _nothing_of(silent: Sequence[Inside]) -> Reason:
     """Return why running programs have no node: what is wrong inside, or how far the first of them has got."""
+    if found := reason_inside(silent):
+        return found
     made = [name for name, node in silent[0].nodes.items() if not node.destroyed]
-    saw = f"it has made the node `{made[0]}`, which is not on this graph" if made else "it shows no node"
-    return reason_inside(silent) or NO_NODE(f"`{silent[0].name}` runs, but {saw}.")
+    if made:
+        return NOT_ON_GRAPH(
+            f"`{silent[0].name}` runs, and has made the node `{made[0]}`, which is not on the graph of this launch.",
+            "A program that chooses a ROS domain itself, with `rclpy.init(domain_id=...)` or `ROS_DOMAIN_ID`, is found "
+            "by nobody here.",
+        )
+    return NO_NODE(f"`{silent[0].name}` runs, but it shows no node.")
 
 
 def _ending_in(base: str, names: Sequence[str]) -> list[str]:

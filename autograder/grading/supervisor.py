@@ -17,7 +17,7 @@ from autograder.course.lab import Cell
 from autograder.grading import trusted_result
 from autograder.grading.builds import with_interfaces
 from autograder.grading.job import CELL_SECONDS, STUCK_SECONDS, Job
-from autograder.grading.trusted_result import believed, is_open, undecided, validated, was_killed
+from autograder.grading.trusted_result import believed, is_open, needs_another_try, undecided, validated
 from autograder.graph.patience import ALONE
 from autograder.reasons import KINDS, Group, Kind
 from autograder.sandbox.grading_sandbox import SandboxRun, run_in_sandbox
@@ -56,7 +56,7 @@ class ResultListener:
         self._worker, self._tell = worker, tell
         self._left: list[Cell] = []
         self._line = bytearray()
-        self._killed: set[str] = set()
+        self._tried: set[str] = set()
 
     def begin(self, cells: Sequence[Cell]) -> None:
         """Note that a worker process starts with these checks."""
@@ -85,8 +85,8 @@ class ResultListener:
         cell = next((one for one in self._left if one.grade_id == check.grade_id), None)
         if cell is not None:
             self._left.remove(cell)
-            if was_killed(check) and check.grade_id not in self._killed:
-                self._killed.add(check.grade_id)  # the check is tried again
+            if needs_another_try(check) and check.grade_id not in self._tried:
+                self._tried.add(check.grade_id)
             elif not is_open(check):  # otherwise it is run again, alone, when the others have ended
                 self._tell(believed(cell, check))
             self._now()
@@ -254,13 +254,14 @@ def _run_share(
     """Run some of a job's checks, one after the other.
 
     A check at which the worker gets stuck stays undecided. A check at which the worker dies is tried again, and so is a
-    check that fails because a program was killed. A new worker then continues with the remaining checks.
+    check that fails for something that the system can cause, too (`needs_another_try`). A new worker then continues
+    with the remaining checks.
     """
     decided: list[CheckResult] = []
     left = list(share)
     lost: list[CheckResult] = []
     died_at = ""
-    killed: set[str] = set()
+    tried: set[str] = set()
     while left and len(lost) < LOST:
         cells = [cell for cell in job.cells if cell.points is None or cell in left]
         part = job.model_copy(update={"cells": cells})
@@ -276,8 +277,8 @@ def _run_share(
             listener.hear if listener is not None else None,
         )
         said = _said(run.stdout)
-        once_more = {check.grade_id for check in said if was_killed(check)} - killed
-        killed |= once_more
+        once_more = {check.grade_id for check in said if needs_another_try(check)} - tried
+        tried |= once_more
         known = {check.grade_id for check in decided + said}
         decided += [check for check in said if check.grade_id not in once_more]
         open_at = next((cell for cell in left if cell.grade_id not in known), None)

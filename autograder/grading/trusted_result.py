@@ -92,15 +92,19 @@ def was_too_busy(check: CheckResult) -> bool:
     return check.points is None and any(outcome.code == TOO_BUSY.code for outcome in check.outcomes)
 
 
-def was_killed(check: CheckResult) -> bool:
-    """Return whether a check failed because a program was ended by SIGKILL, which the kit did not send.
+def needs_another_try(check: CheckResult) -> bool:
+    """Return whether a check failed because of something that the system or the middleware can cause, too.
 
-    The system sends this signal to any process when memory runs out. A program that sends it to itself will do so again
-    when the check is tried a second time.
+    This is a program that was ended by SIGKILL, which the kit did not send: the system sends this signal to any process
+    when memory runs out. Or it is a node that a program has made and that is not on the graph: very rarely, Fast DDS
+    does not deliver its name. A program that causes either of the two itself will do so again when the check is tried a
+    second time.
     """
     failure = check.first_failure
     ends = [log.exit_status for log in check.logs if not log.stopped_by]
-    return failure is not None and failure.code == "crashed" and -signal.SIGKILL in ends
+    return failure is not None and (
+        failure.code == "not-on-graph" or (failure.code == "crashed" and -signal.SIGKILL in ends)
+    )
 
 
 def is_open(check: CheckResult) -> bool:

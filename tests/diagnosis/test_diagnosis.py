@@ -26,6 +26,7 @@ ELSEWHERE = {
     "program-missing": "test_checks.py",
     "nothing-started": "test_launch_files.py",
     "no-node": "test_checks.py",
+    "not-on-graph": "test_worker_limits.py",
     "one-name-for-all": "test_classes.py",
     "duplicate-node": "test_classes.py",
 }

@@ -239,3 +239,40 @@ while not os.path.exists("{safe}"): time.sleep(0.01)
         killer.join()
     assert len(killed) == times
     assert [check.points for check in result.checks] == [points]
+
+
+ABROAD = """
+import os
+import rclpy
+from rclpy.node import Node
+
+times = os.path.getsize({counter!r}) if os.path.exists({counter!r}) else 0
+with open({counter!r}, "a") as counter:
+    counter.write("x")
+rclpy.init(domain_id=(int(os.environ["ROS_DOMAIN_ID"]) + 1) % 100 if times < {times} else None)
+rclpy.spin(Node("tourist"))
+"""
+
+
+@pytest.mark.parametrize(("times", "points"), [(1, 1.0), (2, 0.0)])
+def test_a_check_is_tried_once_more_if_a_node_that_was_made_is_not_on_the_graph(
+    tmp_path: Path, times: int, points: float
+) -> None:
+    counter = tmp_path / "starts"
+    result = run_in_worker(
+        job(
+            "from autograder.checks import launch\n"
+            "with launch('tourist', 'guide') as ros:\n"
+            "    ros.node('/guide').expect(within=120)\n"
+            "    ros.wait(lambda: all(inside.nodes for inside in ros._running.scene().insides), 120)\n"
+            "    ros.node('/tourist').expect(within=5)\nros.score(1)",
+            files={
+                "tourist.py": ABROAD.format(counter=str(counter), times=times),
+                "guide.py": "import rclpy\nrclpy.init()\nrclpy.spin(rclpy.create_node('guide'))\n",
+            },
+        )
+    )
+    assert counter.stat().st_size == 2
+    (check,) = result.checks
+    assert check.points == points
+    assert points or (check.first_failure and check.first_failure.code == "not-on-graph")
