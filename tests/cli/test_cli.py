@@ -280,7 +280,7 @@ def test_an_interrupt_keeps_finished_results_and_leaves_nothing_running(root: Pa
 def test_killing_what_grades_costs_one_more_run_and_hangs_nothing(root: Path, tmp_path: Path) -> None:
     course = toy.make_course(tmp_path / "course")
     for number in range(2):
-        hand_in(course, f"student{number}", "print('hello')")
+        hand_in(course, f"student{number}", STUCK)  # a short one could be over before this test looks
     process = start(course, "grade", "toy", "class", start_new_session=True)
     for member in family_with_a_worker(process):
         with contextlib.suppress(psutil.NoSuchProcess):
