@@ -232,6 +232,17 @@ class Withheld:
         """Return the most seconds for which a single process was kept from running; for `when` see `from_all`."""
         return sum(kept * min(1.0, (end - when) / (end - begin)) for begin, end, _, kept in self._pieces if end > when)
 
+    def longest(self) -> float:
+        """Return the most seconds that a single process lost in a row, which means for more than half of some time."""
+        most = 0.0
+        for number, (began, *_) in enumerate(self._pieces):
+            lost = 0.0
+            for _, end, _, kept in self._pieces[number:]:
+                lost += kept
+                if lost > (end - began) / 2:
+                    most = max(most, lost)
+        return most
+
 
 def idle() -> float:
     """Return for how many seconds the CPUs that this process may use had nothing to do, on average, since the start.

@@ -18,6 +18,11 @@ _SHORT = 0.1
 _TOLERATED = 0.5
 """The seconds of CPU time that a long wait may lack; a short one may lack a quarter of its length. Some lack is normal
 on every machine."""
+_HELD_UP = 1.0
+"""The seconds that a process may lose in a row before a check that is not run alone is run again if it fails.
+
+What the process did late may be judged long after that, when other expectations have passed: a goal that was sent too
+late has a wrong stamp ten seconds later."""
 _NORMAL = 0.05
 """The share of a measurement's time that is withheld on every machine now and then."""
 _SHARE, _SHARE_ALONE = 0.25, 0.5
@@ -36,6 +41,7 @@ class Patience:
         """Begin with all of it left."""
         self.left = ALONE if alone else PATIENCE
         self.withheld = Withheld()
+        self._alone = alone
         self._stretch = math.inf if alone else STRETCH
         self._share = _SHARE_ALONE if alone else _SHARE
         self._lacked = 0.0
@@ -102,11 +108,13 @@ class Patience:
 
         Zero means that the programs and the observer had enough time to run. What counts is how much the failed wait
         with the greatest lack was lacking. If failed waits took less than half of the time, what was withheld from the
-        whole time counts, too, if its share is too large.
+        whole time counts, too, if its share is too large. In a check that is not run alone, a process that was held up
+        at any time before counts, too.
         """
         kept, now = self.kept(self._since), time.monotonic()
         took = now - self._since
         measured = kept if kept > self._share * took and self._in_vain < took / 2 else 0.0
-        lacked = 0.0 if self._sure else max(self._lacked, measured)
+        held_up = 0.0 if self._alone else self.withheld.longest()
+        lacked = 0.0 if self._sure else max(self._lacked, measured, held_up if held_up >= _HELD_UP else 0.0)
         self.passed()
         return lacked

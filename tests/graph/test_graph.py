@@ -252,6 +252,47 @@ def test_one_long_wait_counts_once(monkeypatch: pytest.MonkeyPatch) -> None:
     assert withheld.from_one(100.0) == pytest.approx(3.0)
 
 
+def held_up(monkeypatch: pytest.MonkeyPatch, *waited: float) -> Withheld:
+    """Return what is measured if a node has waited for so many seconds by the end of each second."""
+    clock = iter([100.0 + second for second in range(len(waited) + 1)])
+    seen = iter([{NODE: had(9.0, (0.0, 0.0))}, *({NODE: had(10.0, (0.0, seconds))} for seconds in waited)])
+    monkeypatch.setattr(cpu_use.time, "monotonic", lambda: next(clock, 100.0 + len(waited)))
+    monkeypatch.setattr(cpu_use, "cpu_uses", lambda: next(seen))
+    monkeypatch.setattr(cpu_use, "stolen", lambda _: [])
+    withheld = Withheld()
+    for _ in range(len(waited) + 1):
+        withheld.measure()
+    return withheld
+
+
+@pytest.mark.parametrize(
+    ("waited", "longest"),
+    [
+        ((0.1, 0.2, 0.4, 0.5), 0.0),  # now and then
+        ((0.0, 0.8, 0.8), 0.8),
+        ((0.0, 0.4, 1.3, 1.3), 1.3),  # from the middle of a second to the end of the next
+        ((0.9, 0.9, 0.9, 0.9, 1.8), 0.9),  # twice, and not in a row
+    ],
+)
+def test_a_hold_up_is_what_was_lost_in_a_row(
+    waited: tuple[float, ...], longest: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert held_up(monkeypatch, *waited).longest() == pytest.approx(longest)
+
+
+@pytest.mark.parametrize(("alone", "lacked"), [(False, 1.3), (True, 0.0)])
+def test_a_failure_after_a_hold_up_is_looked_at_again_whatever_passed_between(
+    alone: bool, lacked: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    patience = Patience(alone)
+    patience.withheld = held_up(monkeypatch, 0.0, 0.4, 1.3, *[1.3] * 20)
+    monkeypatch.setattr(patience.withheld, "measure", lambda *_: None)
+    patience.passed()
+    assert patience.decided() == pytest.approx(lacked)
+    patience.is_sure()
+    assert patience.decided() == 0.0
+
+
 def by_a_host(stat: Path, monkeypatch: pytest.MonkeyPatch, used: float, taken: tuple[float, float]) -> Withheld:
     """Return what is measured in a second in which a program ran for `used` s and a host took that much of two CPUs."""
     clock, seen = iter([100.0, 101.0]), iter([{NODE: had(10.0, (5.0, 0.0))}, {NODE: had(11.0, (5.0 + used, 0.0))}])
