@@ -17,7 +17,7 @@ from autograder.checks import contradictions, current, outcomes, picture_data
 from autograder.checks.building import why_no_package, why_not_found
 from autograder.checks.command_line import CommandLine
 from autograder.checks.launch_file import LaunchFile
-from autograder.checks.misuse import Misuse, refuse_other_class, refuse_text
+from autograder.checks.misuse import Misuse, refuse_no_rules, refuse_other_class, refuse_text
 from autograder.checks.program import Program, file_of, refuse_to_start, why_missing, words_of
 from autograder.checks.recording import record
 from autograder.checks.robot import Log, Robot, end_robot, log_of, try_out
@@ -63,7 +63,7 @@ class Launch(Ros):
         self._world = World(world) if isinstance(world, str) else world
         self._group: RunningPrograms | None = None
         self._robot: Robot | None = None
-        self._entered = self._over = False
+        self._entered = False
 
     def __enter__(self) -> Launch:
         if current.check.block is not None:
@@ -157,6 +157,7 @@ class Launch(Ros):
                 raise
             print(robot)
         elif self._group is not None:
+            self._running.refuse_if_over()
             self._start(node)
         elif not self._entered:  # else a package was not built, which every expectation tells
             raise Misuse("This launch does not run yet: name all its programs in launch(…), then .start() begins it.")
@@ -188,6 +189,8 @@ class Launch(Ros):
             assume_success=launched.assume_success,
         )  # fmt: skip
         self._running.programs.append((launched, program))
+        if outcomes.in_hidden_lines():
+            self._running.of_hidden_tests.append(program)
 
     def _miss(self, program: str) -> None:
         """No cell has written this program."""
@@ -239,7 +242,7 @@ class Launch(Ros):
             refuse_other_class(f'show: listen, "{topic}"', msg_type, "message")
         if self._world is None:
             raise Misuse('show: this launch has no world; write launch(…, world="room").')
-        if not self._entered or self._over:
+        if not self._entered or self._running.over:
             raise Misuse("show: nothing runs; begin with robot = launch(…).start(), then robot.show().")
         if here is None:
             return
@@ -261,7 +264,7 @@ class Launch(Ros):
     def __repr__(self) -> str:
         if self._robot is not None and current.check.robot is self._robot:
             return str(self._robot)
-        if self._over:
+        if self._running.over:
             return "This launch has ended; .log() says what its programs printed."
         names = ", ".join(f'"{node.program}"' for node in self._running.described) or "…"
         return f"launch({names}): begin a block with it, `with launch({names}) as ros:`"
@@ -305,9 +308,9 @@ class Launch(Ros):
         return score(points)
 
     def _end(self) -> None:
-        if self._over:
+        if self._running.over:
             return
-        self._over = True
+        self._running.over = True
         try:
             # What still runs is ended here: how is no fact about the program.
             ended = {id(program): program.exit_status() for _, program in self._running.programs}
@@ -390,13 +393,14 @@ def launch(
         packages: packages of the student's that the programs import from; each is built first.
         world: the world that the programs drive in, or the name of its room, such as `room`.
     """
-    refuse_text("launch", packages=packages, remappings=remappings)
+    refuse_text("launch", packages=packages)
+    refuse_no_rules("launch", remappings)
     given = dict(parameters or {})
     if use_sim_time:
         given["use_sim_time"] = True
     nodes = []
     for program in programs:
-        node = Program(program) if isinstance(program, str) else program
+        node = program if isinstance(program, Program) else Program(program)
         nodes.append(
             replace(
                 node,

@@ -230,12 +230,18 @@ def _record(outcome: Outcome) -> None:
     else:
         current.check.findings.starved = max(current.check.findings.starved, patience.decided())
     outcome.part = current.check.findings.part
-    frame = _check_frame()
-    # A cell's own helper function records for the line that called it: hidden there is hidden here.
-    while frame is not None and not outcome.hidden:
-        outcome.hidden = frame.f_lineno in hidden_lines(_lines(frame))
-        frame = frame.f_back if frame.f_code.co_name != "<module>" else None
+    outcome.hidden = outcome.hidden or in_hidden_lines()
     current.check.findings.outcomes.append(outcome)
+
+
+def in_hidden_lines() -> bool:
+    """Whether a line of a hidden test runs now. A cell's own helper function runs for the line that called it."""
+    frame = _check_frame()
+    while frame is not None:
+        if frame.f_lineno in hidden_lines(_lines(frame)):
+            return True
+        frame = frame.f_back if frame.f_code.co_name != "<module>" else None
+    return False
 
 
 def _check_frame() -> FrameType | None:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from autograder.checks import current, picture_data
 from autograder.checks.concurrency import Concurrency
+from autograder.checks.misuse import Misuse
 from autograder.checks.program import Program
 from autograder.checks.settling import Settling
 from autograder.core.front_end import View, Watcher
@@ -44,8 +45,12 @@ class RunningLaunch:
         """Begin without programs."""
         self.described: list[Program] = []
         """What the launch was asked to start."""
+        self.over = False
+        """Whether the launch has ended."""
         self.programs: list[tuple[Program, RunningProgram]] = []
         """What has been started."""
+        self.of_hidden_tests: list[RunningProgram] = []
+        """Programs that a line of a hidden test has started."""
         self.missing: list[str] = []
         """Programs that no cell has written."""
         self.trouble: list[Reason] = []
@@ -105,6 +110,7 @@ class RunningLaunch:
                 truncated=program.truncated(),
                 exit_status=ended[id(program)],
                 stopped_by=program.stopped_by(),
+                hidden=program in self.of_hidden_tests,
             )
             for described, program in self.programs
         ]
@@ -140,6 +146,15 @@ class RunningLaunch:
         for _, program in self.programs:
             made[program.running()] |= {event.name for event in read(program.events()) if isinstance(event, NodeSeen)}
         return made[False] - made[True]
+
+    def refuse_if_over(self) -> None:
+        """Look whether something new is asked of programs that have been ended, as by a cell that is run again.
+
+        Raises:
+            Misuse: the launch has ended.
+        """
+        if self.over:
+            raise Misuse("This launch has ended. Begin another one, as with robot = launch(…).start().")
 
     def lifecycle_client(self, node: str) -> LifecycleClient:
         """Who asks this lifecycle node, and has recorded its changes since the first call of this."""

@@ -134,6 +134,8 @@ class NodeLog(_Model):
     """None if the program was still running when the check stopped it; negative if a signal ended it (-SIGNAL)."""
     stopped_by: str = ""
     """The limit that ended the program, such as `memory limit`; empty if no limit did."""
+    hidden: bool = False
+    """Whether a hidden test has started the program. Students do not see its output then: it may print what it got."""
 
 
 class Ranked(_Model):

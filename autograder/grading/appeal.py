@@ -30,12 +30,14 @@ from autograder.submission.reader import read_submission
 ENDING = ".appeal.json"
 _SENTENCE = 1000
 """The number of characters that a student's sentence may have."""
+_NAME = 200
+"""The number of characters that a student's name may have."""
 _MESSAGES, _MESSAGE_BYTES = 500, 1_000_000
 """The number of messages in a file, and of bytes of them all."""
 MOST_BYTES = 2 * NOTEBOOK_BYTES
 """The size of the largest file that is read."""
 
-_Word = Annotated[Text, StringConstraints(max_length=200)]
+_Word = Annotated[Text, StringConstraints(max_length=_NAME)]
 
 
 class Appeal(BaseModel):
@@ -81,6 +83,8 @@ def make_appeal(notebook: Path, student: str, lab: Lab, check: Cell, sentence: s
     """
     if not sentence.strip() or len(sentence) > _SENTENCE:
         raise KitError(f"The sentence has {len(sentence)} characters.", f"Say it in 1 to {_SENTENCE} characters.")
+    if not student or len(student) > _NAME:
+        raise KitError(f"The name has {len(student)} characters.", f"Name yourself in 1 to {_NAME}: --name NAME")
     submission = read_submission(notebook, lab)
     if not submission.readable:
         raise KitError(f"{notebook}: {submission.problems[-1].because}", "Name a notebook of this lab.")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 
 from pydantic import BaseModel, ConfigDict, Field
@@ -23,7 +24,13 @@ STUCK_SECONDS = 30.0
 """Further seconds after which the worker ends because the cell is stuck in a call that no exception can interrupt."""
 
 MOST_PACKAGES = 3
-"""The number of packages of a submission for which the time limit is extended."""
+"""The number of packages of a submission for which the time limit is extended, and that are built before the checks."""
+
+
+def _mentions(cell: Cell, package: str) -> bool:
+    """Whether a trusted cell names a package: as a text, or where it imports from it."""
+    name = re.escape(package)
+    return bool(re.search(rf"""(["']){name}\1|\b(from|import) {name}\b""", cell.source))
 
 
 def _packages_of_interfaces(files: Mapping[str, str]) -> dict[str, dict[str, str]]:
@@ -67,24 +74,30 @@ class Job(BaseModel):
     @property
     def build_seconds(self) -> float:
         """Seconds that building the packages may take in addition to the time for the checks."""
-        packages = {name.split("/")[1] for name in self.files if name.startswith(f"{SOURCES}/")}
+        folders = {name.split("/")[1] for name in self.files if name.startswith(f"{SOURCES}/")}
+        packages = [name for name in folders if any(_mentions(cell, name) for cell in self.cells)]
         return BUILD_SECONDS * min(len(packages), MOST_PACKAGES)
 
     @property
     def interfaces(self) -> list[tuple[str, dict[str, str]]]:
         """The packages of interfaces that a trusted cell mentions: their names, and their files by path in the package.
 
-        They are those of the student and those of the lab's reference.
+        They are those of the lab's reference and those of the student, of whom only the first few count.
         """
-        found = [
-            package for files in (self.files, self.reference) for package in _packages_of_interfaces(files).items()
+        return [
+            package
+            for files in (self.reference, self.files)
+            for package in [
+                (name, found)
+                for name, found in _packages_of_interfaces(files).items()
+                if any(_mentions(cell, name) for cell in self.cells)
+            ][:MOST_PACKAGES]
         ]
-        return [(name, files) for name, files in found if any(name in cell.source for cell in self.cells)]
 
     def uses_interfaces(self, cell: Cell) -> bool:
         """Whether a check, or a cell that runs before all checks, mentions a package of interfaces."""
         seen = [cell, *(one for one in self.cells if one.points is None)]
-        return any(package in one.source for package, _ in self.interfaces for one in seen)
+        return any(_mentions(one, package) for package, _ in self.interfaces for one in seen)
 
     @property
     def checks(self) -> list[Cell]:

@@ -64,7 +64,7 @@ def _times(text: str) -> set[tuple[float, ...]]:
     """Return the times of each record that an answer carries."""
     found = _LINE.search(text)
     try:
-        asked = OwnRun.read(found[1]).asked if found else ()
+        asked = OwnRun.unpacked(found[1]).asked if found else ()
     except ValueError:  # a check has told the student that this is no line of the kit
         return set()
     times = {_of(one.record) for one in asked}

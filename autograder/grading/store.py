@@ -86,7 +86,7 @@ class ResultStore:
         Results that cannot be read and results of students who have left the class are left out.
         """
         results = []
-        for folder in sorted(self._folder.glob(lab or "*")):
+        for folder in [self._folder / lab] if lab else sorted(self._folder.glob("*")):
             left = left_class(self._root, folder.name)
             for path in sorted(folder.glob("*.json")):
                 if path.stem not in left:

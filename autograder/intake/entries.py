@@ -22,6 +22,7 @@ from autograder.core.errors import KitError
 from autograder.core.files import read_plain
 from autograder.intake.members import (
     MOST,
+    Budget,
     Member,
     TooManyError,
     bad_names,
@@ -86,22 +87,29 @@ class Entry:
         """Whether the entry may contain a notebook."""
         return self.kind in (Kind.FOLDER, Kind.ZIP, Kind.NOTEBOOK)
 
-    @cached_property
+    @property
     def files(self) -> list[Member]:
         """The files in a folder or zip; for a file, the file itself.
 
         Raises:
             NotUnderstoodError: the entry cannot be read, or has more files than the work of a student can have.
         """
+        listed = self._listed
+        if isinstance(listed, NotUnderstoodError):
+            raise listed
+        return listed
+
+    @cached_property
+    def _listed(self) -> list[Member] | NotUnderstoodError:
+        """The files, or why there are none, because to find that out may take long."""
         try:
             return self.list_files()
-        except NotUnderstoodError:
-            raise
+        except NotUnderstoodError as error:
+            return error
         except TooManyError as error:
-            raise NotUnderstoodError(f"cannot be the work of one student: {error}") from error
+            return NotUnderstoodError(f"cannot be the work of one student: {error}")
         except Exception as error:  # a damaged zip raises many kinds of errors
-            why = getattr(error, "strerror", None) or error
-            raise NotUnderstoodError(f"cannot be read ({why})") from error
+            return NotUnderstoodError(f"cannot be read ({getattr(error, 'strerror', None) or error})")
 
     @cached_property
     def inside(self) -> list[Entry]:
@@ -199,8 +207,9 @@ def _few(files: Callable[[], Iterator[Member]]) -> list[Member]:
         TooManyError: there are more files than the work of a student can have.
     """
     found: list[Member] = []
+    budget = Budget()
     for file in files():
-        found += looked_into(file)
+        found += looked_into(file, budget)
         if len(found) > MOST:
             raise TooManyError(f"it holds more than {MOST} files")
     return found

@@ -20,6 +20,10 @@ _DEPTH = 32
 """The deepest nesting of folders that is read."""
 _ZIP_BYTES = 64 * 1024 * 1024
 """The size of the largest zip inside another, in bytes. Such a zip is the repository of one student."""
+_BYTES, _ENTRIES = 4 * _ZIP_BYTES, 5 * MOST
+"""The bytes and the entries, folders included, that all zips of one student may have together while they are listed."""
+_ENTRY = b"PK\x01\x02"
+"""How each entry begins in the directory of a zip."""
 _ZIPS = 3
 """The deepest nesting of zips that is read: the zip of a class, that of a student, and one that the student packed."""
 _OF_SYSTEMS = ("__MACOSX", ".git", ".DS_Store")
@@ -28,6 +32,27 @@ _OF_SYSTEMS = ("__MACOSX", ".git", ".DS_Store")
 
 class TooManyError(Exception):
     """A folder or zip has more files than the work of a student can have."""
+
+
+@dataclass
+class Budget:
+    """What the zips of one student may still take. Zips in zips could otherwise take days: each level multiplies."""
+
+    size: int = _BYTES
+    entries: int = _ENTRIES
+
+    def take(self, content: bytes) -> None:
+        """Take what a zip needs, before its directory is read.
+
+        Raises:
+            TooManyError: so much is not left.
+        """
+        self.size -= len(content)
+        self.entries -= content.count(_ENTRY)
+        if self.size < 0 or self.entries < 0:
+            raise TooManyError(
+                f"the zips in it have more than {_BYTES // 1024**2} MiB, or more than {_ENTRIES} files and folders"
+            )
 
 
 @dataclass(frozen=True)
@@ -144,13 +169,17 @@ def is_notebook(name: str) -> bool:
     return name.lower().endswith(".ipynb")
 
 
-def looked_into(file: Member) -> list[Member]:
+def looked_into(file: Member, budget: Budget) -> list[Member]:
     """Return a file, or the files in it if it is a zip that can be read.
+
+    Args:
+        file: of a student.
+        budget: what the zips of this student may take.
 
     Raises:
         TooManyError: the zip has more files than the work of a student can have.
     """
-    return _inner(file, file, _ZIPS)
+    return _inner(file, file, _ZIPS, budget)
 
 
 def unpacked(zipped: Member) -> list[Member]:
@@ -162,7 +191,7 @@ def unpacked(zipped: Member) -> list[Member]:
         OSError, zipfile.BadZipFile: the zip cannot be read. A damaged zip may also raise other errors.
         TooManyError: the zip has more files than the work of a student can have.
     """
-    return _held(zipped, zipped, _ZIPS)
+    return _held(zipped, zipped, _ZIPS, Budget())
 
 
 def bad_names(zipped: Member) -> list[str]:
@@ -179,30 +208,31 @@ def packed_in(zipped: Member) -> list[Member]:
     return [Member(file.path, partial(_read_again, zipped, above, number)) for number, file in files]
 
 
-def _held(zipped: Member, now: Member, depth: int) -> list[Member]:
+def _held(zipped: Member, now: Member, depth: int, budget: Budget) -> list[Member]:
     """Return the files of a zip and of the zips in it.
 
     Args:
         zipped: the zip as it is read later, when the archive around it is closed.
         now: the same zip as it is read now, while the archive around it is open.
         depth: how many levels of zips may be read.
+        budget: what all zips around and in it may take.
     """
     above = (*zipped.path[:-1], zipped.name[: -len(".zip")])
     files: list[Member] = []
-    for number, file in enumerate(in_zip(_opened(now), [], above)):
+    for number, file in enumerate(in_zip(_opened(now, budget), [], above)):
         later = Member(file.path, partial(_read_again, zipped, above, number))
-        files += _inner(later, file, depth - 1)
+        files += _inner(later, file, depth - 1, budget)
         if len(files) > MOST:
             raise TooManyError(f"it holds more than {MOST} files")
     return files
 
 
-def _inner(later: Member, now: Member, depth: int) -> list[Member]:
+def _inner(later: Member, now: Member, depth: int, budget: Budget) -> list[Member]:
     """Return a file, or the files in it if it is a zip that can be read. For the arguments see `_held`."""
     if not is_zip(now.name) or not depth:
         return [later]
     try:
-        return _held(later, now, depth) or [later]
+        return _held(later, now, depth, budget) or [later]
     except TooManyError:
         raise
     except Exception:  # a damaged zip raises many kinds of errors; it then counts as an ordinary file
@@ -217,8 +247,10 @@ def _read_again(zipped: Member, above: tuple[str, ...], number: int, most: int) 
     raise OSError("it is not in the zip any more")
 
 
-def _opened(member: Member) -> zipfile.ZipFile:
+def _opened(member: Member, budget: Budget | None = None) -> zipfile.ZipFile:
     content = member.read(_ZIP_BYTES + 1)
     if len(content) > _ZIP_BYTES:
         raise OSError(f"it is larger than {_ZIP_BYTES // 1024**2} MiB")
+    if budget is not None:
+        budget.take(content)
     return zipfile.ZipFile(io.BytesIO(content))

@@ -132,6 +132,8 @@ def waited_for(record: Record) -> Iterator[Question]:
                 same = [run for run in held if run.group == group and "exclusive" in group]
                 if one.period == 0 or late < max(0.4 * one.period, _LONG) or len(held) != 1 or len(same) != 1:
                     continue
+                if any(held[0].end < run.end <= two.begin and run.group == group for run in runs):
+                    continue  # a short one ran between, so two answers are right
                 yield Question(
                     kind="waited_for",
                     about={"node": node, "callback": name, "time": two.begin},

@@ -33,8 +33,9 @@ def check_for(check: _Result, audience: Audience) -> _Result:
     """Return the part of a check's result that this audience may see."""
     flags = check.flags if audience == "instructor" else []
     varied = check.varied if audience == "instructor" else []  # hidden tests draw some of them
+    logs = [log for log in check.logs if audience == "instructor" or not log.hidden]
     shown = [outcome_for(outcome, audience) for outcome in check.outcomes]
-    return check.model_copy(update={"outcomes": shown, "flags": flags, "varied": varied})
+    return check.model_copy(update={"outcomes": shown, "flags": flags, "varied": varied, "logs": logs})
 
 
 def result_for(result: SubmissionResult, audience: Audience) -> SubmissionResult:

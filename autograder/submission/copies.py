@@ -56,7 +56,8 @@ def pieces_of(marked: Sequence[dict[str, Any]], file_name: str) -> list[dict[str
         file_name: the name of the answer's file; empty if the answer is not a file.
     """
     copies = copies_of(marked, file_name)
-    code = [cell for cell in marked if cell.get("cell_type") == "code" and cell not in copies]
+    among = {id(cell) for cell in copies}  # to compare thousands of cells with each other would take hours
+    code = [cell for cell in marked if cell.get("cell_type") == "code" and id(cell) not in among]
     return [cell for cell in code if copies and not named_file(cell) and _is_written(cell)]
 
 

@@ -9,7 +9,6 @@ from typing import Any, NamedTuple
 
 from autograder.core.files import read_plain, signature
 from autograder.core.results import Outcome, Status
-from autograder.course.cells import grade_id_of
 from autograder.reasons import Group, Kind, Reason
 
 NO_NOTEBOOK = Kind("no-notebook", "there is no file with the lab's name, or it is empty", Group.NOTEBOOK)
@@ -85,14 +84,6 @@ def _last_saved(path: Path) -> LastSaved:
     answers = mark.get("answers") if isinstance(mark, dict) else None
     files = {str(key): str(name) for key, name in answers.items()} if isinstance(answers, dict) else {}
     return LastSaved(content, cells, files, state[3] / 1e9 if state else 0.0)
-
-
-def grade_ids_in(path: Path) -> set[str]:
-    """Return the grade_ids in a notebook as it was last saved; empty if the notebook cannot be read."""
-    try:
-        return {grade_id_of(cell) for cell in last_saved(path).cells} - {""}
-    except UnreadableError:
-        return set()
 
 
 def _way(path: Path) -> tuple[Path, tuple[str, ...]]:

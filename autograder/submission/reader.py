@@ -15,10 +15,11 @@ from typing import Any
 
 from autograder.core.errors import KitError
 from autograder.core.files import signature
+from autograder.course.cells import grade_id_of
 from autograder.course.lab import Lab, lab_names, load_lab
 from autograder.reasons import Group, Kind
 from autograder.submission.answers import Submission, take_answers, take_files, take_own_files
-from autograder.submission.notebook_file import UnreadableError, grade_ids_in, last_saved, problem
+from autograder.submission.notebook_file import UnreadableError, last_saved, problem
 
 MORE_PROBLEMS = Kind("more-problems", "the notebook has more problems than are listed", Group.NOTEBOOK)
 
@@ -65,12 +66,15 @@ def lab_of(notebook: Path, name: str | None, root: Path) -> Lab:
     """Find the lab of a notebook by the given name, the name of the file, or the grade_ids of its answers.
 
     Raises:
-        KitError: the notebook belongs to none of the course's labs.
+        KitError: the notebook belongs to none of the course's labs, or cannot be read.
     """
     names = lab_names(root)
     if name is not None or notebook.stem in names:
         return load_lab(root, name or notebook.stem)
-    ids = grade_ids_in(notebook)
+    try:
+        ids = {grade_id_of(cell) for cell in last_saved(notebook).cells} - {""}
+    except UnreadableError as error:
+        raise KitError(f"{notebook}: {error.problem.because}", error.problem.hint) from None
     labs = [load_lab(root, known) for known in names]
     best = max(labs, key=lambda lab: len(ids & lab.answers.keys()), default=None)
     # At least half of the answers must be there, because two courses may use the same grade_id.

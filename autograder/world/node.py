@@ -24,6 +24,7 @@ import rclpy
 from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
 from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
+from rclpy.clock import Clock, ClockType
 from rclpy.context import Context
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
@@ -44,7 +45,7 @@ _STEPS_A_PICTURE, _STEPS_A_BATTERY = 4, 20
 """The steps between two pictures of the camera (5 Hz), and between two messages of the battery (1 Hz)."""
 _LATE, _LONGEST = 0.1, 1.0
 """A patient world waits when the last command is older than so many of its seconds, for at most so many real ones."""
-_CLOSED = "The check has placed the car; nobody else may."
+_CLOSED = "The check has placed the car; nobody else may place it, or set a parameter of it."
 
 
 class CarNode:
@@ -106,11 +107,11 @@ class CarNode:
         return response
 
     def _place(self, parameters: Sequence[Parameter]) -> SetParametersResult:
+        if self._closed:
+            return SetParametersResult(successful=False, reason=_CLOSED)
         for parameter in parameters:
             if parameter.name == "pose":
                 value = list(parameter.value or ())
-                if self._closed:
-                    return SetParametersResult(successful=False, reason=_CLOSED)
                 if len(value) != 3:
                     return SetParametersResult(successful=False, reason="`pose` has three numbers: x, y, heading")
                 reason = self._world.place(self._name, Pose(*map(float, value)))
@@ -208,7 +209,9 @@ class RunningWorld:
                 self.nodes[name] = CarNode(simulation, name, self._context, closed=closed, arguments=arguments)
                 leaving.callback(self.nodes[name].node.destroy_node)
                 self._executor.add_node(self.nodes[name].node)
-            next(iter(self.nodes.values())).node.create_timer(STEP, self._tick)
+            # Whoever sets `use_sim_time` of a car decides about the clock of its node, and not about that of the world.
+            steady = Clock(clock_type=ClockType.STEADY_TIME)
+            next(iter(self.nodes.values())).node.create_timer(STEP, self._tick, clock=steady)
             self._thread = threading.Thread(target=self._spin, name="world", daemon=True)
             self._thread.start()
             self._leaving = leaving.pop_all()

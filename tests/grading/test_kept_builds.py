@@ -109,3 +109,21 @@ def test_a_run_that_is_recorded_for_questions_is_built_as_at_grading(store: Path
     job = Job(student="ann", lab="lab", digest="0", isolation=Isolation.FULL, seed=1, files=files, cells=cells)
     (check,), _ = run_recorded(job, ["check"])
     assert check.grade_id == "check" and len(list(store.iterdir())) == 1
+
+
+def test_packages_that_no_check_names_are_not_built_and_give_no_time() -> None:
+    """Each of them could take a quarter of an hour, before the first check begins."""
+    names = ["a", "import", *(f"p{number}" for number in range(5))]
+    files = {f"src/{name}/{file}": "" for name in names for file in ("package.xml", "CMakeLists.txt")}
+    cells = [
+        Cell(grade_id="set_up", source="import rclpy  # a comment about 'things' that a student's package may be"),
+        Cell(
+            grade_id="check",
+            points=1,
+            source="with build('p0') as package:\n    pass\nfrom p1.msg import A\n'p2', 'p3'",
+        ),
+    ]
+    job = Job(student="ann", lab="lab", digest="0", isolation=Isolation.NONE, seed=1, files=files, cells=cells)
+    assert [name for name, _ in job.interfaces] == ["p0", "p1", "p2"]
+    assert job.build_seconds == 3 * builds.BUILD_SECONDS
+    assert job.model_copy(update={"cells": cells[:1]}).build_seconds == 0.0

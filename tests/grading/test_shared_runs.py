@@ -38,6 +38,14 @@ def test_the_same_run_is_found_also_if_other_questions_are_asked_about_it() -> N
     assert with_the_same_run({student: [text] for student, text in handed_in.items()}) == [["ann", "bob"]]
 
 
+def test_of_a_run_only_the_times_are_looked_at_and_not_whether_the_kit_would_ask_so() -> None:
+    """To find out what the kit would ask about a run that somebody has made up can take minutes."""
+    one = OwnRun.of([Record(runs=RUNS)], 1).asked[0]
+    odd = one.model_copy(update={"question": one.question.model_copy(update={"about": {"node": "/robot"}})})
+    line = f"run: {OwnRun(asked=(odd,)).line()}\n"
+    assert with_the_same_run({"ann": [line], "bob": [line], "cem": [table(RUNS)]}) == [["ann", "bob", "cem"]]
+
+
 def test_the_class_page_names_those_who_share_a_run(tmp_path: Path) -> None:
     lab = load_lab(sample_class.ROOT, "lab2_executors")
     students = ["solution", "correct_await", "blank"]

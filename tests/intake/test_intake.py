@@ -310,6 +310,32 @@ def test_no_name_in_a_zip_stops_a_class(names: list[str], tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize("zipped", [False, True])
+def test_zips_in_zips_may_only_take_so_much_together(zipped: bool, tmp_path: Path) -> None:
+    """Each level multiplies what the one before holds: to list a few megabytes took days."""
+    folders, several = io.BytesIO(), io.BytesIO()
+    with zipfile.ZipFile(folders, "w") as archive:
+        for number in range(30_000):
+            archive.writestr(zipfile.ZipInfo(f"{number}/"), "")
+    with zipfile.ZipFile(several, "w", zipfile.ZIP_DEFLATED) as archive:
+        for number in range(4):
+            archive.writestr(f"{number}.zip", folders.getvalue())
+        archive.writestr("toy.ipynb", "the work of eve")
+    files = {"ann/toy.ipynb": b"the work of ann", "eve/work.zip": several.getvalue()}
+    source = tmp_path / "class"
+    for name, content in files.items():
+        (source / name).parent.mkdir(parents=True)
+        (source / name).write_bytes(content)
+    if zipped:
+        with zipfile.ZipFile(source.with_suffix(".zip"), "w", zipfile.ZIP_DEFLATED) as archive:
+            for name, content in files.items():
+                archive.writestr(name, content)
+        source = source.with_suffix(".zip")
+    collected = collect(source, toy.LAB, tmp_path / "course", accepted=tuple(Accepted))
+    assert list(collected.notebooks) == ["ann"]
+    assert "the zips in it have more than 256 MiB, or more than 100000 files and folders" in str(collected.refused)
+
+
+@pytest.mark.parametrize("zipped", [False, True])
 def test_when_it_was_handed_in_is_taken_if_it_is_a_time(tmp_path: Path, zipped: bool) -> None:
     course = toy.make_course(tmp_path / "course")
     said = {

@@ -20,7 +20,7 @@ from places import ROOT
 from autograder.course.cells import grade_id_of, parse, source_of
 from autograder.course.lab import Lab, load_lab
 from autograder.submission.answers import OWN_FILES, Submission
-from autograder.submission.copies import told_of_copies
+from autograder.submission.copies import pieces_of, told_of_copies
 from autograder.submission.notebook_file import NOTEBOOK_BYTES
 from autograder.submission.reader import PROBLEMS_KEPT, read_submission
 
@@ -352,3 +352,19 @@ def test_no_notebook_can_stop_the_reader(cells: Any, tmp_path_factory: pytest.Te
     lab = load_lab(toy.make_course(folder / "course"), toy.LAB)
     submission = read(lab, folder, json.dumps({"nbformat": 4, "cells": cells}))
     assert submission.sources.keys() == lab.answers.keys()
+
+
+class OnlyItself(dict[str, Any]):
+    """A cell that must not be compared with others."""
+
+    def __eq__(self, other: object) -> bool:
+        raise AssertionError("two cells were compared")
+
+    __hash__ = None  # type: ignore[assignment]
+
+
+def test_copies_of_a_cell_are_not_compared_with_each_other() -> None:
+    """Of the ninety thousand that a notebook can hold, that would take the better part of an hour."""
+    copies = [OnlyItself(plain_cell(f"%%node talker\n#{number}")) for number in range(3)]
+    piece = OnlyItself(plain_cell("print('split off')"))
+    assert [id(cell) for cell in pieces_of([*copies, piece], "talker.py")] == [id(piece)]

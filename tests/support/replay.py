@@ -109,7 +109,7 @@ def about_messages(record: Record, question: Question) -> str:
         if mine and moment.what == "taken" and counts:
             taken.append(moment.time)
         sent += moment.what == "sent"
-    return str(len(taken))
+    return str(sent if question.kind == "first_taken" else len(taken))
 
 
 def answer(record: Record, question: Question) -> str:
@@ -130,7 +130,8 @@ def answer(record: Record, question: Question) -> str:
         (run,) = [run for run in before[-1].running if run.node == node and run.thread == about["thread"]]
         return run.callback
     if question.kind == "waited_for":
-        ended = [m for m in of_node if m.what == "end" and m.run.end - m.run.begin > 0.02]
+        group = next(m.run.group for m in begins if m.run.callback == callback)
+        ended = [m for m in of_node if m.what == "end" and m.run.group == group and m.run.end - m.run.begin > 0.02]
         return min(ended, key=lambda m: abs(m.time - about["time"])).run.callback
     if question.kind == "began_during":
         return str(len([m for m in begins if m.run.callback == callback and about["begin"] < m.time < about["end"]]))

@@ -53,7 +53,11 @@ def ask(observer: Observer, kind: type, name: str, request: object) -> object:
 
 
 def place(observer: Observer, pose: object) -> tuple[bool, str]:
-    request = SetParameters.Request(parameters=[Parameter("pose", value=pose).to_parameter_msg()])
+    return set_parameter(observer, Parameter("pose", value=pose))
+
+
+def set_parameter(observer: Observer, parameter: Parameter) -> tuple[bool, str]:
+    request = SetParameters.Request(parameters=[parameter.to_parameter_msg()])
     result = ask(observer, SetParameters, "/car/set_parameters", request).results[0]
     return result.successful, result.reason
 
@@ -136,7 +140,11 @@ def test_the_car_is_placed_and_reset_by_services(observer: Observer) -> None:
 def test_in_a_check_nobody_but_the_check_places_the_car(observer: Observer) -> None:
     world = RunningWorld(Simulation(read_room("room")), observer.domain_id, closed=True)
     try:
-        assert place(observer, [5.0, 3.0, 1.0]) == (False, "The check has placed the car; nobody else may.")
+        told = (False, "The check has placed the car; nobody else may place it, or set a parameter of it.")
+        assert place(observer, [5.0, 3.0, 1.0]) == told
+        assert set_parameter(observer, Parameter("use_sim_time", value=True)) == told  # else it could stop the world
+        begun = world.simulation.time
+        assert observer.wait(lambda: world.simulation.time > begun + 0.2, WITHIN)
         assert not ask(observer, Trigger, "/car/reset", Trigger.Request()).success
         assert world.simulation.driven[""].pose == world.simulation.room.starts[0]
     finally:

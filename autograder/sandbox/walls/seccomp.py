@@ -29,6 +29,8 @@ _CALLS = {  # x86-64, the only architecture for which the ROS wheels exist
     "iopl": 172, "ioperm": 173, "personality": 135, "uselib": 134, "lookup_dcookie": 212, "vhangup": 153,
     "fanotify_init": 300, "modify_ldt": 154, "mbind": 237, "set_mempolicy": 238,
     "migrate_pages": 256, "move_pages": 279, "vmsplice": 278, "tee": 276, "open_tree_attr": 467,
+    # They tell which pages of a file of the system are in memory, and change that: notes for the next launch.
+    "preadv2": 327, "fadvise64": 221, "readahead": 187, "mincore": 27,
     # Each rule of Landlock takes memory that no limit counts, and what io_setup takes is shared by the whole machine.
     "landlock_create_ruleset": 444, "landlock_add_rule": 445, "landlock_restrict_self": 446, "io_setup": 206,
 }  # fmt: skip
