@@ -176,7 +176,9 @@ def add(root: Path, lab_name: str) -> Added:
     grades = {grade.student: grade for grade in read_grades(root, lab_name)}
     results = {one.student: one for one in ResultStore(root).all(lab_name) if one.student in grades}
     if not results:
-        raise KitError(f"There are no grades of {lab_name}.", f"Grade a class first: autograder grade {lab_name}")
+        raise KitError(
+            f"There are no grades of {lab_name}.", f"Grade a class first: autograder grade {lab_name} SUBMISSIONS"
+        )
     new = unreadable = 0
     checks = {cell.grade_id for cell in lab.checks}
     for student, result in results.items():

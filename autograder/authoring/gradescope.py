@@ -56,5 +56,19 @@ def write_gradescope(root: Path, lab: str, path: Path) -> Path:
             runs = "/" not in name
             info.external_attr = (stat.S_IFREG | (0o755 if runs else 0o644)) << 16
             archive.writestr(info, data)
+    _refuse_another_zip(path)
     write_beside(path, content.getvalue())
     return path
+
+
+def _refuse_another_zip(path: Path) -> None:
+    """Do not replace a file that is no autograder, such as the submissions that somebody got from Gradescope."""
+    if not path.exists():
+        return
+    try:
+        with zipfile.ZipFile(path) as archive:
+            if "run_autograder" in archive.namelist():
+                return
+    except (OSError, zipfile.BadZipFile):
+        pass
+    raise KitError(f"{path} exists already, and is no autograder for Gradescope.", "Name another file.")

@@ -101,7 +101,7 @@ def read(path: Path) -> Requirements:
             for one in ({"part": "", "student": ""} | each for each in told["requirements"])
         ]
         return Requirements(found, [plain(text) for text in told.get("not_required") or []])
-    except (yaml.YAMLError, TypeError, KeyError, AttributeError) as error:
+    except (yaml.YAMLError, UnicodeDecodeError, TypeError, KeyError, AttributeError) as error:
         raise KitError(f"{path} cannot be read: {error}.", "Each requirement has a `text` and a `check`.") from error
 
 

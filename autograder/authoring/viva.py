@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+import shlex
 from pathlib import Path
 
 from autograder.authoring.mutation.what_if import WhatIf, what_if
@@ -58,7 +59,7 @@ def write_sheet(root: Path, lab: Lab, result: SubmissionResult) -> Path:
     if not asked:
         raise KitError(
             f"{result.student}: no program of {lab.name} ran long enough to ask about it.",
-            f"See what happened: autograder explain {result.student} --lab {lab.name}",
+            f"See what happened: autograder explain {shlex.quote(result.student)} --lab {lab.name}",
         )
     return write_viva_page(paths.viva_page(lab.name, result.student), result, asked)
 

@@ -6,7 +6,7 @@ import inspect
 import linecache
 import re
 import traceback
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 _TIMES = ("within", "for_seconds")
@@ -55,6 +55,25 @@ def refuse_text(of: str, **lists: object) -> None:
     for name, value in lists.items():
         if isinstance(value, str):
             raise Misuse(f"{of}: {name}={value!r} is one text; write a list, [...].")
+
+
+def refuse_no_rules(of: str, remappings: object) -> None:
+    """Look for remap rules that are no pairs of texts.
+
+    Args:
+        of: what is called.
+        remappings: what should be pairs of an old and a new name.
+
+    Raises:
+        Misuse: one of them is none.
+    """
+    refuse_text(of, remappings=remappings)
+    pairs = (
+        list(remappings) if isinstance(remappings, Iterable) and not isinstance(remappings, Mapping) else [remappings]
+    )
+    for pair in pairs:
+        if not (isinstance(pair, tuple | list) and len(pair) == 2 and all(isinstance(name, str) for name in pair)):
+            raise Misuse(f'{of}: remappings={remappings!r} are no remap rules; write pairs, [("OLD", "NEW")].')
 
 
 def refuse_other_class(of: str, given: object, kind: str) -> None:

@@ -11,7 +11,7 @@ from autograder.arguments import params_file, remap_rules
 from autograder.arguments.params_file import PARAMS_FILE
 from autograder.checks import current
 from autograder.checks.command_line import CommandLine
-from autograder.checks.misuse import refuse_text
+from autograder.checks.misuse import Misuse, refuse_no_rules, refuse_text
 from autograder.checks.waiting import NotLaunchedError
 from autograder.diagnosis.programs import PROGRAM_MISSING
 from autograder.packages.workspace import INSTALLED
@@ -47,9 +47,11 @@ class Program:
 
     def __post_init__(self) -> None:
         """Refuse what would become another command line than is meant."""
+        if not isinstance(self.program, str):
+            raise Misuse(f"Program: {self.program!r} is no name of a program; write each name as a text of its own.")
+        refuse_no_rules("Program", self.remappings)
         refuse_text(
             "Program",
-            remappings=self.remappings,
             ros_arguments=self.ros_arguments,
             arguments_of_its_own=self.arguments_of_its_own,
         )

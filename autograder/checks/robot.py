@@ -33,6 +33,9 @@ class Log(str):
 def log_of(programs: Sequence[RunningProgram], name: str) -> Log:
     """Return what the programs of a launch have printed so far, or one of them."""
     chosen = [program for program in programs if name in ("", program.name)]
+    if programs and not chosen:
+        there = ", ".join(dict.fromkeys(program.name for program in programs))
+        raise Misuse(f"log: no program {name!r} was started; there is {there}.")
     many = len(chosen) > 1
     return Log("\n".join(f"--- {p.name}\n{tidy(p.output())}" if many else tidy(p.output()).rstrip() for p in chosen))
 

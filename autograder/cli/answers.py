@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from typing import Annotated
 
 import typer
@@ -50,4 +51,5 @@ def mark(
     print(f"{in_points(points)} for {cell}: {', '.join(before)}. {pages}")
     for student, old in before.items():
         if old is not None and old != points:
-            print(f"{student} had {old:g} before. `autograder explain {student} --lab {lab}` says who gave them.")
+            who = f"`autograder explain {shlex.quote(student)} --lab {lab}` says who gave them."
+            print(f"{student} had {old:g} before. {who}")

@@ -26,5 +26,5 @@ CourseOption = Annotated[
 ]
 """The option of instructors' commands. `check` has its own option, because its default is the kit's own course."""
 ForceOption = Annotated[bool, typer.Option("--force", help="Also run submissions that did not change.")]
-SeedOption = Annotated[int | None, typer.Option(help="Use the same random values as the run with this seed.")]
+SeedOption = Annotated[int | None, typer.Option(min=0, help="Use the same random values as the run with this seed.")]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON, for programs.")]

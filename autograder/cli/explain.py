@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -42,7 +43,7 @@ def explain(
         _in_gradebook(root, result)
         _history(root, result)
         screen.print("To see all evidence and messages of a check, name the check, such as: ", end="")
-        screen.print(f"autograder explain {student} 1 --lab {result.lab}", markup=False)
+        screen.print(f"autograder explain {shlex.quote(student)} 1 --lab {result.lab}", markup=False)
         return
     chosen = named(result.checks, check, result.lab)
     screen.print(evidence_view(chosen, book))
@@ -53,10 +54,13 @@ def explain(
 
 
 def _result(root: Path, student: str, lab: str) -> SubmissionResult:
+    from autograder.course.lab import load_lab
     from autograder.grading.store import ResultStore
 
     found = [result for result in ResultStore(root).all(lab or None) if result.student == student]
     if not found:
+        if lab:
+            load_lab(root, lab)  # refuses a name that is misspelt
         raise KitError(f"There is no result of {student!r}.", "Grade the class first: autograder grade LAB SUBMISSIONS")
     if len(found) > 1:
         raise KitError(f"{student} has results of {len(found)} labs.", f"Name one: --lab {found[-1].lab}")

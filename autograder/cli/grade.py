@@ -109,16 +109,18 @@ def _places(course: Path | None, lab: str, submissions: Path | None) -> tuple[Pa
     Raises:
         KitError: there are no submissions, or the course's folder is inside them.
     """
+    from autograder.course.lab import load_lab
     from autograder.course.paths import course_root
 
     root = course_root(course)
+    load_lab(root, lab)  # refuses a name that is misspelt, before anything is said about submissions
     source = submissions or CoursePaths(root).sample_class(lab)
     if not source.exists():
         raise KitError(
             f"There are no submissions at {source}.",
             "Name a folder or zip."
-            if submissions
-            else f"Build the sample class: python tests/support/sample_class.py {lab}",
+            if submissions or not (root / "tests" / "support" / "sample_class.py").is_file()
+            else f"Name a folder or zip, or build the sample class: make grade LAB={lab}",
         )
     if submissions is None:
         from autograder.authoring.courses import sample_course

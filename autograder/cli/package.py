@@ -26,10 +26,11 @@ def package(
     if notebook is not None and not notebook.is_file():
         raise KitError(f"There is no notebook {notebook}.", "Name an .ipynb file.")
     from autograder.course.lab import load_lab
-    from autograder.course.paths import course_root
+    from autograder.course.paths import course_root, is_students_kit, trusted_course
     from autograder.packages.ament_package import lab_files, packages_in, write_packages
 
-    found = load_lab(course_root(course), lab)
+    # The lab in a student's folder is the student's own notebook.
+    found = load_lab(trusted_course(course) if is_students_kit() else course_root(course), lab)
     files = lab_files(found, notebook)
     written = write_packages(found, files, folder)
     names = [*written, *packages_in(files)]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -54,6 +55,10 @@ def replay(
     answered = grant or refuse
     if grant and refuse:
         raise KitError("An appeal is granted or refused, not both.", "Use --grant or --refuse.")
+    if points is not None and not grant:
+        raise KitError("`--points` says how many points are granted.", "Add --grant, or leave out --points.")
+    if reason.strip() and not (answered or sample):
+        raise KitError("`--reason` belongs to an answer.", "Add --grant or --refuse.")
     if answered and not reason.strip():
         raise KitError("An answer needs a reason, which the student reads.", "Add --reason 'SENTENCE'.")
     who, screen = owner(root, made, lab), console()
@@ -86,7 +91,7 @@ def replay(
 def _how_to_answer(screen: Console, kept: Path, who: str) -> None:
     """Show the command that answers an appeal, if somebody handed in its answers."""
     if who:
-        answer = f"autograder replay {kept} --times 0 --refuse --reason 'SENTENCE'"
+        answer = f"autograder replay {shlex.quote(str(kept))} --times 0 --refuse --reason 'SENTENCE'"
         screen.print(f"\nTo answer it: {answer} (or --grant)", markup=False, soft_wrap=True)
 
 

@@ -35,7 +35,7 @@ def report(course: CourseOption = None) -> None:
     renew_pages(root)
     entries = class_entries(root)
     if not entries:
-        raise KitError("There are no results yet.", "Grade a class first: autograder grade LAB")
+        raise KitError("There are no results yet.", "Grade a class first: autograder grade LAB SUBMISSIONS")
     for lab in sorted({entry.lab for entry in entries}):
         of_lab = [entry for entry in entries if entry.lab == lab]
         students = [entry.student for entry in of_lab]
@@ -61,10 +61,18 @@ def term(course: CourseOption = None) -> None:
     renew_pages(root)
     entries, settings = class_entries(root), read_settings(root)
     if not entries:
-        raise KitError("There are no results yet.", "Grade a class first: autograder grade LAB")
+        raise KitError("There are no results yet.", "Grade a class first: autograder grade LAB SUBMISSIONS")
     page, today = CoursePaths(root).term_page, datetime.date.today()
     appeals, damaged = waiting(root)
     labs, roster = lab_names(root), roster_lines(root)
+    if not {entry.lab for entry in entries} & {*labs}:
+        graded = ", ".join(sorted({entry.lab for entry in entries}))
+        raise KitError(
+            f"None of the labs that were graded is in the course any more: {graded}.",
+            f"Labs in {root}: {', '.join(labs) or 'none'}.",
+        )
+    for name in settings.weights.keys() - {*labs}:
+        print(f"course.toml gives a weight to `{name}`, which is no lab of this course.", file=sys.stderr)
     print(write_term_page(page, settings.title, entries, labs, settings.weights, appeals, today, roster))
     for sentence in damaged:
         print(sentence, file=sys.stderr)
@@ -99,7 +107,7 @@ def export(
     renew_pages(root, lab)
     entries = class_entries(root, lab)
     if not entries:
-        raise KitError("There are no results to export.", "Grade a class first: autograder grade LAB")
+        raise KitError("There are no results to export.", "Grade a class first: autograder grade LAB SUBMISSIONS")
     labs = sorted({entry.lab for entry in entries})
     if len(labs) > 1 and form not in SEVERAL_LABS:
         raise KitError(f"The format `{form}` holds only one lab.", f"Name it: --lab LAB, one of {', '.join(labs)}.")
@@ -167,7 +175,7 @@ def similar(
     given = {name: answer.blank for name, answer in found.answers.items()}
     students = [result.student for result in ResultStore(root).all(lab)]
     if not students:
-        raise KitError("There are no submissions yet.", f"Grade a class first: autograder grade {lab}")
+        raise KitError("There are no submissions yet.", f"Grade a class first: autograder grade {lab} SUBMISSIONS")
     paths = {student: CoursePaths(root).submitted_notebook(student, lab) for student in students}
     sources = {student: read_submission(path, found).sources for student, path in paths.items()}
     pairs = find(sources, given, at_least / 100)[:most]

@@ -18,6 +18,10 @@ _TRIED = "AUTOGRADER_ROS2_TRIED"
 kit's command again, it is not tried a second time."""
 
 
+MAX_DOMAIN = 232
+"""The largest domain: the ports of larger ones do not exist (DDSI-RTPS 2.3, section 9.6.1)."""
+
+
 def real_ros2() -> str | None:
     """Return the `ros2` of an installed ROS on the PATH; None if there is only the kit's own, or a script for it."""
     tried = os.environ.get(_TRIED, "").split(os.pathsep)
@@ -42,6 +46,7 @@ def ros2(words: Sequence[str]) -> int:
         os.execve(installed, [installed, *words], {**os.environ, _TRIED: tried})
     try:
         refuse_foreign_ros(os.environ)
+        _refuse_domain(os.environ.get("ROS_DOMAIN_ID") or "0")
         return _run(words)
     except SetUpError as error:
         print(f"error: {error.what}\n  {error.do}", file=sys.stderr)
@@ -51,6 +56,19 @@ def ros2(words: Sequence[str]) -> int:
         return 0
     except KeyboardInterrupt:
         return int(signal.SIGINT)
+
+
+def _refuse_domain(domain: str) -> None:
+    """Look for a domain that the middleware does not have, because the error that it gives is a traceback.
+
+    Raises:
+        SetUpError: it is no number, or too large.
+    """
+    if not (domain.isdecimal() and int(domain) <= MAX_DOMAIN):
+        raise SetUpError(
+            f"ROS_DOMAIN_ID is {domain!r}.",
+            f"Use a number from 0 to {MAX_DOMAIN}, as in `ROS_DOMAIN_ID=7 ros2 node list`.",
+        )
 
 
 def _join_notebook() -> None:

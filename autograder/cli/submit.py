@@ -58,6 +58,9 @@ def submit(
         )
     folder = output or course_root() / FOLDER
     packed = folder / f"{found.name}.ipynb"
+    receipt = packed.with_suffix(".receipt.txt")
+    if packed.exists() and not receipt.exists() and not packed.samefile(notebook):
+        raise KitError(f"{packed} is another notebook, and no copy that was made to hand in.", "Name another folder.")
     write_beside(packed, content)
     screen = console()
     warnings = look_over(notebook, found, packed).warnings
@@ -71,7 +74,6 @@ def submit(
     ]
     if not without_checks:
         lines.append(f"checks    {_checks(packed, found.name, isolation, course, gap=bool(warnings))}")
-    receipt = packed.with_suffix(".receipt.txt")
     write_beside(receipt, "\n".join(lines) + "\n")
     screen.print("\n" + "\n".join(lines), markup=False, soft_wrap=True)
     screen.print(f"\nHand in {packed.name}, and keep {receipt.name}.", markup=False)

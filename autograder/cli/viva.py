@@ -49,11 +49,16 @@ def viva(
 
 def _results(root: Path, students: list[str], sample: int, lab: str) -> list[SubmissionResult]:
     """Return the results of the chosen students in one lab."""
+    from autograder.course.lab import load_lab
     from autograder.grading.store import ResultStore
 
     if not students and not sample:
         raise KitError("Nobody was named.", "Name students, or let some be chosen: autograder viva --sample 5")
     graded = ResultStore(root).all(lab or None)
+    if not graded:
+        if lab:
+            load_lab(root, lab)  # refuses a name that is misspelt
+        raise KitError("There are no results yet.", "Grade a class first: autograder grade LAB SUBMISSIONS")
     labs = sorted({result.lab for result in graded if not students or result.student in students})
     if len(labs) > 1:
         raise KitError(f"{len(labs)} labs were graded.", f"Name one: --lab {labs[-1]}")

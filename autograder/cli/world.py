@@ -22,9 +22,15 @@ def world(
     ] = None,
 ) -> None:
     """Run a world with a car until Ctrl-C, as a ROS node that others can drive."""
+    from rclpy.exceptions import NameValidationException
+
     from autograder.core.errors import KitError
     from autograder.world import RunningWorld, Simulation, read_room
 
+    given = words or []
+    before = given[: given.index("--ros-args")] if "--ros-args" in given else given
+    if before:
+        raise KitError(f"The world has no option or argument `{before[0]}`.", "See `autograder world --help`.")
     names = [name.strip("/") for name in car or [""]]
     try:
         simulation = Simulation(read_room(room), names, heartbeat=heartbeat, seed=seed)
@@ -33,7 +39,14 @@ def world(
     over = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):  # an exception while the nodes are made would leave some behind
         signal.signal(number, lambda *_: over.set())
-    running = RunningWorld(simulation, arguments=words or ())
+    try:
+        running = RunningWorld(simulation, arguments=given)
+    except (RuntimeError, NameValidationException) as error:  # rclpy's errors are RuntimeErrors
+        reason = " ".join(str(error).split())
+        raise KitError(
+            f"The world does not start: {reason}.",
+            "Look at the names, at the ROS arguments (a remap rule is `-r FROM:=TO`), and at ROS_DOMAIN_ID.",
+        ) from None
     nodes = ", ".join(node.node.get_fully_qualified_name() for node in running.nodes.values())
     typer.echo(f"The world {room} runs with {nodes}. Ctrl-C ends it.")
     over.wait()

@@ -119,8 +119,9 @@ def only_one(path: Path, what: str) -> Iterator[None]:
         OSError: the lock file cannot be written; `filename` is its path.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
-    # O_CLOEXEC: a child process that outlives this one must not keep the lock.
-    with os.fdopen(os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644), "r+") as file:
+    # O_CLOEXEC: a child process that outlives this one must not keep the lock. Two graders whose umask allows it may
+    # both write the file.
+    with os.fdopen(os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666), "r+") as file:
         try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError as error:

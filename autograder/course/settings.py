@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Self
 
-from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, NonNegativeFloat, ValidationError, model_validator
 
 from autograder.core.errors import KitError
 
@@ -32,7 +32,7 @@ class CourseSettings(BaseModel):
     """The executor that runs the jobs of a class, as `NAME` or `NAME://ADDRESS`; see `autograder.grading.executors`."""
     history_for_students: bool = False
     """Whether the feedback page shows the history of the points: when the lab was graded, and what changed and why."""
-    weights: dict[str, float] = {}
+    weights: dict[str, NonNegativeFloat] = {}
     """The weight of each lab in the term's total; a lab that is not listed has the weight 1."""
     lectures: dict[str, str] = {}
     """The page of each lecture in the book, by the name that hints use for the lecture, such as `Week 2`."""

@@ -109,7 +109,9 @@ def decide(
             recorder.record(student)
             told.append(f"The feedback page was renewed: {CoursePaths(root).feedback_page(student, lab.name)}")
         else:
-            told.append(f"The feedback page shows the answer when you grade again: autograder grade {lab.name}")
+            told.append(
+                f"The feedback page shows the answer when you grade again: autograder grade {lab.name} SUBMISSIONS"
+            )
         write_grades(root)
     return told
 

@@ -90,6 +90,7 @@ def _create(root: Path) -> None:
     file.parent.mkdir(parents=True, exist_ok=True)
     beside = file.with_name(f".{file.name}.{os.getpid()}")
     try:
+        beside.touch()  # SQLite itself gives nobody else the right to write, whatever the umask of two graders says
         with Gradebook(f"sqlite:///{beside}", course_id=""):
             pass
         beside.replace(file)

@@ -41,7 +41,9 @@ def written_answers(root: Path, lab: Lab, cell: str) -> list[WrittenAnswer]:
         if submission.readable and of_cell is not None:
             found.append(WrittenAnswer(grade.student, submission.sources[cell], of_cell))
     if not found:
-        raise KitError(f"There are no answers to {cell} yet.", f"Grade a class first: autograder grade {lab.name}")
+        raise KitError(
+            f"There are no answers to {cell} yet.", f"Grade a class first: autograder grade {lab.name} SUBMISSIONS"
+        )
     return found
 
 

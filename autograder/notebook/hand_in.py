@@ -55,8 +55,9 @@ def look_over(notebook: Path, lab: Lab, packed: Path) -> HandIn:
     cells = {grade_id_of(cell): cell for cell in saved}
     for answer in lab.answers.values():
         marked = [cell for cell in saved if grade_id_of(cell) == answer.grade_id]
-        if marked:
-            cells[answer.grade_id] = copies_of(marked, answer.file.file_name if answer.file else "")[-1]
+        # A cell that has become Markdown is no copy; that the answer is missing is among the problems.
+        if copies := copies_of(marked, answer.file.file_name if answer.file else ""):
+            cells[answer.grade_id] = copies[-1]
             source = submission.sources[answer.grade_id]
             _look_at_answer(answer, cells[answer.grade_id], source, runs, saved_at, found, untouched, unrun)
     if untouched:

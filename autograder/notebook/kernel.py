@@ -20,7 +20,7 @@ from autograder.core import interrupts
 from autograder.core.results import CellResult, Status
 from autograder.course.cells import cell_digest
 from autograder.notebook.lab_state import Report
-from autograder.notebook.program_folder import ProgramFolder, Written, notebook_of, shown
+from autograder.notebook.program_folder import RENAMED, ProgramFolder, Written, notebook_of, shown
 
 if TYPE_CHECKING:
     from autograder.checks.running_launch import RunningLaunch
@@ -243,8 +243,8 @@ class Kernel:
         used = self.used(file_names)
         if saved is not None and not saved.path.is_file():
             return [
-                f"{shown(saved.path)} no longer exists, so the kit cannot tell whether this is what would be graded. If"
-                " you renamed the notebook, shut down its kernel and open it again."
+                f"{shown(saved.path)} no longer exists, so the kit cannot tell whether this is what would be graded."
+                f" {RENAMED}"
             ]
         told = [remark for written in used if saved and (remark := saved.remark(written))]
         for written in used:

@@ -14,6 +14,7 @@ from IPython.core.magic import no_var_expand
 
 from autograder.graph.names import nearest
 from autograder.notebook.lab_state import LabState, lab_state
+from autograder.notebook.program_folder import RENAMED
 from autograder.submission.notebook_file import UnreadableError
 
 if TYPE_CHECKING:
@@ -124,13 +125,14 @@ def lab_magic(kernel: Kernel) -> Any:
     def lab(line: str) -> None:
         notebook = kernel.folder.notebook
         if notebook is None:
-            print("This front end does not say which notebook this is. Run in a terminal: autograder check NOTEBOOK")
+            print(f"The kit does not know this notebook. {RENAMED} Or run in a terminal: autograder check NOTEBOOK")
             return
         numbers = {name: written.number for name, written in kernel.folder.written.items()}
         try:
             state = lab_state(notebook, kernel.reports, numbers, kernel.folder.path)
         except UnreadableError as error:
-            print(error.problem.because)
+            renamed = "" if notebook.is_file() else f" {RENAMED}"
+            print(f"{error.problem.because}{renamed}")
             return
         remarks = kernel.remarks(set(kernel.folder.written))
         # A note about copies of cells is left out if a remark begins with the same text.

@@ -182,6 +182,10 @@ def shown(path: Path) -> str:
     return str(path)
 
 
+RENAMED = "If you renamed the notebook, shut down its kernel and open it again."
+"""What to do if a notebook is no longer where it was when its kernel started."""
+
+
 def notebook_of(variables: dict[str, Any], environment: dict[str, str]) -> Path | None:
     """Return the notebook of a kernel, if the front end (VS Code or a Jupyter server) names it; otherwise None."""
     for told in (variables.get("__vsc_ipynb_file__"), environment.get("JPY_SESSION_NAME")):

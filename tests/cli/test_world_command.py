@@ -41,10 +41,13 @@ def test_two_cars_are_on_the_graph_with_their_remapped_names_until_ctrl_c() -> N
         observer.close()
 
 
-def test_a_room_that_is_not_there_and_too_many_cars_are_told() -> None:
+def test_what_keeps_a_world_from_starting_is_told() -> None:
     for words, told in (
         (["garage"], "error: There is no room `garage`."),
         (["room", "--car", "a", "--car", "b"], "2 cars are to be driven, and the map has 1."),
+        (["room", "--heartbeet"], "error: The world has no option or argument `--heartbeet`."),
+        (["room", "--car", "my car"], "error: The world does not start: "),
+        (["room", "--ros-args", "-r", "cmd_vel=drive"], "a remap rule is `-r FROM:=TO`"),
     ):
         _, err = (refused := start(*words)).communicate(timeout=WITHIN)
-        assert told in err and refused.returncode == 2
+        assert told in err and refused.returncode == 2 and "Traceback" not in err and "defect" not in err, err

@@ -505,8 +505,10 @@ def test_of_a_renamed_notebook_nothing_is_said_that_nobody_can_know(notebook: No
     write(notebook)
     notebook.path.rename(notebook.path.with_name("renamed.ipynb"))
     shown = notebook.run(CHECK).text
+    lab = notebook.run("%lab").text
     notebook.path.with_name("renamed.ipynb").rename(notebook.path)
     assert "lab.ipynb no longer exists" in shown and "not saved" not in shown
+    assert "If you renamed the notebook, shut down its kernel and open it again." in " ".join(lab.split())
 
 
 def test_a_cell_of_the_labs_own_that_was_changed_is_named(notebook: Notebook) -> None:
@@ -628,6 +630,10 @@ def test_what_cannot_be_started_or_drawn_is_a_sentence_and_what_runs_goes_on(not
     notebook.run(f'robot = launch("talker").start()\nrobot.wait(lambda: {up}, within=150)')
     for typo, sentence in (
         ('launch("taker").start()', "There is no `taker`"),
+        ('robot.log("taker")', "no program 'taker' was started; there is talker."),
+        ('launch(["talker"]).start()', "is no name of a program; write each name as a text of its own."),
+        ('launch("talker", remappings={"chatter": "news"}).start()', 'write pairs, [("OLD", "NEW")].'),
+        ('launch("talker", remappings=("chatter", "news")).start()', 'write pairs, [("OLD", "NEW")].'),
         ("robot.draw.qos()", 'qos: it is about one topic, such as ros.draw.qos("/chatter"). Topics here: "/chatter".'),
         ("robot.draw.arrivals()", 'Topics here: "/chatter".'),
         ('robot.draw.lifecycle("/talker")', "`/talker` is no lifecycle node"),
@@ -636,6 +642,9 @@ def test_what_cannot_be_started_or_drawn_is_a_sentence_and_what_runs_goes_on(not
         assert sentence in shown.error and "autograder/checks" not in shown.error
         assert "running: talker (nodes so far: /talker)" in notebook.run("print(robot)").text
     notebook.run("robot.stop()")
+    for late in ('robot.start("talker")', 'robot.publisher("/late", String)', 'robot.lifecycle("/talker")'):
+        shown = notebook.run(late)
+        assert "This launch has ended. Begin another one" in shown.error and "autograder/checks" not in shown.error
 
 
 def test_no_traceback_of_a_node_shows_the_kit_and_input_is_explained(notebook: Notebook) -> None:

@@ -363,8 +363,14 @@ def _is_call(node: ast.AST, method: str) -> bool:
 def course_findings(root: Path) -> list[Finding]:
     """Return the mistakes in the course's settings: labs and codes of reasons that are listed but do not exist."""
     names = lab_names(root)
-    missing = [name for name in read_settings(root).labs if name not in names]
+    settings = read_settings(root)
+    missing = [name for name in settings.labs if name not in names]
     found = [Finding("", f"{SETTINGS_FILE} lists the lab `{name}`, which does not exist.") for name in missing]
+    found += [
+        Finding("", f"{SETTINGS_FILE} gives a weight to the lab `{name}`, which does not exist.")
+        for name in settings.weights
+        if name not in names
+    ]
     explained = read_book(root).sections
     if explained:
         checks = "".join(cell.source for name in names for cell in load_lab(root, name).cells)

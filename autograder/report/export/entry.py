@@ -68,7 +68,9 @@ def scores(entries: Sequence[Entry], left_out: list[str]) -> list[tuple[Entry, s
     found = []
     for entry in entries:
         if entry.grade is None:
-            left_out.append(f"{entry.student} is not in the gradebook: run autograder grade {entry.lab} again.")
+            left_out.append(
+                f"{entry.student} is not in the gradebook: run autograder grade {entry.lab} SUBMISSIONS again."
+            )
         elif entry.stale:
             left_out.append(told_stale(entry))
         elif entry.grade.score is None:
@@ -85,7 +87,7 @@ def told_stale(entry: Entry) -> str:
     """Say that a student is not exported because the result, the grade and the page do not belong together."""
     return (
         f"{entry.student}: the result, the grade and the feedback page do not belong together, because something"
-        f" changed after {entry.lab} was graded: run autograder grade {entry.lab} again."
+        f" changed after {entry.lab} was graded: run autograder grade {entry.lab} SUBMISSIONS again."
     )
 
 
@@ -137,7 +139,9 @@ def feedback_zip(entries: Sequence[Entry], platform: str, place: Callable[[Entry
             elif entry.stale:
                 left_out.append(told_stale(entry))
             elif entry.feedback is None:
-                left_out.append(f"{entry.student} has no feedback page: run autograder grade {entry.lab} again.")
+                left_out.append(
+                    f"{entry.student} has no feedback page: run autograder grade {entry.lab} SUBMISSIONS again."
+                )
             else:
                 info = zipfile.ZipInfo(name, _ALWAYS)
                 info.compress_type = zipfile.ZIP_DEFLATED
