@@ -48,7 +48,7 @@ def _viva(root: Path, *words: str) -> subprocess.CompletedProcess[str]:
     command = "import sys; sys.argv[0] = 'autograder'; from autograder.cli import main; main()"
     return subprocess.run(
         [sys.executable, "-c", command, "viva", *words],
-        cwd=root, env=os.environ | {"PYTHONPATH": str(sample_class.ROOT)}, capture_output=True, text=True, timeout=300,
+        cwd=root, env=os.environ | {"PYTHONPATH": str(sample_class.ROOT)}, capture_output=True, text=True, timeout=3600,
     )  # fmt: skip
 
 

@@ -139,7 +139,8 @@ def test_a_car_that_only_turns_has_turned() -> None:
 
 
 def test_a_program_that_sends_no_command_reads_why() -> None:
-    check = 'with launch("p", world="street") as ros:\n    ros.car().expect_driven(1.0, within=1)\nros.score(1)'
+    check = 'with launch("p", world="street") as ros:\n    ros.wait(lambda: ros.graph.publishers("/cmd_vell"), 120)\n'
+    check += "    ros.car().expect_driven(1.0, within=1)\nros.score(1)"
     found = graded(check, DRIVES.format(speed=1.0, more="").replace('"cmd_vel"', '"cmd_vell"'))
     failed = found.first_failure
     assert failed is not None and failed.code == "topic-name" and "/cmd_vell" in failed.because, failed
@@ -201,7 +202,8 @@ def test_a_check_places_the_car_and_drives_it_with_a_heartbeat() -> None:
 
 
 def test_an_int_in_a_command_is_told_and_not_where_the_check_has_turned_the_car() -> None:
-    check = 'with launch("p", world="street") as ros:\n    car = ros.car()\n    car.place(*car.pose[:2], 2.0)\n'
+    check = 'from geometry_msgs.msg import Twist\nwith launch("p", world="street") as ros:\n    car = ros.car()\n'
+    check += '    ros.topic("/cmd_vel", Twist).expect_messages()\n    car.place(*car.pose[:2], 2.0)\n'
     check += "    car.expect_driven(0.1, within=1)\nros.score(1)"
     failed = graded(check, DRIVES.format(speed="1", more="")).first_failure
     assert failed is not None and failed.code == "not-driven"
@@ -211,7 +213,8 @@ def test_an_int_in_a_command_is_told_and_not_where_the_check_has_turned_the_car(
 
 def test_commands_that_are_no_numbers_are_told_as_such_and_not_as_missing() -> None:
     check = (
-        'with launch("p", world=World("street", patient=True)) as ros:\n    ros.car().expect_driven(0.1, within=1)\n'
+        'from geometry_msgs.msg import Twist\nwith launch("p", world=World("street", patient=True)) as ros:\n'
+        '    ros.topic("/cmd_vel", Twist).expect_messages()\n    ros.car().expect_driven(0.1, within=1)\n'
     )
     failed = graded(f"{check}ros.score(1)", DRIVES.format(speed="float('nan')", more="")).first_failure
     assert failed is not None and failed.code == "not-driven"

@@ -86,7 +86,7 @@ def test_a_lab_that_changed_after_grading_does_not_hold_up_an_export(root: Path)
     assert export(root, "canvas-feedback")[0] == 0
     by_hand.give(root, "annlee", "why", 3.5)
     status, _, said = export(root, "canvas-feedback")
-    assert status == 3 and "run autograder grade toy again" in said
+    assert status == 3 and "run autograder grade toy SUBMISSIONS again" in said
 
 
 def test_a_page_keeps_its_reports_if_it_is_renewed_with_another_version_of_the_kit(

@@ -48,12 +48,19 @@ class Course:
         """The jobs of the last run, in their order."""
         self.meddle: Changed = lambda _, result: result
         """What becomes of a result, by how many jobs of the run came before it."""
+        self.begin: Callable[[str], None] = lambda _: None
+        """What happens when the job of that name begins."""
         course = self
 
         class Noting(Local):
             def run(self, jobs: Sequence[Job], started: Callable[[str], None]) -> Generator[SubmissionResult]:
                 course.given = list(jobs)
-                for number, result in enumerate(super().run(jobs, started)):
+
+                def begin(name: str) -> None:
+                    course.begin(name)
+                    started(name)
+
+                for number, result in enumerate(super().run(jobs, begin)):
                     yield course.meddle(number, result)
 
         monkeypatch.setitem(EXECUTORS, "local", lambda _, settings: Noting(settings.at_once))
@@ -108,8 +115,16 @@ def course(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Course:
 
 @pytest.fixture
 def judged(course: Course, monkeypatch: pytest.MonkeyPatch) -> Course:
-    """The same without running anything: `toy.judge` says what a job comes to, for classes that are large."""
-    monkeypatch.setattr("autograder.grading.executors.local.run_in_worker", lambda job, *_: toy.judge(job))
+    """The same without running anything, and in order: `toy.judge` says what a job comes to, for large classes."""
+
+    class InOrder:
+        def run(self, jobs: Sequence[Job], started: Callable[[str], None]) -> Generator[SubmissionResult]:
+            course.given = list(jobs)
+            for number, job in enumerate(jobs):
+                started(job.student)
+                yield course.meddle(number, toy.judge(job))
+
+    monkeypatch.setitem(EXECUTORS, "local", lambda *_: InOrder())
     course.wrong_answers(WRONG.replace("raise SystemExit(3)", "print('no')"))
     return course
 
@@ -182,12 +197,11 @@ def test_a_wrong_answer_that_passes_towards_the_end_stops_the_run_before_any_gra
     )
     course.hand_in("ann", "bob")
 
-    def touch(number: int, result: SubmissionResult) -> SubmissionResult:
-        if number == 2:
+    def touch(name: str) -> None:
+        if name == course.given[-1].student:
             flag.touch()
-        return result
 
-    course.meddle = touch
+    course.begin = touch
     with pytest.raises(KitError) as error:
         course.grade()
     assert "No grade was written" in error.value.what
@@ -199,7 +213,7 @@ def test_a_wrong_answer_that_passes_towards_the_end_stops_the_run_before_any_gra
     assert not course.paths.grades.exists()
     assert course.files(course.paths.results) == set()
     flag.unlink()
-    course.meddle = lambda _, result: result
+    course.begin = lambda _: None
     # What ran beside it is doubtful: it runs again, and so do the known answers.
     assert course.grade().canaries
     assert sorted(course.names) == ["?", "?", "ann", "bob"]

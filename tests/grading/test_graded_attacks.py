@@ -35,7 +35,7 @@ TALKS, HAS_A_PARAMETER = (
 SOON_STUCK = """
 import sys
 worker = sys.modules["autograder.grading.worker"]  # of which this process is a fork
-worker.CELL_SECONDS, worker.STUCK_SECONDS = 15, 1  # from the next check on, until another worker goes on
+worker.CELL_SECONDS, worker.STUCK_SECONDS = 60, 1  # from the next check on, until another worker goes on
 """
 SCORES = "from autograder.checks import outcomes\nfrom autograder.checks.scoring import score\n"
 GOOD = "outcomes.passed('good')\nscore(1)"

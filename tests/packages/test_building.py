@@ -278,7 +278,7 @@ with launch("counter", packages=["good_interfaces"], listen=[("/counted", String
     ros.topic("/counted", String).expect_messages(at_least=1, where=lambda m: m.data == "2 of car")
 ros.score(1)""",
     "float for int": """with launch("halves", packages=["good_interfaces"], listen=[("/counted", String)]) as ros:
-    ros.topic("/counted", String).expect_messages(at_least=1, where=lambda m: m.data == "2 of car", within=5)
+    ros.topic("/counted", String).expect_messages(at_least=1, where=lambda m: m.data == "2 of car", within=60)
 ros.score(1)""",
     "fields": """with build("good_interfaces") as package:
     package.expect_interface("msg/Thing", {"label": "string", "x": "float64"})

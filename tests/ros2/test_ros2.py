@@ -9,7 +9,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import replace
 from io import StringIO
@@ -277,21 +277,26 @@ def test_what_a_newcomer_has_not_heard_of_yet_is_known_to_be_missing(
         observer.close()
 
 
-def test_a_command_waits_for_a_program_that_is_slow_to_answer(ten_nodes: tuple[subprocess.Popen[str], int]) -> None:
+def test_a_command_waits_for_a_program_that_is_slow_to_answer(
+    ten_nodes: tuple[subprocess.Popen[str], int], monkeypatch: pytest.MonkeyPatch
+) -> None:
     made, domain = ten_nodes
     made.send_signal(signal.SIGSTOP)  # as one that gets no turn on a busy machine
-    environment = {name: value for name, value in os.environ.items() if not name.startswith("FASTRTPS")}
-    command = [Path(sys.executable).with_name("autograder"), "ros2", "topic", "list"]
-    listed = subprocess.Popen(
-        command, env={**environment, "ROS_DOMAIN_ID": str(domain)}, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-        text=True,
-    )  # fmt: skip
-    assert until(lambda: session.participants_here(domain) == 2)
-    with pytest.raises(subprocess.TimeoutExpired):
-        listed.wait(4)  # longer than where there is nothing
-    made.send_signal(signal.SIGCONT)
-    said, warned = listed.communicate(timeout=WITHIN)
-    assert (len(said.splitlines()), warned) == (21, "")
+    looks, count = 0, session.participants_here
+
+    def looked(asked: int) -> int:
+        nonlocal looks
+        looks += 1
+        if looks == session._REPEATED + 4:  # where there is nothing it would have gone on by now
+            made.send_signal(signal.SIGCONT)
+        return count(asked)
+
+    monkeypatch.setattr(session, "participants_here", looked)
+    said, warned = StringIO(), StringIO()
+    with redirect_stdout(said), redirect_stderr(warned):
+        assert run(["topic", "list"], domain) == 0
+    assert looks >= session._REPEATED + 4
+    assert (len(said.getvalue().splitlines()), warned.getvalue()) == (21, "")
 
 
 def test_a_program_that_does_not_answer_at_all_is_told(ten_nodes: tuple[subprocess.Popen[str], int]) -> None:
@@ -301,14 +306,6 @@ def test_a_program_that_does_not_answer_at_all_is_told(ten_nodes: tuple[subproce
     with redirect_stdout(said), redirect_stderr(said):
         assert run(["node", "list"], domain) == 0
     assert said.getvalue() == "WARNING: a program here does not answer: what follows may not be all there is.\n"
-
-
-def until(done: Callable[[], bool]) -> bool:
-    """Whether it came."""
-    deadline = time.monotonic() + WITHIN
-    while not done() and time.monotonic() < deadline:
-        time.sleep(0.01)
-    return done()
 
 
 def test_what_a_shell_has_made_deaf_to_ctrl_c_goes_on(robot: Robot) -> None:
@@ -358,9 +355,18 @@ def notebook(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Notebook]:
     made.close()
 
 
+def begun(notebook: Notebook, cell: str, nodes: str = "['/talker']") -> str:
+    """Return what a cell says that begins a robot, and what the robot says of itself when its nodes are there."""
+    robot = cell.partition(" = ")[0]
+    there = f"assert {robot}.wait(lambda: {robot}.graph.nodes() == {nodes}, within={WITHIN}), {robot}.graph.nodes()"
+    shown = notebook.run(f"{cell}\n{there}\nprint({robot})")
+    assert not shown.error, shown.error
+    return shown.text
+
+
 def test_a_robot_goes_on_from_cell_to_cell(notebook: Notebook) -> None:
     assert "No program is running" in notebook.run("%ros2 node list").text
-    assert "running: talker (nodes so far: /talker)" in notebook.run('robot = launch("talker").start()').text
+    assert "running: talker (nodes so far: /talker)" in begun(notebook, 'robot = launch("talker").start()')
     assert notebook.run("%ros2 node list").text == "/talker\n"
     assert notebook.run("%ros2 topic echo /chatter -n 2").text == "data: hello\n---\n" * 2
     shown = notebook.run("%ros2 topic info /chater\n_exit_code").text
@@ -379,8 +385,8 @@ def test_a_robot_goes_on_from_cell_to_cell(notebook: Notebook) -> None:
 
 
 def test_a_second_robot_ends_the_first(notebook: Notebook) -> None:
-    notebook.run('first = launch("talker").start()')
-    assert "has been stopped" in notebook.run('second = launch("talker", name="second").start()').text
+    begun(notebook, 'first = launch("talker").start()')
+    assert "has been stopped" in begun(notebook, 'second = launch("talker", name="second").start()', "['/second']")
     assert notebook.run("%ros2 node list").text == "/second\n"
     assert "has ended" in notebook.run("first").text
     notebook.run("second.stop()")
@@ -388,7 +394,9 @@ def test_a_second_robot_ends_the_first(notebook: Notebook) -> None:
 
 def test_a_program_that_ends_by_itself_is_told_once(notebook: Notebook) -> None:
     notebook.run("%%node broken\nimport rclpy\nraise SystemExit(3)", "broken")
-    shown = notebook.run('robot = launch("talker", "broken").start()').text
+    cell = 'robot = launch("talker", "broken").start()'
+    ended = "assert robot.wait(lambda: not robot.program('broken').running(), within=600)"
+    shown = begun(notebook, f"{cell}\n{ended}")
     assert "broken has ended, with exit status 3" in shown and "running: talker" in shown
     assert notebook.run("%ros2 node list").text == "/talker\n"
     assert "broken has ended" in notebook.run("robot").text
@@ -397,7 +405,7 @@ def test_a_program_that_ends_by_itself_is_told_once(notebook: Notebook) -> None:
 
 def test_what_goes_on_ends_with_the_cell(notebook: Notebook) -> None:
     notebook.run("from autograder.notebook import magics")
-    notebook.run('robot = launch("talker").start()')
+    begun(notebook, 'robot = launch("talker").start()')
     for seconds in A_WHILE:
         notebook.run(f"magics._ENDLESS = {seconds}")
         shown = notebook.run("%ros2 topic hz /chatter").text
@@ -409,11 +417,11 @@ def test_what_goes_on_ends_with_the_cell(notebook: Notebook) -> None:
 
 
 def test_what_runs_is_not_what_its_cell_says_now(notebook: Notebook) -> None:
-    notebook.run('robot = launch("talker").start()')
+    begun(notebook, 'robot = launch("talker").start()')
     notebook.run(TALKER + "\n", "talker")
     assert "The cell of talker has been run again since" in notebook.run("robot").text
     assert notebook.run("%ros2 node list").text.endswith("Call .start() once more.\n/talker\n")
-    assert "again" not in notebook.run('robot = launch("talker").start()').text
+    assert "again" not in begun(notebook, 'robot = launch("talker").start()')
     notebook.run("robot.stop()")
 
 
@@ -507,7 +515,7 @@ def test_a_subscription_asks_for_what_every_publisher_offers(offered: list[str],
 def test_a_node_that_nothing_spins_is_told(notebook: Notebook) -> None:
     stuck = "import threading\nimport rclpy\nrclpy.init()\nnode = rclpy.create_node('stuck')\nthreading.Event().wait()"
     notebook.run(f"%%node stuck\n{stuck}", "stuck")
-    notebook.run('robot = launch("stuck", "talker").start()')
+    begun(notebook, 'robot = launch("stuck", "talker").start()', "['/stuck', '/talker']")
     notebook.run("from autograder.notebook import magics\nmagics._ENDLESS = 50.0")
     shown = notebook.run("%ros2 param list").text
     assert "/stuck:\nException while calling service of node '/stuck': None\n/talker:\n  start" in shown

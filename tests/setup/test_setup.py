@@ -11,6 +11,7 @@ import os
 import re
 import shutil
 import signal
+import socket
 import stat
 import subprocess
 import sys
@@ -149,15 +150,18 @@ def test_one_environment_serves_students_and_tests(small: Path) -> None:
 
 def test_an_interrupted_environment_is_made_anew(tmp_path: Path) -> None:
     folder = check_out(tmp_path / "course")
-    process = subprocess.Popen(
-        [MAKE, "-C", folder, "setup"], env=ENVIRON, stderr=subprocess.PIPE, text=True, start_new_session=True
-    )
-    deadline = time.monotonic() + 600
-    while not (folder / ".venv" / "pyvenv.cfg").exists():
-        assert time.monotonic() < deadline
-        time.sleep(0.01)
-    os.killpg(process.pid, signal.SIGINT)
-    assert "The next run starts over" in process.communicate(timeout=600)[1]
+    with socket.create_server(("127.0.0.1", 0)) as mute:  # a package index that never answers, so set-up does not end
+        index = f"http://127.0.0.1:{mute.getsockname()[1]}/simple"
+        environ = ENVIRON | {"PIP_CONFIG_FILE": "/dev/null", "PIP_FIND_LINKS": "", "PIP_INDEX_URL": index}
+        process = subprocess.Popen(
+            [MAKE, "-C", folder, "setup"], env=environ, stderr=subprocess.PIPE, text=True, start_new_session=True
+        )
+        deadline = time.monotonic() + 600
+        while not (folder / ".venv" / "pyvenv.cfg").exists():
+            assert time.monotonic() < deadline
+            time.sleep(0.01)
+        os.killpg(process.pid, signal.SIGINT)
+        assert "The next run starts over" in process.communicate(timeout=600)[1]
     assert process.returncode != 0
     (folder / ".venv" / "left-over").touch()
 

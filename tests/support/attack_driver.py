@@ -91,6 +91,9 @@ def watched(program: RunningProgram, wanted: str) -> dict[str, Any]:
         values = nice(program)
         if not program.wait(1.0):
             program.stop(0.1)
+            program.wait(
+                WITHIN
+            )  # a hundred threads, each of which must get a turn to die, take longer than `stop` waits
     else:
         values = []
         program.wait(WITHIN)

@@ -18,6 +18,7 @@ from typing import Any
 import yaml
 from places import ROOT
 
+from autograder.core.errors import KitError
 from autograder.course.cells import grade_id_of, source_of
 from autograder.course.lab import Cell, Lab, load_lab
 from autograder.course.paths import CoursePaths
@@ -199,4 +200,7 @@ def build_class(lab_name: str) -> Path:
 if __name__ == "__main__":
     if len(sys.argv) != 2:
         sys.exit("usage: python tests/support/sample_class.py LAB")
-    print(build_class(sys.argv[1]))
+    try:
+        print(build_class(sys.argv[1]))
+    except KitError as error:  # the name of the lab is misspelt
+        sys.exit(f"error: {error.what}\n  {error.do}")
