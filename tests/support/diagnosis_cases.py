@@ -335,6 +335,21 @@ CASES = {
         says="no-feedback",
         ask=of_goal("why_no_feedback"),
     ),
+    "no_feedback_at_first": Case(
+        COUNTS.format(AGREE),
+        EXECUTE + "    if goal.request.order > 5:\n    " + FEEDBACK + SUCCEED,
+        says="no-feedback",
+        because="Feedback(sequence=[1]))`) should publish feedback",
+        ask=of_goal("why_no_feedback"),
+    ),
+    "waits_for_its_rate": Case(
+        COUNTS.format(AGREE),
+        EXECUTE + "    rate = self.create_rate(20)\n    rate.sleep()\n" + FEEDBACK + SUCCEED,
+        says="rate-in-callback",
+        because="inside a callback waits for a timer",
+        never=("no-feedback",),
+        ask=of_goal("why_no_feedback"),
+    ),
     "some_feedback": Case(
         COUNTS.format(AGREE),
         EXECUTE + FEEDBACK + SUCCEED,
