@@ -308,6 +308,13 @@ CASES = {
         because="a goal can end only once",
         ask=of_goal("why_not_finished"),
     ),
+    "sets_the_status": Case(
+        COUNTS.format(AGREE),
+        EXECUTE + "    goal.status = 4\n    return Fibonacci.Result()\n",
+        says="execute-exception",
+        because="A call in the execute callback sets the status",
+        ask=of_goal("why_not_finished"),
+    ),
     "aborts_by_itself": Case(
         COUNTS.format(AGREE),
         EXECUTE + "    goal.abort()\n    return Fibonacci.Result()\n",
@@ -1096,6 +1103,15 @@ CASES = {
         says="crashed",
         ask=trouble,
         never=("not-copied",),
+    ),
+    "names_its_timers": Case(
+        "self.timers = []\n", says="crashed", because="another name, such as `self.my_timers`", ask=trouble
+    ),
+    "sets_a_property_of_its_own": Case(
+        "class Door:\n    @property\n    def open(self):\n        return True\n\nDoor().open = False\n",
+        says="crashed",
+        because="The lines above it in the log",
+        ask=trouble,
     ),
     "wrong_parameter": Case(
         main="given = [rclpy.Parameter('rate', value='x')]\n"
