@@ -453,6 +453,21 @@ CASES = {
         never=("rule-without-match",),
         ask=no_end_under_a_rule,
     ),
+    "makes_it_in_a_method_that_nobody_calls": Case(
+        methods="def make(self):\n    self.more = self.create_publisher(String, '~/more', 10)\n",
+        says="not-made-yet",
+        because="what calls `make`",
+        ask=no_end,
+    ),
+    "makes_it_after_an_endless_loop": Case(
+        "self.create_timer(0.05, self.tick)\n",
+        "def tick(self):\n    while True:\n        time.sleep(0.01)\n"
+        "    self.more = self.create_publisher(String, '~/more', 10)\n",
+        says="stuck-callback",
+        because="the loop in lines",
+        never=("not-made-yet",),
+        ask=no_end,
+    ),
     "no_end_for_a_rule": Case(
         says="rule-without-match",
         because="nothing is called",
