@@ -520,8 +520,18 @@ CASES = {
         "self.lock = threading.Lock()\nself.lock.acquire()\n" + TALK + "self.create_timer(0.05, self.work)\n",
         "def work(self):\n    with self.lock:\n        pass\n",
         says="waits-for-lock",
-        because="with self.lock:",
+        because="on every path and also after an error: `with self.lock:` does so",
         never=("stuck-callback",),
+    ),
+    "waits_for_who_holds_the_lock": Case(
+        "self.lock = threading.Lock()\n"
+        "self.create_timer(0.05, self.work, callback_group=Exclusive())\n"
+        "self.create_timer(0.05, self.wait, callback_group=Exclusive())\n",
+        "def work(self):\n    with self.lock:\n        time.sleep(60)\n\n"
+        "def wait(self):\n    with self.lock:\n        pass\n",
+        THREADS.format(3),
+        says="waits-for-lock",
+        because="Callbacks that take the same lock run one after another",
     ),
     "takes_the_lock_twice": Case(
         "self.lock = threading.Lock()\n" + TALK + "self.create_timer(0.05, self.work)\n",
