@@ -292,9 +292,14 @@ def takes_turn(inside: Inside) -> Reason | None:
                     f"{waits}it already holds this {noun}, which it took in line {line}: it waits for itself.",
                     "Take it only once, or use a `threading.RLock`, which one thread may take again.",
                 )
+            hint = ONE_LOCK if noun == "lock" else "Whoever takes it has to release it, also after an error."
+            if inside.source.by_hand(what):
+                hint = (
+                    "Whoever takes it has to release it, on every path and also after an error: "
+                    f"`with {what}:` does so."
+                )
             return WAITS_FOR_LOCK(
-                f"{waits}{f'the {noun} that it needs' if noun else 'what it takes there'} is not free.",
-                ONE_LOCK if noun == "lock" else "Whoever takes it has to release it, also after an error.",
+                f"{waits}{f'the {noun} that it needs' if noun else 'what it takes there'} is not free.", hint
             )
     return None
 

@@ -108,8 +108,8 @@ def why_no_result(scene: Scene, name: str) -> Reason | None:
 def why_no_feedback(scene: Scene, name: str) -> Reason | None:
     """Return why no feedback came.
 
-    Must have seen: an error in the execute callback; or an execute callback that ran, and no call of
-    `publish_feedback`.
+    Must have seen: an error in the execute callback; or an execute callback that ran, and no feedback published. While
+    the callback is running, what is wrong inside a program comes first, because that can hold the feedback back.
     """
     found = _said(scene, name, "execute")
     if found:
@@ -118,12 +118,24 @@ def why_no_feedback(scene: Scene, name: str) -> Reason | None:
     servers = [thing for _, thing in things if thing.kind == "action_server"]
     for inside, thing in things:
         if thing.kind == "execute" and thing.runs and servers and not any(server.runs for server in servers):
-            return NO_FEEDBACK(
+            blocked = inside_reason(scene) if thing.running else None
+            return blocked or NO_FEEDBACK(
                 f"`{inside.name}`: {called(thing)} {'runs' if thing.running else 'has run'}, and no feedback was "
                 "published.",
-                "`goal_handle.publish_feedback(...)` sends one feedback message; call it in the loop.",
+                _how_to_publish(inside),
             )
     return None
+
+
+def _how_to_publish(inside: Inside) -> str:
+    """Return what to do if no feedback was published, which depends on whether the source calls for it at all."""
+    number = inside.source.calls("publish_feedback")
+    if not number:
+        return "`goal_handle.publish_feedback(...)` sends one feedback message; call it in the loop."
+    return (
+        f"Line {number} (`{inside.source.line(number)}`) should publish feedback. Look at what the callback does "
+        "before this line, and whether it gets there."
+    )
 
 
 def why_wrong_feedback(scene: Scene, name: str) -> Reason | None:

@@ -395,14 +395,18 @@ def taken_away(scene: Scene, topic: str, kind: str, node: str) -> Reason | None:
 
 
 def not_made_yet(scene: Scene, topic: str, kind: str, node: str) -> Reason | None:
-    """Must have seen: a line in a method of the source that creates such an end, and no end created there."""
+    """Must have seen: a line in a method of the source that creates such an end, and no end created there.
+
+    What is wrong inside this program comes first, because that can be what keeps it from reaching the line.
+    """
     for inside in scene.inside_of(node) if node else scene.insides:
         for method, call in _makers(inside, _before_rules(scene, inside, topic), kind) if inside.alive else []:
             code = inside.source.line(call.lineno)
-            return NOT_MADE_YET(
+            return reason_inside([inside]) or NOT_MADE_YET(
                 f"The code creates the {kind} on `{topic}` in `{method}`, line {call.lineno} (`{code}`), but the "
                 "program has not reached this line.",
-                f"Create the {kind} in the callback after which it must exist.",
+                f"Look at what the program does before this line, and at what calls `{method}`. If the {kind} must "
+                "exist earlier, create it in the callback after which it must exist.",
             )
     return None
 

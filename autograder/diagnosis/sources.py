@@ -156,6 +156,16 @@ class Source:
         made = self._made(what)
         return _NOUNS.get(_called(made), "") if made else ""
 
+    def by_hand(self, what: str) -> bool:
+        """Whether the source names `acquire` or `release` of a thing, which `with` would call by itself."""
+        last = what.rpartition(".")[2]  # what is `self.lock` in a class can be `node.lock` elsewhere
+        return any(
+            isinstance(node, ast.Attribute)
+            and node.attr in ("acquire", "release")
+            and ast.unparse(node.value).rpartition(".")[2] == last
+            for node in ast.walk(self._tree)
+        )
+
     def single(self, what: str) -> bool:
         """Whether only one thread at a time can hold this: a lock, or a semaphore of 1."""
         made = self._made(what)

@@ -24,6 +24,19 @@ NOT_COPIED = Kind(
 )
 USED_AFTER_DESTROY = Kind("used-after-destroy", "the error says that something destroyed was used", Group.PROGRAM)
 
+_WITHOUT_SETTER = (
+    "clients",
+    "context",
+    "default_callback_group",
+    "guards",
+    "publishers",
+    "services",
+    "subscriptions",
+    "timers",
+    "waitables",
+)
+"""The properties of rclpy's `Node` that cannot be set (`node.py` of rclpy 7.1)."""
+
 KNOWN_ERRORS = (
     (
         "add_entity() missing 1 required positional argument",
@@ -41,12 +54,20 @@ KNOWN_ERRORS = (
         "If the line of rclpy's own is `with self.handle:`, a method of yours is called `handle`. That is an attribute "
         "of rclpy's own `Node`: give yours another name.",
     ),
+    *(
+        (
+            f"property '{name}' of '",  # the name of the class follows, which can be any
+            CRASHED,
+            f"rclpy's own `Node` has a property `{name}`, which cannot be set. In a class that inherits from `Node`, "
+            f"an attribute needs another name, such as `self.my_{name}`.",
+        )
+        for name in _WITHOUT_SETTER
+    ),
     (
-        "object has no setter",
+        "property 'status' of 'ServerGoalHandle' object has no setter",
         CRASHED,
-        "rclpy's own `Node` has `clients`, `context`, `default_callback_group`, `guards`, `publishers`, `services`, "
-        "`subscriptions`, `timers` and `waitables`, and none of them can be set. An attribute of your node needs "
-        "another name, such as `self.my_timers`.",
+        "A call in the execute callback sets the status of the goal: `goal_handle.succeed()`, `goal_handle.abort()` "
+        "or `goal_handle.canceled()`.",
     ),
     (
         "ModuleNotFoundError",

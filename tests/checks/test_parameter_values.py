@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 from graded_cell import TALKER, Grade, failure
 
+OTHER = TALKER.replace('"talker"', '"other"')
 FILE = "/talker:\n  ros__parameters:\n    word: bye\n"
 
 
@@ -26,3 +27,25 @@ def test_the_reason_says_where_the_value_comes_from(grade: Grade, launched: str,
         """
     found = failure(grade(check, talker__py=TALKER, talker__yaml=FILE))
     assert found.code == "parameter-value" and because in found.because, found
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        'params_file="other.yaml"',
+        'ros_arguments=["-p", "word:=ho"]',
+        'ros_arguments=["-p", "word:=ho", "-p", "word:=hey"]',
+        'ros_arguments=["-p", "other:word:=ho"]',
+        'ros_arguments=["-p", "wrod:=ho"]',
+        'ros_arguments=["-r", "word:=ho"]',
+    ],
+)
+def test_what_another_program_was_given_does_not_explain_a_value(grade: Grade, given: str) -> None:
+    check = f"""\
+        with launch(Program("other", {given}), "talker") as ros:
+            ros.node("/talker").expect_parameter("word", "hi")
+        ros.score(2)
+        """
+    file = FILE.replace("talker", "other")
+    found = failure(grade(check, talker__py=TALKER, other__py=OTHER, other__yaml=file))
+    assert found.code == "parameter-value" and "so it has its default: talker.py:11" in found.because, found

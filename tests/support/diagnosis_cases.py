@@ -308,6 +308,13 @@ CASES = {
         because="a goal can end only once",
         ask=of_goal("why_not_finished"),
     ),
+    "sets_the_status": Case(
+        COUNTS.format(AGREE),
+        EXECUTE + "    goal.status = 4\n    return Fibonacci.Result()\n",
+        says="execute-exception",
+        because="A call in the execute callback sets the status",
+        ask=of_goal("why_not_finished"),
+    ),
     "aborts_by_itself": Case(
         COUNTS.format(AGREE),
         EXECUTE + "    goal.abort()\n    return Fibonacci.Result()\n",
@@ -333,6 +340,21 @@ CASES = {
         COUNTS.format(AGREE),
         EXECUTE + SUCCEED,
         says="no-feedback",
+        ask=of_goal("why_no_feedback"),
+    ),
+    "no_feedback_at_first": Case(
+        COUNTS.format(AGREE),
+        EXECUTE + "    if goal.request.order > 5:\n    " + FEEDBACK + SUCCEED,
+        says="no-feedback",
+        because="Feedback(sequence=[1]))`) should publish feedback",
+        ask=of_goal("why_no_feedback"),
+    ),
+    "waits_for_its_rate": Case(
+        COUNTS.format(AGREE),
+        EXECUTE + "    rate = self.create_rate(20)\n    rate.sleep()\n" + FEEDBACK + SUCCEED,
+        says="rate-in-callback",
+        because="inside a callback waits for a timer",
+        never=("no-feedback",),
         ask=of_goal("why_no_feedback"),
     ),
     "some_feedback": Case(
@@ -431,6 +453,21 @@ CASES = {
         never=("rule-without-match",),
         ask=no_end_under_a_rule,
     ),
+    "makes_it_in_a_method_that_nobody_calls": Case(
+        methods="def make(self):\n    self.more = self.create_publisher(String, '~/more', 10)\n",
+        says="not-made-yet",
+        because="what calls `make`",
+        ask=no_end,
+    ),
+    "makes_it_after_an_endless_loop": Case(
+        "self.create_timer(0.05, self.tick)\n",
+        "def tick(self):\n    while True:\n        time.sleep(0.01)\n"
+        "    self.more = self.create_publisher(String, '~/more', 10)\n",
+        says="stuck-callback",
+        because="the loop in lines",
+        never=("not-made-yet",),
+        ask=no_end,
+    ),
     "no_end_for_a_rule": Case(
         says="rule-without-match",
         because="nothing is called",
@@ -483,8 +520,18 @@ CASES = {
         "self.lock = threading.Lock()\nself.lock.acquire()\n" + TALK + "self.create_timer(0.05, self.work)\n",
         "def work(self):\n    with self.lock:\n        pass\n",
         says="waits-for-lock",
-        because="with self.lock:",
+        because="on every path and also after an error: `with self.lock:` does so",
         never=("stuck-callback",),
+    ),
+    "waits_for_who_holds_the_lock": Case(
+        "self.lock = threading.Lock()\n"
+        "self.create_timer(0.05, self.work, callback_group=Exclusive())\n"
+        "self.create_timer(0.05, self.wait, callback_group=Exclusive())\n",
+        "def work(self):\n    with self.lock:\n        time.sleep(60)\n\n"
+        "def wait(self):\n    with self.lock:\n        pass\n",
+        THREADS.format(3),
+        says="waits-for-lock",
+        because="Callbacks that take the same lock run one after another",
     ),
     "takes_the_lock_twice": Case(
         "self.lock = threading.Lock()\n" + TALK + "self.create_timer(0.05, self.work)\n",
@@ -1081,6 +1128,15 @@ CASES = {
         says="crashed",
         ask=trouble,
         never=("not-copied",),
+    ),
+    "names_its_timers": Case(
+        "self.timers = []\n", says="crashed", because="another name, such as `self.my_timers`", ask=trouble
+    ),
+    "sets_a_property_of_its_own": Case(
+        "class Door:\n    @property\n    def open(self):\n        return True\n\nDoor().open = False\n",
+        says="crashed",
+        because="The lines above it in the log",
+        ask=trouble,
     ),
     "wrong_parameter": Case(
         main="given = [rclpy.Parameter('rate', value='x')]\n"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +12,7 @@ from autograder.arguments.remap_rules import PARAMETER_VALUE
 from autograder.checks import current
 from autograder.checks.program import Program
 from autograder.checks.running_launch import RunningLaunch
+from autograder.diagnosis import Scene
 from autograder.graph import parameters
 from autograder.graph.names import nearest
 from autograder.graph.services import ServiceMissing
@@ -55,21 +56,33 @@ def undeclared(node: str, name: str, declared: Collection[str]) -> Reason:
 
 def why_other(running: RunningLaunch, node: str, name: str, found: Any, wanted: Any) -> Reason:
     """Why the parameter `name` of `node` is `found` and not `wanted`: a reason that is established, or what it is."""
+    scene = running.scene()
+    programs = _programs_of(running, scene, node)
     reasons: tuple[Callable[[], Reason | None], ...] = (
-        lambda: _file_for_others(running, node),
-        lambda: _given_as_a_rule(running, name),
-        lambda: _given_to_another(running, node, name),
-        lambda: _given_by_another_name(running, node, name, found),
-        lambda: _given_twice(running, node, name, found),
+        lambda: _file_for_others(programs, node),
+        lambda: _given_as_a_rule(programs, name),
+        lambda: _given_to_another(programs, node, name),
+        lambda: _given_by_another_name(running, programs, node, name, found),
+        lambda: _given_twice(programs, name, found),
         lambda: _no_such_argument(running, found),
     )
     found_it = next((reason for ask in reasons if (reason := ask())), None)
-    return found_it or _other_value(found, wanted, _origin(running, node, name))
+    return found_it or _other_value(found, wanted, _origin(scene, programs, node, name))
 
 
-def _given_as_a_rule(running: RunningLaunch, name: str) -> Reason | None:
+def _programs_of(running: RunningLaunch, scene: Scene, node: str) -> list[Program]:
+    """Return the programs that have this node according to their probes; all programs if no probe knows it.
+
+    What the launch gives to another program does not reach this node, so it explains none of the node's values.
+    """
+    having = scene.inside_of(node)
+    programs = [launched for launched, _ in running.programs]
+    return [launched for launched, inside in zip(programs, scene.insides, strict=True) if inside in having]
+
+
+def _given_as_a_rule(programs: Sequence[Program], name: str) -> Reason | None:
     """Whether the parameter was given with `-r`, as if it were a remap rule."""
-    for launched, _ in running.programs:
+    for launched in programs:
         for text in launched.all_rules():
             rule = remap_rules.parse(text)
             if rule and rule.left == name:
@@ -78,9 +91,9 @@ def _given_as_a_rule(running: RunningLaunch, name: str) -> Reason | None:
     return None
 
 
-def _given_to_another(running: RunningLaunch, node: str, name: str) -> Reason | None:
+def _given_to_another(programs: Sequence[Program], node: str, name: str) -> Reason | None:
     """Whether `-p NODE:name:=value` was meant for this node: a node's name there is one in the namespace `/`."""
-    for launched, _ in running.programs:
+    for launched in programs:
         for text in launched.parameter_rules():
             meant, _, parameter = text.partition(":=")[0].rpartition(":")
             if parameter == name and meant and f"/{meant}" != node:
@@ -90,9 +103,11 @@ def _given_to_another(running: RunningLaunch, node: str, name: str) -> Reason | 
     return None
 
 
-def _given_by_another_name(running: RunningLaunch, node: str, name: str, found: Any) -> Reason | None:
+def _given_by_another_name(
+    running: RunningLaunch, programs: Sequence[Program], node: str, name: str, found: Any
+) -> Reason | None:
     """Whether values were given under names that the node has not declared, and none under this one."""
-    given = {one for launched, _ in running.programs for one in _given(launched, node)}
+    given = {one for launched in programs for one in _given(launched, node)}
     if name in given or not given:
         return None
     try:
@@ -111,9 +126,9 @@ def _given_by_another_name(running: RunningLaunch, node: str, name: str, found: 
     )
 
 
-def _given_twice(running: RunningLaunch, node: str, name: str, found: Any) -> Reason | None:
+def _given_twice(programs: Sequence[Program], name: str, found: Any) -> Reason | None:
     """Whether `-p` gives the parameter more than one value: unlike with remap rules, the last one counts."""
-    for launched, _ in running.programs:
+    for launched in programs:
         given = [text for text in launched.parameter_rules() if text.partition(":=")[0] == name]
         if len(given) > 1:
             because = f"It is {found!r}: `-p` gives `{name}` {len(given)} values, and the last one counts."
@@ -144,9 +159,9 @@ def _no_such_argument(running: RunningLaunch, found: Any) -> Reason | None:
     )
 
 
-def _file_for_others(running: RunningLaunch, node: str) -> Reason | None:
-    """Whether the parameter files of the launch have nothing for this node."""
-    for launched, _ in running.programs:
+def _file_for_others(programs: Sequence[Program], node: str) -> Reason | None:
+    """Whether the parameter files that these programs are given have nothing for this node."""
+    for launched in programs:
         if launched.warnings:
             hint = "Write `$(dirname)/NAME.yaml`; NAME is a cell's `%%file`."
             if "the build installs no" in launched.warnings[0]:
@@ -162,9 +177,9 @@ def _file_for_others(running: RunningLaunch, node: str) -> Reason | None:
     return None
 
 
-def _origin(running: RunningLaunch, node: str, name: str) -> str:
+def _origin(scene: Scene, programs: Sequence[Program], node: str, name: str) -> str:
     """Return a sentence that says where a parameter has its value from, or an empty text if that was not seen."""
-    for launched, _ in running.programs:
+    for launched in programs:
         for text in launched.parameter_rules():
             meant, _, parameter = text.partition(":=")[0].rpartition(":")
             if parameter == name and (not meant or f"/{meant}" == node):
@@ -174,7 +189,7 @@ def _origin(running: RunningLaunch, node: str, name: str) -> str:
                 params_file.text_of(current.check.folder, file), node
             ):
                 return f" `{Path(file).name}` gave it this value."
-    for inside in running.scene().insides:
+    for inside in scene.insides:
         for seen in inside.parameters:
             line = inside.source.declares(name)
             if (seen.node, seen.name) == (node, name) and seen.sets:
