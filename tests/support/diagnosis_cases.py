@@ -1222,6 +1222,34 @@ CASES = {
         never=("lifecycle-inactive",),
         ask=lambda scene, name: diagnosis.lifecycle_silence(scene, f"/{name}/managed"),
     ),
+    "no_super_and_published_before": Case(
+        "self.managed = self.create_lifecycle_publisher(String, '~/managed', 10)\n" + MANAGED,
+        CONFIGURE.format("return TransitionCallbackReturn.SUCCESS")
+        + "\ndef on_activate(self, state):\n    return TransitionCallbackReturn.SUCCESS\n",
+        "node.trigger_configure()\nnode.managed.publish(String())\nnode.trigger_activate()\nrclpy.spin(node)",
+        base="LifecycleNode",
+        says="no-super-on-activate",
+        never=("lifecycle-inactive",),
+        ask=lambda scene, name: diagnosis.lifecycle_silence(scene, f"/{name}/managed"),
+    ),
+    "made_after_super": Case(
+        MANAGED,
+        "def on_activate(self, state):\n    done = super().on_activate(state)\n"
+        "    self.managed = self.create_lifecycle_publisher(String, '~/managed', 10)\n    return done\n",
+        "node.trigger_configure()\nnode.trigger_activate()\nrclpy.spin(node)",
+        base="LifecycleNode",
+        says="no-super-on-activate",
+        because="or the publisher was created after that call. Create the publisher first",
+        ask=lambda scene, name: diagnosis.lifecycle_silence(scene, f"/{name}/managed"),
+    ),
+    "inactive_and_has_sent": Case(
+        TALK + "self.managed = self.create_lifecycle_publisher(String, '~/managed', 10)\n",
+        main="node.trigger_configure()\nnode.managed.publish(String())\nnode.trigger_activate()\n"
+        "node.managed.publish(String())\nrclpy.spin(node)",
+        base="LifecycleNode",
+        never=("lifecycle-inactive", "no-super-on-activate"),
+        ask=lambda scene, name: diagnosis.lifecycle_silence(scene, f"/{name}/managed"),
+    ),
     "inactive": Case(
         "self.managed = self.create_lifecycle_publisher(String, '~/managed', 10)\n" + MANAGED,
         main="rclpy.spin(node)",
