@@ -220,13 +220,21 @@ def cannot_answer(inside: Inside) -> Reason | None:
 
 def _never_spun(inside: Inside, names: list[str]) -> Reason | None:
     for name in names:
-        others = [node.name for node in inside.nodes.values() if node.spun]
+        others = [
+            node.name
+            for node in inside.nodes.values()
+            if inside.spinning(node.name) or (node.spun and inside.now - node.spun <= ENDED_AFTER)
+        ]
         place = inside.main_place() if not others else None
         return NOT_SPINNING(
             f"`{inside.name}` created the node `{name}`, but nothing spins it, so none of its callbacks can run."
             + (f" The program is in {place}." if place else "")
             + (f" Only {', '.join(f'`{other}`' for other in others)} is spun." if others else ""),
-            "Call `rclpy.spin(node)`, or `spin()` of the executor that the node was added to.",
+            "`spin` returns only at shutdown, so a second `spin` after it is not reached. Add all nodes to one "
+            "executor and spin that."
+            if others
+            else "Call `rclpy.spin(node)`, or `spin()` of the executor that the node was added to. If this call is in "
+            "the program already, the program has not come to it.",
         )
     return None
 

@@ -665,6 +665,24 @@ CASES = {
     "never_spins": Case(
         TALK, main="threading.Event().wait()", says="not-spinning", because="`threading.Event().wait()`"
     ),
+    "never_comes_to_spin": Case(
+        TALK,
+        main="while rclpy.ok():\n    time.sleep(0.1)\nrclpy.spin(node)",
+        says="not-spinning",
+        because="If this call is in the program already, the program has not come to it.",
+    ),
+    "spins_another_first": Case(
+        TALK,
+        main="other = rclpy.create_node('other')\nrclpy.spin(other)\nrclpy.spin(node)",
+        says="not-spinning",
+        because="Only `/other` is spun. `spin` returns only at shutdown, so a second `spin` after it is not reached.",
+    ),
+    "spun_another_once": Case(
+        TALK,
+        main="other = rclpy.create_node('other')\nrclpy.spin_once(other, timeout_sec=0.1)\nthreading.Event().wait()",
+        says="not-spinning",
+        because="(`threading.Event().wait()`). Call `rclpy.spin(node)`",
+    ),
     "needs_no_spin": Case(
         main="while rclpy.ok():\n    time.sleep(0.1)",
         says="silent",
