@@ -692,6 +692,20 @@ CASES = {
     "in_init": Case(
         TALK + "while True:\n    pass\n", says="stuck-in-init", because="`while True:`", never=("not-spinning",)
     ),
+    "in_what_init_calls": Case(
+        TALK + "self.work()\n",
+        "def work(self):\n    while True:\n        time.sleep(0.1)\n",
+        says="stuck-in-init",
+        because="(`self.work()`), and there in the loop in line",
+        never=("not-spinning",),
+    ),
+    "in_the_init_of_no_node": Case(
+        TALK,
+        "def work(self):\n    while True:\n        time.sleep(0.1)\n",
+        "class App:\n    def __init__(self):\n        node.work()\nApp()",
+        says="not-spinning",
+        never=("stuck-in-init",),
+    ),
     "slow_init": Case(TALK + "time.sleep(0.3)\n", says="silent", never=("stuck-in-init", "timer-period")),
     "not_added": Case(TALK, main="SingleThreadedExecutor().spin()", says="node-not-added", never=("not-spinning",)),
     "ends_spinning": Case(
