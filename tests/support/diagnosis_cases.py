@@ -308,6 +308,19 @@ CASES = {
         because="a goal can end only once",
         ask=of_goal("why_not_finished"),
     ),
+    "executes_twice": Case(
+        COUNTS.format(AGREE + ", handle_accepted_callback=self.take"),
+        EXECUTE + SUCCEED + "\ndef take(self, goal):\n    goal.execute()\n    goal.execute()\n",
+        says="callback-exception",
+        because="It ended the spinning. `execute()` was called for a goal whose execution has already begun",
+    ),
+    "executes_when_it_has_ended": Case(
+        COUNTS.format(AGREE),
+        EXECUTE + "    goal.succeed()\n    goal.execute()\n    return Fibonacci.Result()\n",
+        says="execute-exception",
+        because="The goal keeps its earlier status, with an empty result; the node continues. `execute()` was called",
+        ask=of_goal("why_not_finished"),
+    ),
     "aborts_by_itself": Case(
         COUNTS.format(AGREE),
         EXECUTE + "    goal.abort()\n    return Fibonacci.Result()\n",
