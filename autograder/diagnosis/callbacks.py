@@ -56,7 +56,7 @@ _AFTER = {
 _KINDS = {"service": SERVICE_EXCEPTION, "lifecycle": LIFECYCLE_EXCEPTION, "execute": EXECUTE_EXCEPTION}
 
 _GOAL_STATE = re.compile(r"invalid transition from state (\w+) with event (\w+)")
-"""What rclpy says if a goal cannot end with this status in its current state."""
+"""What rclpy says if a goal cannot be executed, or cannot end with this status, in its current state."""
 
 _NEVER_AWAITED = re.compile(r"RuntimeWarning: coroutine '([\w.<>]{1,100})' was never awaited")
 
@@ -234,10 +234,15 @@ def _ended_already(error: str) -> bool:
 
 
 def _of_goal_state(error: str) -> str:
-    """Return what to do if a goal cannot end with this status in its current state; empty for another error."""
+    """Return what to do if a goal's current state does not allow what the program did; empty for another error."""
     found = _GOAL_STATE.search(error)
     if not found:
         return ""
+    if found[2] == "EXECUTE":
+        return (
+            "`execute()` was called for a goal whose execution has already begun, or that has ended. Call it once for "
+            "each goal. rclpy does that itself if the server has no `handle_accepted_callback`."
+        )
     if _ended_already(error):
         return (
             "The goal had already ended, and a goal can end only once. `goal_handle.is_active` says whether it can "

@@ -161,12 +161,20 @@ class Inside:
 
     def main_place(self) -> sources.Place | None:
         """Return where the program's main thread is in the student's own code."""
-        return self.source.place(self.name, [next(reversed(stacks.values()), []) for stacks in self.stacks], True)
+        return self.source.place(self.name, self._mains(), True)
+
+    def constructor_place(self) -> sources.Place | None:
+        """Return where the program's main thread is in the constructor of a node, which may have called other code."""
+        looks = [self.source.from_constructor(self.name, frames) for frames in self._mains()]
+        return self.source.place(self.name, looks, True)
 
     def main_in_rclpy(self) -> bool:
         """Whether the program's main thread is inside a call into rclpy that the student's own code made."""
-        mains = [next(reversed(stacks.values()), []) for stacks in self.stacks]
+        mains = self._mains()
         return bool(mains) and all(sources.inside_rclpy(self.name, frames) for frames in mains)
+
+    def _mains(self) -> list[list[sources.Frame]]:
+        return [next(reversed(stacks.values()), []) for stacks in self.stacks]
 
 
 def called(thing: Thing) -> str:

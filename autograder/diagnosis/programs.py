@@ -148,7 +148,7 @@ def shut_down_inside(scene: Scene) -> Reason | None:
 
 
 STUCK_IN_INIT = Kind(
-    "stuck-in-init", "nothing was ever spun; the program is in one place of an __init__ each time", Group.SPINNING
+    "stuck-in-init", "nothing was ever spun; the program is in one place of a node's __init__ each time", Group.SPINNING
 )
 NODE_NOT_ADDED = Kind("node-not-added", "an executor without nodes spins; the node was never spun", Group.SPINNING)
 NOT_SPINNING = Kind(
@@ -180,14 +180,16 @@ def _unspun(inside: Inside) -> list[str]:
 
 
 def in_the_constructor(inside: Inside) -> Reason | None:
-    """Must have seen: no node spun yet, and the program in the same place of an `__init__` at each look."""
+    """Must have seen: no node spun yet, and the program in the same place of a node's `__init__` at each look."""
     if not _unspun(inside) or any(executor.spins for executor in inside.executors):
         return None
-    place = inside.main_place()
-    if place is None or place.function != "__init__":
+    place, innermost = inside.constructor_place(), inside.main_place()
+    if place is None:
         return None
+    called = f", and there in {innermost}" if innermost not in (None, place) else ""
     return STUCK_IN_INIT(
-        f"`{inside.name}` is still in `__init__`, in {place}. It has not begun to spin, so no callback can run.",
+        f"`{inside.name}` is still in `__init__`, in {place}{called}. It has not begun to spin, so no callback can "
+        "run.",
         "A constructor has to return. Use a timer for work that repeats.",
     )
 
@@ -220,13 +222,21 @@ def cannot_answer(inside: Inside) -> Reason | None:
 
 def _never_spun(inside: Inside, names: list[str]) -> Reason | None:
     for name in names:
-        others = [node.name for node in inside.nodes.values() if node.spun]
+        others = [
+            node.name
+            for node in inside.nodes.values()
+            if inside.spinning(node.name) or (node.spun and inside.now - node.spun <= ENDED_AFTER)
+        ]
         place = inside.main_place() if not others else None
         return NOT_SPINNING(
             f"`{inside.name}` created the node `{name}`, but nothing spins it, so none of its callbacks can run."
             + (f" The program is in {place}." if place else "")
             + (f" Only {', '.join(f'`{other}`' for other in others)} is spun." if others else ""),
-            "Call `rclpy.spin(node)`, or `spin()` of the executor that the node was added to.",
+            "`spin` returns only at shutdown, so a second `spin` after it is not reached. Add all nodes to one "
+            "executor and spin that."
+            if others
+            else "Call `rclpy.spin(node)`, or `spin()` of the executor that the node was added to. If this call is in "
+            "the program already, the program has not come to it.",
         )
     return None
 

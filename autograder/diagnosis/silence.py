@@ -60,7 +60,7 @@ TIMER_PERIOD = Kind(
     "timer-period", "nothing published, and the node has only timers, none of which is due yet", Group.SILENCE
 )
 LIFECYCLE_INACTIVE = Kind(
-    "lifecycle-inactive", "a lifecycle publisher dropped a message in another state", Group.SILENCE
+    "lifecycle-inactive", "a lifecycle publisher that never sent a message dropped one in another state", Group.SILENCE
 )
 NO_SUPER_ON_ACTIVATE = Kind(
     "no-super-on-activate",
@@ -104,20 +104,29 @@ def why_silent(scene: Scene, topic: str, msg_type: type, profile: QoSProfile) ->
 
 
 def lifecycle_silence(scene: Scene, topic: str = "") -> Reason | None:
-    """Must have seen: a lifecycle publisher that dropped a message because it was not activated.
+    """Must have seen: a lifecycle publisher that dropped a message in state active, or has dropped all its messages.
 
     If `topic` is given, the publisher must be on this topic.
     """
-    for inside in scene.insides:
-        for event in inside.all(LifecyclePublishOff):
-            if topic and event.name != topic:
-                continue
-            if event.state == "active":
-                return NO_SUPER_ON_ACTIVATE(
-                    f"`{inside.name}` is active, but its lifecycle publisher was never activated: `on_activate` does "
-                    "not call `super().on_activate(state)`.",
-                    "End `on_activate` with `return super().on_activate(state)`.",
-                )
+    drops = [
+        (inside, event)
+        for inside in scene.insides
+        for event in inside.all(LifecyclePublishOff)
+        if topic in ("", event.name)
+    ]
+    # A timer may have published before the activation, too, so this is not the first drop of every such publisher.
+    for inside, event in drops:
+        if event.state == "active":
+            return NO_SUPER_ON_ACTIVATE(
+                f"`{inside.name}` publishes in {event.line} while it is active, but its lifecycle publisher was not "
+                "switched on: `on_activate` does not call `super().on_activate(state)`, or the publisher was created "
+                "after that call.",
+                "Create the publisher first, best in `on_configure`, and end `on_activate` with "
+                "`return super().on_activate(state)`.",
+            )
+    for inside, event in drops:
+        sent = any(owner is inside and publisher.runs for owner, publisher in _publishers(scene, event.name))
+        if not sent:
             return LIFECYCLE_INACTIVE(
                 f"`{inside.name}` publishes in {event.line} while it is {event.state or 'not active'}: a lifecycle "
                 "publisher drops such messages.",

@@ -133,6 +133,18 @@ class Source:
         (number,) = lines
         return Place(number, number, self.line(number), "", places[0][2])
 
+    def from_constructor(self, name: str, frames: Sequence[Frame]) -> list[Frame]:
+        """Return a thread's frames from the constructor of a node on, without what it has called; empty without one.
+
+        A class that inherits from nothing is not a node, and its constructor may run the whole program.
+        """
+        nodes = [part for part in ast.walk(self._tree) if isinstance(part, ast.ClassDef) and part.bases]
+        for number, (file, line, function) in enumerate(frames):
+            own = file.endswith(f"/{name}.py") and function == "__init__"
+            if own and any(node.lineno <= line <= (node.end_lineno or 0) for node in nodes):
+                return list(frames[number:])
+        return []
+
     def turn(self, name: str, looks: Sequence[list[Frame]]) -> Place | None:
         """Return where a thread waited each time to take a lock, a semaphore or the like; None if it did not."""
         for frames in looks:

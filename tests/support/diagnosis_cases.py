@@ -315,6 +315,19 @@ CASES = {
         because="A call in the execute callback sets the status",
         ask=of_goal("why_not_finished"),
     ),
+    "executes_twice": Case(
+        COUNTS.format(AGREE + ", handle_accepted_callback=self.take"),
+        EXECUTE + SUCCEED + "\ndef take(self, goal):\n    goal.execute()\n    goal.execute()\n",
+        says="callback-exception",
+        because="It ended the spinning. `execute()` was called for a goal whose execution has already begun",
+    ),
+    "executes_when_it_has_ended": Case(
+        COUNTS.format(AGREE),
+        EXECUTE + "    goal.succeed()\n    goal.execute()\n    return Fibonacci.Result()\n",
+        says="execute-exception",
+        because="The goal keeps its earlier status, with an empty result; the node continues. `execute()` was called",
+        ask=of_goal("why_not_finished"),
+    ),
     "aborts_by_itself": Case(
         COUNTS.format(AGREE),
         EXECUTE + "    goal.abort()\n    return Fibonacci.Result()\n",
@@ -712,6 +725,24 @@ CASES = {
     "never_spins": Case(
         TALK, main="threading.Event().wait()", says="not-spinning", because="`threading.Event().wait()`"
     ),
+    "never_comes_to_spin": Case(
+        TALK,
+        main="while rclpy.ok():\n    time.sleep(0.1)\nrclpy.spin(node)",
+        says="not-spinning",
+        because="If this call is in the program already, the program has not come to it.",
+    ),
+    "spins_another_first": Case(
+        TALK,
+        main="other = rclpy.create_node('other')\nrclpy.spin(other)\nrclpy.spin(node)",
+        says="not-spinning",
+        because="Only `/other` is spun. `spin` returns only at shutdown, so a second `spin` after it is not reached.",
+    ),
+    "spun_another_once": Case(
+        TALK,
+        main="other = rclpy.create_node('other')\nrclpy.spin_once(other, timeout_sec=0.1)\nthreading.Event().wait()",
+        says="not-spinning",
+        because="(`threading.Event().wait()`). Call `rclpy.spin(node)`",
+    ),
     "needs_no_spin": Case(
         main="while rclpy.ok():\n    time.sleep(0.1)",
         says="silent",
@@ -720,6 +751,20 @@ CASES = {
     ),
     "in_init": Case(
         TALK + "while True:\n    pass\n", says="stuck-in-init", because="`while True:`", never=("not-spinning",)
+    ),
+    "in_what_init_calls": Case(
+        TALK + "self.work()\n",
+        "def work(self):\n    while True:\n        time.sleep(0.1)\n",
+        says="stuck-in-init",
+        because="(`self.work()`), and there in the loop in line",
+        never=("not-spinning",),
+    ),
+    "in_the_init_of_no_node": Case(
+        TALK,
+        "def work(self):\n    while True:\n        time.sleep(0.1)\n",
+        "class App:\n    def __init__(self):\n        node.work()\nApp()",
+        says="not-spinning",
+        never=("stuck-in-init",),
     ),
     "slow_init": Case(TALK + "time.sleep(0.3)\n", says="silent", never=("stuck-in-init", "timer-period")),
     "not_added": Case(TALK, main="SingleThreadedExecutor().spin()", says="node-not-added", never=("not-spinning",)),
@@ -1276,6 +1321,34 @@ CASES = {
         base="LifecycleNode",
         says="no-super-on-activate",
         never=("lifecycle-inactive",),
+        ask=lambda scene, name: diagnosis.lifecycle_silence(scene, f"/{name}/managed"),
+    ),
+    "no_super_and_published_before": Case(
+        "self.managed = self.create_lifecycle_publisher(String, '~/managed', 10)\n" + MANAGED,
+        CONFIGURE.format("return TransitionCallbackReturn.SUCCESS")
+        + "\ndef on_activate(self, state):\n    return TransitionCallbackReturn.SUCCESS\n",
+        "node.trigger_configure()\nnode.managed.publish(String())\nnode.trigger_activate()\nrclpy.spin(node)",
+        base="LifecycleNode",
+        says="no-super-on-activate",
+        never=("lifecycle-inactive",),
+        ask=lambda scene, name: diagnosis.lifecycle_silence(scene, f"/{name}/managed"),
+    ),
+    "made_after_super": Case(
+        MANAGED,
+        "def on_activate(self, state):\n    done = super().on_activate(state)\n"
+        "    self.managed = self.create_lifecycle_publisher(String, '~/managed', 10)\n    return done\n",
+        "node.trigger_configure()\nnode.trigger_activate()\nrclpy.spin(node)",
+        base="LifecycleNode",
+        says="no-super-on-activate",
+        because="or the publisher was created after that call. Create the publisher first",
+        ask=lambda scene, name: diagnosis.lifecycle_silence(scene, f"/{name}/managed"),
+    ),
+    "inactive_and_has_sent": Case(
+        TALK + "self.managed = self.create_lifecycle_publisher(String, '~/managed', 10)\n",
+        main="node.trigger_configure()\nnode.managed.publish(String())\nnode.trigger_activate()\n"
+        "node.managed.publish(String())\nrclpy.spin(node)",
+        base="LifecycleNode",
+        never=("lifecycle-inactive", "no-super-on-activate"),
         ask=lambda scene, name: diagnosis.lifecycle_silence(scene, f"/{name}/managed"),
     ),
     "inactive": Case(
