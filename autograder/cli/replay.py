@@ -53,14 +53,7 @@ def replay(
     root, made = course_root(course), read_appeal(file)
     lab = load_lab(root, made.lab)
     answered = grant or refuse
-    if grant and refuse:
-        raise KitError("An appeal is granted or refused, not both.", "Use --grant or --refuse.")
-    if points is not None and not grant:
-        raise KitError("`--points` says how many points are granted.", "Add --grant, or leave out --points.")
-    if reason.strip() and not (answered or sample):
-        raise KitError("`--reason` belongs to an answer.", "Add --grant or --refuse.")
-    if answered and not reason.strip():
-        raise KitError("An answer needs a reason, which the student reads.", "Add --reason 'SENTENCE'.")
+    _refuse_half_an_answer(grant, refuse, points, reason.strip(), sample)
     who, screen = owner(root, made, lab), console()
     kept = keep(root, file, made)
     _show(screen, made, lab, who)
@@ -86,6 +79,18 @@ def replay(
     decision = Decision.GRANTED if grant else Decision.REFUSED
     for sentence in decide(root, who, made, decision, reason.strip(), points):
         screen.print(plain(sentence), markup=False, soft_wrap=True)
+
+
+def _refuse_half_an_answer(grant: bool, refuse: bool, points: float | None, reason: str, sample: str) -> None:
+    """Look for options that make no answer together, so that none of them is passed over."""
+    if grant and refuse:
+        raise KitError("An appeal is granted or refused, not both.", "Use --grant or --refuse.")
+    if points is not None and not grant:
+        raise KitError("`--points` says how many points are granted.", "Add --grant, or leave out --points.")
+    if reason and not (grant or refuse or sample):
+        raise KitError("`--reason` belongs to an answer.", "Add --grant or --refuse.")
+    if (grant or refuse) and not reason:
+        raise KitError("An answer needs a reason, which the student reads.", "Add --reason 'SENTENCE'.")
 
 
 def _how_to_answer(screen: Console, kept: Path, who: str) -> None:

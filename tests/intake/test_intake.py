@@ -320,7 +320,7 @@ def test_zips_in_zips_may_only_take_so_much_together(zipped: bool, tmp_path: Pat
         for number in range(4):
             archive.writestr(f"{number}.zip", folders.getvalue())
         archive.writestr("toy.ipynb", "the work of eve")
-    files = {"ann/toy.ipynb": b"the work of ann", "eve/work.zip": several.getvalue()}
+    files = {"ann/toy.ipynb": b"the work of ann", "eve/all.zip": several.getvalue()}
     source = tmp_path / "class"
     for name, content in files.items():
         (source / name).parent.mkdir(parents=True)
