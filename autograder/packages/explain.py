@@ -30,7 +30,7 @@ PACKAGE_XML = Kind(
 PACKAGE_NAME = Kind("package-name", "package.xml gives the package another name than its folder has", Group.BUILDING)
 BUILD_TYPE = Kind(
     "build-type",
-    "package.xml exports no build type that fits: colcon does not know how to build the package",
+    "package.xml exports no build type, or one whose file, CMakeLists.txt or setup.py, is missing",
     Group.BUILDING,
 )
 CMAKE = Kind("cmake", "CMake stopped at a line of CMakeLists.txt with the error that is quoted", Group.BUILDING)
@@ -57,6 +57,8 @@ INTERFACE_GROUP = Kind(
     Group.BUILDING,
 )
 
+_BUILD_FILES = {"ament_cmake": "CMakeLists.txt", "ament_python": "setup.py"}
+"""For each build type, the file that says how to build such a package."""
 _Reason = Callable[[re.Match[str]], Reason]
 
 
@@ -110,7 +112,7 @@ def needed_packages(sources: Path, to_build: bool = False) -> list[str]:
 
 
 def not_described(sources: Path, name: str) -> Reason | None:
-    """Return what in package.xml prevents colcon from building the package, or from building it under its name."""
+    """Return what in package.xml, or beside it, prevents colcon from building the package, or under its name."""
     from catkin_pkg.package import InvalidPackage, parse_package
 
     path = sources / "package.xml"
@@ -128,14 +130,25 @@ def not_described(sources: Path, name: str) -> Reason | None:
     if package.name != name:
         because = f"package.xml names the package `{package.name}`; its folder, and this task, name it `{name}`."
         return PACKAGE_NAME(because)
-    exported = [export.content for export in package.exports if export.tagname == "build_type"]
-    wanted = "ament_cmake" if (sources / "CMakeLists.txt").is_file() else "ament_python"
-    if exported != [wanted]:
-        has = f"exports the build type `{exported[0]}`" if exported else "exports no build type"
-        because = f"package.xml {has}, so colcon does not build the package as an `{wanted}` package."
-        hint = f"It needs `<export><build_type>{wanted}</build_type></export>`."
+    exported = [str(export.content) for export in package.exports if export.tagname == "build_type"]
+    return _other_build_type(exported, sources, name)
+
+
+def _other_build_type(exported: list[str], sources: Path, name: str) -> Reason | None:
+    """Return why the build types that package.xml exports do not fit the package's files; None if they do."""
+    there = [kind for kind, file in _BUILD_FILES.items() if (sources / file).is_file()]
+    if len(exported) == 1 and exported[0] in there:
+        return None
+    types = " and ".join(f"`{one}`" for one in exported)
+    has = f"exports the build type {types}" if exported else "exports no build type"
+    if there:
+        because = f"package.xml {has}, so colcon does not build the package as an `{there[0]}` package."
+        hint = f"It needs `<export><build_type>{there[0]}</build_type></export>`, as its only build type."
         return BUILD_TYPE(because, hint)
-    return None
+    missing = [file for kind, file in _BUILD_FILES.items() if kind in exported] or list(_BUILD_FILES.values())
+    because = f"package.xml {has}, and the package has {' and '.join(f'no `{file}`' for file in missing)}."
+    cells = " or ".join(f"`%%file src/{name}/{file}`" for file in missing)
+    return BUILD_TYPE(because, f"Run the cell that begins with {cells}, or write it.")
 
 
 def _interface_line(match: re.Match[str]) -> Reason:

@@ -81,6 +81,31 @@ CASES: dict[str, tuple[dict[str, str], str, str, str]] = {
         "build-type",
         "no build type",
     ),
+    "type_alone": (
+        {"package.xml": SENSORS["package.xml"].replace("<build_type>ament_python</build_type>", "")},
+        'expect_depends("rclpy")',
+        "build-type",
+        "no build type, and the package has no `CMakeLists.txt` and no `setup.py`",
+    ),
+    "no_cmake": (
+        without(INTERFACES, "CMakeLists.txt"),
+        EXPECT,
+        "build-type",
+        "no `CMakeLists.txt`. Run the cell that begins with `%%file src/no_cmake/CMakeLists.txt`, or write it.",
+    ),
+    "no_setup": (without(SENSORS, "setup.py"), 'expect_depends("rclpy")', "build-type", "has no `setup.py`"),
+    "two_types": (
+        changed(SENSORS, "package.xml", "<export>", "<export><build_type>ament_cmake</build_type>"),
+        'expect_depends("rclpy")',
+        "build-type",
+        "`ament_cmake` and `ament_python`",
+    ),
+    "unused_cmake": (
+        {**SENSORS, "CMakeLists.txt": ""},
+        'expect_depends("std_msgs")',
+        "package-depend",
+        "does not name `std_msgs`",
+    ),
     "no_marker": (without(SENSORS, "resource/NAME"), EXPECT, "package-file", "resource/"),
     "no_module_folder": (
         changed(SENSORS, "setup.py", 'packages=["NAME"]', 'packages=["nme"]'),
