@@ -151,6 +151,17 @@ def _other_build_type(exported: list[str], sources: Path, name: str) -> Reason |
     return BUILD_TYPE(because, f"Run the cell that begins with {cells}, or write it.")
 
 
+def _not_a_file(match: re.Match[str]) -> Reason:
+    """Return what setup.py may mean by something that is not a file: the tool's words are the same for a folder."""
+    path = match[1].rstrip("/")
+    hint = ""
+    if "*" in path:
+        hint = f'A pattern has to be looked up: `glob("{path}")`, with `from glob import glob`.'
+    elif not Path(path).suffix and not path.startswith("resource/"):  # the marker has no suffix, and is no folder
+        hint = f'If it is a folder, its files have to be named: `glob("{path}/*")`, with `from glob import glob`.'
+    return PACKAGE_FILE(f"setup.py installs `{match[1]}`, and the package has no file of that name.", hint)
+
+
 def _interface_line(match: re.Match[str]) -> Reason:
     line, name, said = match.groups()
     said = said.strip() + "'" * (said.count("'") % 2)  # the pattern does not include a quotation mark at the end
@@ -184,10 +195,7 @@ _REASONS: list[tuple[str, _Reason]] = [
     ),
     (
         r"error: can't copy '([^']+)': doesn't exist",
-        lambda m: PACKAGE_FILE(
-            f"setup.py installs `{m[1]}`, and the package has no such file.",
-            f'A pattern has to be looked up: `glob("{m[1]}")`, with `from glob import glob`.' if "*" in m[1] else "",
-        ),
+        _not_a_file,
     ),
     (
         r"error: package directory '([^']+)' does not exist",

@@ -156,6 +156,12 @@ CASES: dict[str, tuple[dict[str, str], str, str, str]] = {
         "package-file",
         "from glob import glob",
     ),
+    "folder": (
+        changed(SENSORS, "setup.py", '["launch/car.launch.yaml"]', '["launch"]'),
+        EXPECT,
+        "package-file",
+        'no file of that name. If it is a folder, its files have to be named: `glob("launch/*")`',
+    ),
     "no_comma": (
         changed(SENSORS, "setup.py", ":main", ":main lamp = NAME.sensor:main"),
         EXPECT,
