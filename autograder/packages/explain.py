@@ -17,7 +17,7 @@ INTERFACE_LINE = Kind(
     "interface-line", "a line of an interface file is not a field, or its name or type is not allowed", Group.BUILDING
 )
 INTERFACE_TYPE = Kind(
-    "interface-type", "an interface file uses a message type that the package does not have", Group.BUILDING
+    "interface-type", "an interface file uses a message type that its package does not build", Group.BUILDING
 )
 BUILD_FAILED = Kind("build-failed", "the build failed in another way; its first error is quoted", Group.BUILDING)
 BUILD_TIME = Kind("build-time", "the build took too long and was ended", Group.BUILDING)
@@ -180,8 +180,13 @@ def _interface_line(match: re.Match[str]) -> Reason:
 
 
 def _unknown_type(match: re.Match[str]) -> Reason:
-    because = f"An interface uses the message `{match[1]}/{match[2]}`, and the package does not have it."
-    hint = "A message of another package is written with that package: `std_msgs/Header`."
+    package, name = match.groups()
+    because = f"An interface uses the message `{package}/{name}`,"
+    because += f" and `rosidl_generate_interfaces` in CMakeLists.txt names no `msg/{name}.msg`."
+    hint = (
+        "Is the name right? A message of the same package needs a file, which has to be named there. A message of"
+        " another package is written with that package: `std_msgs/Header`."
+    )
     return INTERFACE_TYPE(because, hint)
 
 

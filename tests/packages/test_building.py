@@ -240,7 +240,18 @@ CASES: dict[str, tuple[dict[str, str], str, str, str]] = {
         "interface-file",
         "Thin",
     ),
-    "header_alone": (changed(INTERFACES, "msg/Things.msg", "std_msgs/", ""), EXPECT, "interface-type", "Header"),
+    "header_alone": (
+        changed(INTERFACES, "msg/Things.msg", "std_msgs/", ""),
+        EXPECT,
+        "interface-type",
+        "A message of another package is written with that package",
+    ),
+    "message_left_out": (
+        changed(INTERFACES, "CMakeLists.txt", '  "msg/Thing.msg"\n', ""),
+        EXPECT,
+        "interface-type",
+        "names no `msg/Thing.msg`",
+    ),
     "no_dependency": (
         changed(INTERFACES, "CMakeLists.txt", "  DEPENDENCIES std_msgs)", ")"),
         EXPECT,
@@ -280,6 +291,7 @@ ALIKE = (
     "no_dollar",
     "no_colon",
     "no_comma",
+    "header_alone",
     "msg_in_type",
     "other_folder",
     "other_function",
