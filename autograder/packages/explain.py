@@ -242,7 +242,7 @@ _REASONS: list[tuple[str, _Reason]] = [
         r"include_map\[pkg\].{0,2000}?KeyError: '([^']{1,200})'",
         lambda m: INTERFACE_DEPENDENCY(
             f"An interface uses a message of `{m[1]}`, but rosidl_generate_interfaces does not name this package.",
-            f"Its last line names the packages whose messages are used: `DEPENDENCIES {m[1]}`.",
+            f"Is `{m[1]}` the right name of a package? If so, name it in the last line there: `DEPENDENCIES {m[1]}`.",
         ),
     ),
     (
@@ -253,7 +253,7 @@ _REASONS: list[tuple[str, _Reason]] = [
         r"the passed dependency '([^']+)' has not been found before",
         lambda m: CMAKE_PACKAGE(
             f"CMakeLists.txt uses `{m[1]}` before it has looked it up.",
-            f"Put `find_package({m[1]} REQUIRED)` above the line that uses it.",
+            f"Is `{m[1]}` the right name of a package? If so, put `find_package({m[1]} REQUIRED)` above that line.",
         ),
     ),
     (
@@ -266,8 +266,8 @@ _REASONS: list[tuple[str, _Reason]] = [
     (
         r'Unknown CMake command "ament_(\w+)"',
         lambda m: CMAKE_PACKAGE(
-            f"CMake does not know `ament_{m[1]}`: the package that brings it was not looked up.",
-            "Put `find_package(ament_cmake REQUIRED)` above the line that uses it.",
+            f"CMake does not know `ament_{m[1]}`: it is misspelt, or the package that brings it was not looked up.",
+            "Is the name right? If so, put `find_package(ament_cmake REQUIRED)` above the line that uses it.",
         ),
     ),
     (

@@ -256,13 +256,13 @@ CASES: dict[str, tuple[dict[str, str], str, str, str]] = {
         changed(INTERFACES, "CMakeLists.txt", "  DEPENDENCIES std_msgs)", ")"),
         EXPECT,
         "interface-dependency",
-        "std_msgs",
+        "Is `std_msgs` the right name of a package? If so, name it in the last line there: `DEPENDENCIES std_msgs`.",
     ),
     "not_found": (
         changed(INTERFACES, "CMakeLists.txt", "find_package(std_msgs REQUIRED)\n", ""),
         EXPECT,
         "cmake-package",
-        "std_msgs",
+        "Is `std_msgs` the right name of a package? If so, put `find_package(std_msgs REQUIRED)`",
     ),
     "no_generators": (
         changed(INTERFACES, "CMakeLists.txt", "find_package(rosidl_default_generators REQUIRED)\n", ""),
@@ -282,6 +282,12 @@ CASES: dict[str, tuple[dict[str, str], str, str, str]] = {
         "cmake",
         "line 6",
     ),
+    "typo_at_the_end": (
+        changed(INTERFACES, "CMakeLists.txt", "ament_package()", "ament_pakage()"),
+        EXPECT,
+        "cmake-package",
+        "`ament_pakage`: it is misspelt, or",
+    ),
     "typo_in_cmake": (changed(INTERFACES, "CMakeLists.txt", "project(", "projekt("), EXPECT, "cmake", "line 2"),
 }
 
@@ -298,6 +304,7 @@ ALIKE = (
     "lost_function",
     "capital",
     "no_generators",
+    "typo_at_the_end",
     "typo_in_cmake",
 )
 """Cases whose code another one has, too."""
