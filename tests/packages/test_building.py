@@ -53,6 +53,7 @@ for number in range(60_000):
 
 EXPECT = "expect_built()"
 RUNS = 'expect_executable("speed_sensor")'
+DEPENDS = 'expect_depends("std_msgs", to_build=("std_msgs",))'
 CASES: dict[str, tuple[dict[str, str], str, str, str]] = {
     # name: (files, expectation, code, words of the reason)
     "forges_the_result": (
@@ -211,7 +212,25 @@ CASES: dict[str, tuple[dict[str, str], str, str, str]] = {
         changed(INTERFACES, "package.xml", "<buildtool_depend>rosidl_default_generators</buildtool_depend>", ""),
         'expect_depends("std_msgs", to_build=("std_msgs", "rosidl_default_generators"))',
         "package-depend",
-        "to build it",
+        "to build it. For that it names: `ament_cmake`, `std_msgs`. It needs `<buildtool_depend>",
+    ),
+    "neither": (
+        changed(INTERFACES, "package.xml", "<depend>std_msgs</depend>", ""),
+        DEPENDS,
+        "package-depend",
+        "It needs `<depend>std_msgs</depend>`.",
+    ),
+    "at_run_alone": (
+        changed(INTERFACES, "package.xml", "<depend>std_msgs</depend>", "<exec_depend>std_msgs</exec_depend>"),
+        DEPENDS,
+        "package-depend",
+        "It needs `<build_depend>std_msgs</build_depend>`.",
+    ),
+    "to_build_alone": (
+        changed(INTERFACES, "package.xml", "<depend>std_msgs</depend>", "<build_depend>std_msgs</build_depend>"),
+        DEPENDS,
+        "package-depend",
+        "It needs `<exec_depend>std_msgs</exec_depend>`.",
     ),
     "marker_left_out": (
         changed(SENSORS, "setup.py", '("share/ament_index/resource_index/packages", ["resource/NAME"]),', ""),
