@@ -199,6 +199,15 @@ CASES: dict[str, tuple[dict[str, str], str, str, str]] = {
         "entry-point-target",
         "not to `other_function.sensor:main`",
     ),
+    "script_alone": (
+        {
+            **changed(SENSORS, "setup.py", 'entry_points={"console_', 'scripts=["speed_sensor"], entry_points={"gui_'),
+            "speed_sensor": "#!/usr/bin/env python3\n",
+        },
+        RUNS,
+        "entry-point",
+        "`lib/script_alone/speed_sensor` is installed, but not by an entry point",
+    ),
     "lost_function": (changed(SENSORS, "setup.py", ":main", ":run"), RUNS, "entry-point-target", "`run`"),
     "launch_left_out": (
         changed(SENSORS, "setup.py", '("share/NAME/launch", ["launch/car.launch.yaml"]),', ""),
@@ -328,11 +337,16 @@ ALIKE = (
 )
 """Cases whose code another one has, too."""
 
+GOOD_SENSORS = {
+    **changed(SENSORS, "setup.py", '["speed_sensor =', '["lamp = NAME:main", "speed_sensor ='),
+    "NAME/__init__.py": "def main():\n    print('on')\n",
+}
 SET_UP = "from autograder.checks import Program, build, launch, launch_file\nfrom std_msgs.msg import Int64, String\n"
 GOOD = {
     "sensors": """with build("good_sensors") as package:
     package.expect_built()
     package.expect_executable("speed_sensor")
+    package.expect_executable("lamp", target="good_sensors:main")
     package.expect_installed("share/good_sensors/package.xml")
 with launch(Program("speed_sensor", package="good_sensors"), listen=[("/speed", Int64)]) as ros:
     ros.node("/sensor").expect()
@@ -437,7 +451,7 @@ def found(request: pytest.FixtureRequest) -> dict[str, CheckResult]:
             continue
         files |= package(name, case)
         checks[name] = f'with build("{name}") as package:\n    package.{expectation}\npackage.score(1)'
-    files |= package("good_sensors", SENSORS) | package("good_interfaces", INTERFACES)
+    files |= package("good_sensors", GOOD_SENSORS) | package("good_interfaces", INTERFACES)
     for name, setup in HOSTILE.items():
         files |= package(name, {**SENSORS, "setup.py": setup.replace("ROOT", str(ROOT))})
         checks[name] = HOSTILE_CHECK.replace("NAME", name)
