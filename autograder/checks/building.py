@@ -151,11 +151,12 @@ class Package:
         by = {one: f" `{module}` imports it." for one, module in imported_interfaces(sources).items()}
         lacking = next((one for one in (*packages, *by) if one not in (*at_run, self.name)), "")
         if lacking:
-            tag = "depend" if lacking in to_build else "exec_depend"
+            # package.xml is refused if it has <depend> beside <build_depend>, or beside <exec_depend>.
+            tag = "depend" if lacking in to_build and lacking not in at_build else "exec_depend"
             self._fail(title, _not_named(lacking, f"at run time.{by.get(lacking, '')}", at_run, tag), hint)
         lacking = next((one for one in to_build if one not in at_build), "")
         if lacking:
-            tag = "depend" if lacking in at_run else "buildtool_depend"
+            tag = "build_depend" if lacking in (*packages, *by) else "buildtool_depend"
             self._fail(title, _not_named(lacking, "to build it.", at_build, tag), hint)
         outcomes.passed(title)
 

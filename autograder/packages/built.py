@@ -85,11 +85,16 @@ def why_other_target(built: Built, name: str, wanted: str = "") -> Reason | None
         wanted: the function, as `module:function`; without it, any existing function is accepted.
     """
     target = re.sub(r"\s|\[.*", "", _entry_points(built).get(name, ""))
+    if not target:
+        because = f"`lib/{built.name}/{name}` is installed, but not by an entry point in `console_scripts` of setup.py."
+        return ENTRY_POINT(because)
     module, _, function = target.partition(":")
-    path = next((one for one in built.files if one.endswith(f"/site-packages/{module.replace('.', '/')}.py")), "")
+    place = f"/site-packages/{module.replace('.', '/')}"
+    places = (f"{place}/__init__.py", f"{place}.py")  # Python looks for them in this order
+    path = next((one for end in places for one in built.files if one.endswith(end)), "")
     first = re.escape(function.partition(".")[0])
     defined = rf"^((def|class) {first}\b|{first}\s*=|.*\bimport\b.*\b{first}\b)"
-    if target and ":" not in target:
+    if ":" not in target:
         because = f"The entry point `{name}` leads to `{target}`, which has no `:` between module and function."
     elif not path:
         because = f"The entry point names the module `{module}`, and no such module is installed."

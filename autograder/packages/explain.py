@@ -17,7 +17,7 @@ INTERFACE_LINE = Kind(
     "interface-line", "a line of an interface file is not a field, or its name or type is not allowed", Group.BUILDING
 )
 INTERFACE_TYPE = Kind(
-    "interface-type", "an interface file uses a message type that the package does not have", Group.BUILDING
+    "interface-type", "an interface file uses a message type that its package does not build", Group.BUILDING
 )
 BUILD_FAILED = Kind("build-failed", "the build failed in another way; its first error is quoted", Group.BUILDING)
 BUILD_TIME = Kind("build-time", "the build took too long and was ended", Group.BUILDING)
@@ -30,7 +30,7 @@ PACKAGE_XML = Kind(
 PACKAGE_NAME = Kind("package-name", "package.xml gives the package another name than its folder has", Group.BUILDING)
 BUILD_TYPE = Kind(
     "build-type",
-    "package.xml exports no build type that fits: colcon does not know how to build the package",
+    "package.xml exports no build type, or one whose file, CMakeLists.txt or setup.py, is missing",
     Group.BUILDING,
 )
 CMAKE = Kind("cmake", "CMake stopped at a line of CMakeLists.txt with the error that is quoted", Group.BUILDING)
@@ -57,6 +57,8 @@ INTERFACE_GROUP = Kind(
     Group.BUILDING,
 )
 
+_BUILD_FILES = {"ament_cmake": "CMakeLists.txt", "ament_python": "setup.py"}
+"""For each build type, the file that says how to build such a package."""
 _Reason = Callable[[re.Match[str]], Reason]
 
 
@@ -110,7 +112,7 @@ def needed_packages(sources: Path, to_build: bool = False) -> list[str]:
 
 
 def not_described(sources: Path, name: str) -> Reason | None:
-    """Return what in package.xml prevents colcon from building the package, or from building it under its name."""
+    """Return what in package.xml, or beside it, prevents colcon from building the package, or under its name."""
     from catkin_pkg.package import InvalidPackage, parse_package
 
     path = sources / "package.xml"
@@ -128,14 +130,36 @@ def not_described(sources: Path, name: str) -> Reason | None:
     if package.name != name:
         because = f"package.xml names the package `{package.name}`; its folder, and this task, name it `{name}`."
         return PACKAGE_NAME(because)
-    exported = [export.content for export in package.exports if export.tagname == "build_type"]
-    wanted = "ament_cmake" if (sources / "CMakeLists.txt").is_file() else "ament_python"
-    if exported != [wanted]:
-        has = f"exports the build type `{exported[0]}`" if exported else "exports no build type"
-        because = f"package.xml {has}, so colcon does not build the package as an `{wanted}` package."
-        hint = f"It needs `<export><build_type>{wanted}</build_type></export>`."
+    exported = [str(export.content) for export in package.exports if export.tagname == "build_type"]
+    return _other_build_type(exported, sources, name)
+
+
+def _other_build_type(exported: list[str], sources: Path, name: str) -> Reason | None:
+    """Return why the build types that package.xml exports do not fit the package's files; None if they do."""
+    there = [kind for kind, file in _BUILD_FILES.items() if (sources / file).is_file()]
+    if len(exported) == 1 and exported[0] in there:
+        return None
+    types = " and ".join(f"`{one}`" for one in exported)
+    has = f"exports the build type {types}" if exported else "exports no build type"
+    if there:
+        because = f"package.xml {has}, so colcon does not build the package as an `{there[0]}` package."
+        hint = f"It needs `<export><build_type>{there[0]}</build_type></export>`, as its only build type."
         return BUILD_TYPE(because, hint)
-    return None
+    missing = [file for kind, file in _BUILD_FILES.items() if kind in exported] or list(_BUILD_FILES.values())
+    because = f"package.xml {has}, and the package has {' and '.join(f'no `{file}`' for file in missing)}."
+    cells = " or ".join(f"`%%file src/{name}/{file}`" for file in missing)
+    return BUILD_TYPE(because, f"Run the cell that begins with {cells}, or write it.")
+
+
+def _not_a_file(match: re.Match[str]) -> Reason:
+    """Return what setup.py may mean by something that is not a file: the tool's words are the same for a folder."""
+    path = match[1].rstrip("/")
+    hint = ""
+    if "*" in path:
+        hint = f'A pattern has to be looked up: `glob("{path}")`, with `from glob import glob`.'
+    elif not Path(path).suffix and not path.startswith("resource/"):  # the marker has no suffix, and is no folder
+        hint = f'If it is a folder, its files have to be named: `glob("{path}/*")`, with `from glob import glob`.'
+    return PACKAGE_FILE(f"setup.py installs `{match[1]}`, and the package has no file of that name.", hint)
 
 
 def _interface_line(match: re.Match[str]) -> Reason:
@@ -156,8 +180,13 @@ def _interface_line(match: re.Match[str]) -> Reason:
 
 
 def _unknown_type(match: re.Match[str]) -> Reason:
-    because = f"An interface uses the message `{match[1]}/{match[2]}`, and the package does not have it."
-    hint = "A message of another package is written with that package: `std_msgs/Header`."
+    package, name = match.groups()
+    because = f"An interface uses the message `{package}/{name}`,"
+    because += f" and `rosidl_generate_interfaces` in CMakeLists.txt names no `msg/{name}.msg`."
+    hint = (
+        "Is the name right? A message of the same package needs a file, which has to be named there. A message of"
+        " another package is written with that package: `std_msgs/Header`."
+    )
     return INTERFACE_TYPE(because, hint)
 
 
@@ -171,10 +200,7 @@ _REASONS: list[tuple[str, _Reason]] = [
     ),
     (
         r"error: can't copy '([^']+)': doesn't exist",
-        lambda m: PACKAGE_FILE(
-            f"setup.py installs `{m[1]}`, and the package has no such file.",
-            f'A pattern has to be looked up: `glob("{m[1]}")`, with `from glob import glob`.' if "*" in m[1] else "",
-        ),
+        _not_a_file,
     ),
     (
         r"error: package directory '([^']+)' does not exist",
@@ -216,7 +242,7 @@ _REASONS: list[tuple[str, _Reason]] = [
         r"include_map\[pkg\].{0,2000}?KeyError: '([^']{1,200})'",
         lambda m: INTERFACE_DEPENDENCY(
             f"An interface uses a message of `{m[1]}`, but rosidl_generate_interfaces does not name this package.",
-            f"Its last line names the packages whose messages are used: `DEPENDENCIES {m[1]}`.",
+            f"Is `{m[1]}` the right name of a package? If so, name it in the last line there: `DEPENDENCIES {m[1]}`.",
         ),
     ),
     (
@@ -227,7 +253,7 @@ _REASONS: list[tuple[str, _Reason]] = [
         r"the passed dependency '([^']+)' has not been found before",
         lambda m: CMAKE_PACKAGE(
             f"CMakeLists.txt uses `{m[1]}` before it has looked it up.",
-            f"Put `find_package({m[1]} REQUIRED)` above the line that uses it.",
+            f"Is `{m[1]}` the right name of a package? If so, put `find_package({m[1]} REQUIRED)` above that line.",
         ),
     ),
     (
@@ -240,8 +266,8 @@ _REASONS: list[tuple[str, _Reason]] = [
     (
         r'Unknown CMake command "ament_(\w+)"',
         lambda m: CMAKE_PACKAGE(
-            f"CMake does not know `ament_{m[1]}`: the package that brings it was not looked up.",
-            "Put `find_package(ament_cmake REQUIRED)` above the line that uses it.",
+            f"CMake does not know `ament_{m[1]}`: it is misspelt, or the package that brings it was not looked up.",
+            "Is the name right? If so, put `find_package(ament_cmake REQUIRED)` above the line that uses it.",
         ),
     ),
     (

@@ -53,6 +53,7 @@ for number in range(60_000):
 
 EXPECT = "expect_built()"
 RUNS = 'expect_executable("speed_sensor")'
+DEPENDS = 'expect_depends("std_msgs", to_build=("std_msgs",))'
 CASES: dict[str, tuple[dict[str, str], str, str, str]] = {
     # name: (files, expectation, code, words of the reason)
     "forges_the_result": (
@@ -80,6 +81,31 @@ CASES: dict[str, tuple[dict[str, str], str, str, str]] = {
         EXPECT,
         "build-type",
         "no build type",
+    ),
+    "type_alone": (
+        {"package.xml": SENSORS["package.xml"].replace("<build_type>ament_python</build_type>", "")},
+        'expect_depends("rclpy")',
+        "build-type",
+        "no build type, and the package has no `CMakeLists.txt` and no `setup.py`",
+    ),
+    "no_cmake": (
+        without(INTERFACES, "CMakeLists.txt"),
+        EXPECT,
+        "build-type",
+        "no `CMakeLists.txt`. Run the cell that begins with `%%file src/no_cmake/CMakeLists.txt`, or write it.",
+    ),
+    "no_setup": (without(SENSORS, "setup.py"), 'expect_depends("rclpy")', "build-type", "has no `setup.py`"),
+    "two_types": (
+        changed(SENSORS, "package.xml", "<export>", "<export><build_type>ament_cmake</build_type>"),
+        'expect_depends("rclpy")',
+        "build-type",
+        "`ament_cmake` and `ament_python`",
+    ),
+    "unused_cmake": (
+        {**SENSORS, "CMakeLists.txt": ""},
+        'expect_depends("std_msgs")',
+        "package-depend",
+        "does not name `std_msgs`",
     ),
     "no_marker": (without(SENSORS, "resource/NAME"), EXPECT, "package-file", "resource/"),
     "no_module_folder": (
@@ -131,6 +157,12 @@ CASES: dict[str, tuple[dict[str, str], str, str, str]] = {
         "package-file",
         "from glob import glob",
     ),
+    "folder": (
+        changed(SENSORS, "setup.py", '["launch/car.launch.yaml"]', '["launch"]'),
+        EXPECT,
+        "package-file",
+        'no file of that name. If it is a folder, its files have to be named: `glob("launch/*")`',
+    ),
     "no_comma": (
         changed(SENSORS, "setup.py", ":main", ":main lamp = NAME.sensor:main"),
         EXPECT,
@@ -167,6 +199,15 @@ CASES: dict[str, tuple[dict[str, str], str, str, str]] = {
         "entry-point-target",
         "not to `other_function.sensor:main`",
     ),
+    "script_alone": (
+        {
+            **changed(SENSORS, "setup.py", 'entry_points={"console_', 'scripts=["speed_sensor"], entry_points={"gui_'),
+            "speed_sensor": "#!/usr/bin/env python3\n",
+        },
+        RUNS,
+        "entry-point",
+        "`lib/script_alone/speed_sensor` is installed, but not by an entry point",
+    ),
     "lost_function": (changed(SENSORS, "setup.py", ":main", ":run"), RUNS, "entry-point-target", "`run`"),
     "launch_left_out": (
         changed(SENSORS, "setup.py", '("share/NAME/launch", ["launch/car.launch.yaml"]),', ""),
@@ -180,7 +221,25 @@ CASES: dict[str, tuple[dict[str, str], str, str, str]] = {
         changed(INTERFACES, "package.xml", "<buildtool_depend>rosidl_default_generators</buildtool_depend>", ""),
         'expect_depends("std_msgs", to_build=("std_msgs", "rosidl_default_generators"))',
         "package-depend",
-        "to build it",
+        "to build it. For that it names: `ament_cmake`, `std_msgs`. It needs `<buildtool_depend>",
+    ),
+    "neither": (
+        changed(INTERFACES, "package.xml", "<depend>std_msgs</depend>", ""),
+        DEPENDS,
+        "package-depend",
+        "It needs `<depend>std_msgs</depend>`.",
+    ),
+    "at_run_alone": (
+        changed(INTERFACES, "package.xml", "<depend>std_msgs</depend>", "<exec_depend>std_msgs</exec_depend>"),
+        DEPENDS,
+        "package-depend",
+        "It needs `<build_depend>std_msgs</build_depend>`.",
+    ),
+    "to_build_alone": (
+        changed(INTERFACES, "package.xml", "<depend>std_msgs</depend>", "<build_depend>std_msgs</build_depend>"),
+        DEPENDS,
+        "package-depend",
+        "It needs `<exec_depend>std_msgs</exec_depend>`.",
     ),
     "marker_left_out": (
         changed(SENSORS, "setup.py", '("share/ament_index/resource_index/packages", ["resource/NAME"]),', ""),
@@ -209,18 +268,29 @@ CASES: dict[str, tuple[dict[str, str], str, str, str]] = {
         "interface-file",
         "Thin",
     ),
-    "header_alone": (changed(INTERFACES, "msg/Things.msg", "std_msgs/", ""), EXPECT, "interface-type", "Header"),
+    "header_alone": (
+        changed(INTERFACES, "msg/Things.msg", "std_msgs/", ""),
+        EXPECT,
+        "interface-type",
+        "A message of another package is written with that package",
+    ),
+    "message_left_out": (
+        changed(INTERFACES, "CMakeLists.txt", '  "msg/Thing.msg"\n', ""),
+        EXPECT,
+        "interface-type",
+        "names no `msg/Thing.msg`",
+    ),
     "no_dependency": (
         changed(INTERFACES, "CMakeLists.txt", "  DEPENDENCIES std_msgs)", ")"),
         EXPECT,
         "interface-dependency",
-        "std_msgs",
+        "Is `std_msgs` the right name of a package? If so, name it in the last line there: `DEPENDENCIES std_msgs`.",
     ),
     "not_found": (
         changed(INTERFACES, "CMakeLists.txt", "find_package(std_msgs REQUIRED)\n", ""),
         EXPECT,
         "cmake-package",
-        "std_msgs",
+        "Is `std_msgs` the right name of a package? If so, put `find_package(std_msgs REQUIRED)`",
     ),
     "no_generators": (
         changed(INTERFACES, "CMakeLists.txt", "find_package(rosidl_default_generators REQUIRED)\n", ""),
@@ -240,6 +310,12 @@ CASES: dict[str, tuple[dict[str, str], str, str, str]] = {
         "cmake",
         "line 6",
     ),
+    "typo_at_the_end": (
+        changed(INTERFACES, "CMakeLists.txt", "ament_package()", "ament_pakage()"),
+        EXPECT,
+        "cmake-package",
+        "`ament_pakage`: it is misspelt, or",
+    ),
     "typo_in_cmake": (changed(INTERFACES, "CMakeLists.txt", "project(", "projekt("), EXPECT, "cmake", "line 2"),
 }
 
@@ -249,21 +325,28 @@ ALIKE = (
     "no_dollar",
     "no_colon",
     "no_comma",
+    "header_alone",
     "msg_in_type",
     "other_folder",
     "other_function",
     "lost_function",
     "capital",
     "no_generators",
+    "typo_at_the_end",
     "typo_in_cmake",
 )
 """Cases whose code another one has, too."""
 
+GOOD_SENSORS = {
+    **changed(SENSORS, "setup.py", '["speed_sensor =', '["lamp = NAME:main", "speed_sensor ='),
+    "NAME/__init__.py": "def main():\n    print('on')\n",
+}
 SET_UP = "from autograder.checks import Program, build, launch, launch_file\nfrom std_msgs.msg import Int64, String\n"
 GOOD = {
     "sensors": """with build("good_sensors") as package:
     package.expect_built()
     package.expect_executable("speed_sensor")
+    package.expect_executable("lamp", target="good_sensors:main")
     package.expect_installed("share/good_sensors/package.xml")
 with launch(Program("speed_sensor", package="good_sensors"), listen=[("/speed", Int64)]) as ros:
     ros.node("/sensor").expect()
@@ -368,7 +451,7 @@ def found(request: pytest.FixtureRequest) -> dict[str, CheckResult]:
             continue
         files |= package(name, case)
         checks[name] = f'with build("{name}") as package:\n    package.{expectation}\npackage.score(1)'
-    files |= package("good_sensors", SENSORS) | package("good_interfaces", INTERFACES)
+    files |= package("good_sensors", GOOD_SENSORS) | package("good_interfaces", INTERFACES)
     for name, setup in HOSTILE.items():
         files |= package(name, {**SENSORS, "setup.py": setup.replace("ROOT", str(ROOT))})
         checks[name] = HOSTILE_CHECK.replace("NAME", name)
