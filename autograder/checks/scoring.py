@@ -154,7 +154,7 @@ def _too_busy(result: CellResult) -> list[str]:
     return [
         f"Other programs on this machine kept your programs from the CPU for {result.starved:.2f} s while this check"
         " was running. Before you look for a mistake, run this cell again when the machine has less to do. During"
-        " grading, such a check is automatically run again, alone."
+        " grading, such a check is automatically run again."
     ]
 
 

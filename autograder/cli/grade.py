@@ -234,7 +234,7 @@ def _run_again(results: Sequence[SubmissionResult]) -> str:
     decided = f"{unknown} of them are still undecided." if unknown else "all of them are decided now."
     return (
         f"{len(again)} of {len(checks)} checks ({len(again) / len(checks):.1%}) lost points while other processes kept"
-        f" their programs from the CPUs, and were run again alone; {decided}"
+        f" their programs from the CPUs, and were run again; {decided}"
     )
 
 

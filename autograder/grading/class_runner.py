@@ -35,7 +35,7 @@ def run_class(
 
     Each result is stored as soon as it is known, so that an interrupted run loses only the submissions that were
     running. If a run fails or hangs, the others are not affected. At the end, checks whose programs were kept from the
-    CPUs by other processes are run again, alone.
+    CPUs by other processes are run again.
 
     Args:
         submissions: the notebooks, by student.
@@ -122,7 +122,8 @@ def run_jobs(
 ) -> Generator[SubmissionResult]:
     """Run jobs, and yield the part of each result that can be trusted, because a result may come from another machine.
 
-    Checks whose programs were kept from the CPUs by other processes are run again, alone, after all jobs have run.
+    Checks whose programs were kept from the CPUs by other processes are run again after all jobs have run. First,
+    several run at once, because most of them were held up by chance and are decided then. The others run alone.
 
     Args:
         executor: runs the jobs.
@@ -137,17 +138,33 @@ def run_jobs(
         for result in ran:
             job = by_student[result.student]
             believed = validated(result, job.checks)
-            if trusted_result.open_checks(job, believed) is None:
+            if trusted_result.open_checks(job, believed, alone=True) is None:
                 yield believed
                 continue
             to_run_again[job.student] = believed
             keep(believed)
-    for student, before in to_run_again.items():
-        again = trusted_result.open_checks(by_student[student], before)
-        assert again is not None
-        with closing(executor.run([again], started)) as ran:
+    if len(to_run_again) > 1:
+        still_open = {}
+        again = _to_run_again(by_student, to_run_again, alone=False)
+        with closing(executor.run(list(again.values()), started)) as ran:
             for result in ran:
-                yield trusted_result.settled(again, before, validated(result, again.checks))
+                job = again[result.student]
+                believed = trusted_result.settled(job, to_run_again[job.student], validated(result, job.checks))
+                if trusted_result.open_checks(job, believed, alone=True) is None:
+                    yield believed
+                else:
+                    still_open[job.student] = believed
+        to_run_again = still_open
+    for student, job in _to_run_again(by_student, to_run_again, alone=True).items():
+        with closing(executor.run([job], started)) as ran:
+            for result in ran:
+                yield trusted_result.settled(job, to_run_again[student], validated(result, job.checks))
+
+
+def _to_run_again(jobs: Mapping[str, Job], results: Mapping[str, SubmissionResult], *, alone: bool) -> dict[str, Job]:
+    """Return the jobs, by student, that run the open checks of these results again."""
+    again = {student: trusted_result.open_checks(jobs[student], result, alone) for student, result in results.items()}
+    return {student: job for student, job in again.items() if job is not None}
 
 
 class _Stores:
@@ -197,7 +214,7 @@ class _Stores:
             if (
                 result is not None
                 and not lacks_a_result(result)
-                and trusted_result.open_checks(job, result) is not None
+                and trusted_result.open_checks(job, result, alone=True) is not None
             ):
                 found[job.student] = result
         return found

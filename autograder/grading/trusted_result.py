@@ -3,10 +3,10 @@
 A result comes from a worker that ran close to a student's programs, or from a file. Neither of them decides how many
 points a check can give.
 
-A check is run again, alone, if it lost points while other processes kept its programs from the CPUs. It is known which
+A check is run again if it lost points while other processes kept its programs from the CPUs. It is known which
 processes used the CPUs (`autograder.core.cpu_use`), so a program cannot cause this by computing all the time. Other
-processes therefore cost only time and no points. In the second run, nothing else of this kit runs at the same time, and
-the check either gets a verdict or stays undecided.
+processes therefore cost only time and no points. In the last run of a check, nothing else of this kit runs at the same
+time, and the check either gets a verdict or stays undecided.
 """
 
 from __future__ import annotations
@@ -112,33 +112,35 @@ def is_open(check: CheckResult) -> bool:
     return check.starved > 0 and (check.points is None or check.points < check.max_points)
 
 
-def open_checks(job: Job, result: SubmissionResult) -> Job | None:
-    """Return the job that runs the open checks of a result again, alone; None if there are no open checks."""
+def open_checks(job: Job, result: SubmissionResult, alone: bool) -> Job | None:
+    """Return the job that runs the open checks of a result again, alone or not; None if there are no open checks."""
     wanted = {check.grade_id for check in result.checks if is_open(check)}
     cells = [cell for cell in job.cells if cell.points is None or cell.grade_id in wanted]
-    return job.model_copy(update={"cells": cells, "alone": True, "seed": result.seed}) if wanted else None
+    return job.model_copy(update={"cells": cells, "alone": alone, "seed": result.seed}) if wanted else None
 
 
 def settled(job: Job, first: SubmissionResult, again: SubmissionResult) -> SubmissionResult:
-    """Return a result with the results that its open checks had in the second run.
+    """Return a result with the results that its open checks had when they were run again.
+
+    If they ran alone, what is still open then remains undecided.
 
     Args:
-        job: the job of the second run.
-        first: the result of the first run.
-        again: the result of the second run.
+        job: the job that ran them again.
+        first: the result before that.
+        again: the result of that run.
     """
     cells = {cell.grade_id: cell for cell in job.checks}
     before = {check.grade_id: check for check in first.checks}
-    second = {one.grade_id: _settled(cells[one.grade_id], before[one.grade_id], one) for one in again.checks}
+    second = {one.grade_id: _settled(cells[one.grade_id], before[one.grade_id], one, job.alone) for one in again.checks}
     seconds = {name: round(first.seconds.get(name, 0.0) + spent, 3) for name, spent in again.seconds.items()}
     checks = [second.get(check.grade_id, check) for check in first.checks]
     return first.model_copy(update={"checks": checks, "seconds": seconds})
 
 
-def _settled(cell: Cell, first: CheckResult, again: CheckResult) -> CheckResult:
+def _settled(cell: Cell, first: CheckResult, again: CheckResult, alone: bool) -> CheckResult:
     """Return the result of a check that was run twice, with everything that a person may want to see from both runs."""
     check = again
-    if is_open(again):
+    if alone and is_open(again):
         busy = too_busy(cell, again.starved)
         check = busy.model_copy(
             update={"seconds": again.seconds, "outcomes": [*busy.outcomes, *again.outcomes], "logs": again.logs}

@@ -67,7 +67,7 @@ def grading(lab: Lab, student: str, complete: bool) -> Grade:
 def decided(job: Job, stop: threading.Event) -> SubmissionResult:
     """What a job comes to, with checks run again whose programs others kept from the CPUs."""
     first = run_in_worker(job, stop)
-    again = trusted_result.open_checks(job, first)
+    again = trusted_result.open_checks(job, first, alone=True)
     if again is None:
         return first
     for _ in range(TRIES_ALONE):  # other tests run beside it all the same

@@ -1,4 +1,4 @@
-"""What others take from a check's programs costs no points: the check is run again, alone, before it is decided."""
+"""What others take from a check's programs costs no points: the check is run again before it is decided."""
 
 from __future__ import annotations
 
@@ -68,23 +68,26 @@ def test_a_program_that_others_kept_from_the_cpu_gets_its_points(crowded_cpu: st
     assert check.run_again
 
 
+Asked = tuple[str, list[str], bool]
+"""A student, the checks that are to be run, and whether they are to run alone."""
+
+
 class Machine:
     """An executor that gives what it is told to, and notes what it was asked to run at once."""
 
-    def __init__(self, first: dict[str, float], alone: dict[str, float]) -> None:
-        self.first, self.alone, self.asked = first, alone, list[list[tuple[str, list[str], bool]]]()
+    def __init__(self, first: dict[str, float], again: dict[str, float], alone: dict[str, float]) -> None:
+        self.starved, self.asked = {"first": first, "again": again, "alone": alone}, list[list[Asked]]()
 
     def run(self, jobs: Sequence[Job], started: Callable[[str], None]) -> Generator[SubmissionResult, None, None]:
         self.asked.append([(job.student, [cell.grade_id for cell in job.checks], job.alone) for job in jobs])
         for job in jobs:
-            told = self.alone if job.alone else self.first
-            yield job.result([failing(cell, told.get(job.student, 0.0), job.alone) for cell in job.checks])
+            run = "alone" if job.alone else "first" if len(job.checks) > 1 else "again"
+            yield job.result([failing(cell, self.starved[run].get(job.student, 0.0), run) for cell in job.checks])
 
 
-def failing(cell: Cell, starved: float, alone: bool) -> CheckResult:
+def failing(cell: Cell, starved: float, run: str) -> CheckResult:
     """A check that lost its points in a time of which so many seconds were withheld; of the table none ever are."""
     starved *= cell.grade_id == "check_talker"
-    run = "again" if alone else "first"
     outcome = Outcome(status=Status.FAILED, title="a message comes", code="silent", observed=run)
     return CheckResult(
         grade_id=cell.grade_id,
@@ -97,33 +100,34 @@ def failing(cell: Cell, starved: float, alone: bool) -> CheckResult:
     )
 
 
-def test_a_class_runs_what_was_starved_again_at_its_end_one_by_one(
+def test_a_class_runs_what_was_starved_again_at_its_end_and_what_is_still_open_alone(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     lab = load_lab(toy.make_course(tmp_path / "course"), toy.LAB)
-    machine = Machine({"ann": 2.0, "bob": 3.0}, {"bob": 1.5})
+    machine = Machine({"ann": 2.0, "bob": 3.0, "cat": 1.0}, {"bob": 1.5, "cat": 2.5}, {"bob": 1.5})
     monkeypatch.setattr(executors, "chosen", lambda *_: machine)
-    class_ = {who: toy.hand_in(tmp_path, who, lab.clean_notebook({})["cells"]) for who in ("ann", "bob", "eve")}
+    class_ = {who: toy.hand_in(tmp_path, who, lab.clean_notebook({})["cells"]) for who in ("ann", "bob", "cat", "eve")}
     shown: list[SubmissionResult] = []
     results = run_class(class_, tmp_path / "course", lab, Settings(Isolation.NONE, seed=1), shown.append)
     assert machine.asked == [
-        [(who, ["check_talker", "check_answers"], False) for who in ("ann", "bob", "eve")],
-        [("ann", ["check_talker"], True)],
+        [(who, ["check_talker", "check_answers"], False) for who in ("ann", "bob", "cat", "eve")],
+        [(who, ["check_talker"], False) for who in ("ann", "bob", "cat")],
         [("bob", ["check_talker"], True)],
+        [("cat", ["check_talker"], True)],
     ]
-    assert [result.student for result in shown] == ["eve", "ann", "bob"]  # each once, when nothing changes any more
+    assert [result.student for result in shown] == ["eve", "ann", "bob", "cat"]  # each once, when it is settled
     points = {who: [check.points for check in result.checks] for who, result in results.items()}
-    assert points == {"ann": [0.0, 0.0], "bob": [None, 0.0], "eve": [0.0, 0.0]}
+    assert points == {"ann": [0.0, 0.0], "bob": [None, 0.0], "cat": [0.0, 0.0], "eve": [0.0, 0.0]}
     assert [check.run_again for check in results["ann"].checks] == [True, False]
     failure = results["bob"].checks[0].first_failure
     assert (
         failure is not None and failure.code == TOO_BUSY.code and "when the machine has less to do" in failure.because
     )
-    for result in shown[1:]:  # a person may look at both runs
-        check = result.checks[0]
-        assert check.flags == ["odd in both", "odd first", "odd again"]
-        assert [log.text for log in check.logs] == ["again"]
-        assert (check.outcomes[-1].code, check.outcomes[-1].observed) == ("silent", "again")
+    for result, *runs in ((shown[1], "first", "again"), *((one, "first", "again", "alone") for one in shown[2:])):
+        check = result.checks[0]  # a person may look at all runs
+        assert check.flags == ["odd in both", *(f"odd {run}" for run in runs)]
+        assert [log.text for log in check.logs] == runs[-1:]
+        assert (check.outcomes[-1].code, check.outcomes[-1].observed) == ("silent", runs[-1])
     assert lacks_a_result(results["bob"]) and not lacks_a_result(results["ann"])  # a later run grades bob again
 
 
@@ -135,11 +139,22 @@ def test_what_lost_nothing_is_not_run_again() -> None:
     assert not trusted_result.is_open(check.model_copy(update={"points": 0.0, "starved": 0.0}))
 
 
+def test_a_single_check_that_was_starved_runs_again_alone_at_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lab = load_lab(toy.make_course(tmp_path / "course"), toy.LAB)
+    machine = Machine({"bob": 3.0}, {}, {})
+    monkeypatch.setattr(executors, "chosen", lambda *_: machine)
+    class_ = {who: toy.hand_in(tmp_path, who, lab.clean_notebook({})["cells"]) for who in ("ann", "bob")}
+    run_class(class_, tmp_path / "course", lab, Settings(Isolation.NONE, seed=1), lambda _: None)
+    assert machine.asked[1:] == [[("bob", ["check_talker"], True)]]  # it waits longer then, and costs the class no more
+
+
 def test_an_interruption_while_checks_are_run_again_loses_no_first_result(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     lab = load_lab(toy.make_course(tmp_path / "course"), toy.LAB)
-    machine = Machine({"ann": 2.0, "bob": 3.0}, {})
+    machine = Machine({"ann": 2.0, "bob": 3.0}, {}, {})
     monkeypatch.setattr(executors, "chosen", lambda *_: machine)
     class_ = {who: toy.hand_in(tmp_path, who, lab.clean_notebook({})["cells"]) for who in ("ann", "bob", "eve")}
 
