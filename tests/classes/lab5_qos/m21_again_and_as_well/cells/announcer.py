@@ -1,0 +1,32 @@
+%%node announcer
+import rclpy
+from rclpy.executors import ExternalShutdownException
+from rclpy.node import Node
+from std_msgs.msg import String
+
+
+class Announcer(Node):
+    def __init__(self):
+        super().__init__("announcer")
+        self.declare_parameter("text", "ready")
+        self.publisher = self.create_publisher(String, "announcement", 10)
+        self.heard = False
+        self.timer = self.create_timer(0.05, self.announce)
+
+    def announce(self):
+        heard = self.publisher.get_subscription_count() > 0
+        if heard and not self.heard:
+            self.publisher.publish(String(data=self.get_parameter("text").value))
+        self.heard = heard
+
+
+def main():
+    rclpy.init()
+    try:
+        rclpy.spin(Announcer())
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    rclpy.try_shutdown()
+
+
+main()
