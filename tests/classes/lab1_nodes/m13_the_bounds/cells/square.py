@@ -31,7 +31,7 @@ class Square(Node):
             metres, turn = way_to(self.places[0], odometry)
             command.linear.x = 0.6 if abs(turn) < 0.3 else 0.0
             command.angular.z = 2.0 * turn
-            if metres < (0.15 if len(self.places) > 1 else 0.45):
+            if metres < (0.15 if len(self.places) > 1 else 0.7):
                 self.places.pop(0)
         self.wheels.publish(command)
 

@@ -35,7 +35,7 @@ class Square(Node):
                 self.places.pop(0)
         else:
             self.rest = getattr(self, 'rest', 0) + 1
-            if self.rest > 160:
+            if self.rest > 100:
                 command.linear.x = 0.3
         self.wheels.publish(command)
 

@@ -16,7 +16,7 @@ class PictureAge(Node):
         self.pub = self.create_publisher(Float64, "age", 10)
         self.sub = self.create_subscription(Image, "camera/image", self.on_image, 10)
         # the main loop: five times as fast as the camera, and independent of the simulated time
-        self.loop = self.create_timer(0.02, self.update, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self.loop = self.create_timer(0.1, self.update, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def on_image(self, msg):
         passed = self.get_clock().now() - Time.from_msg(msg.header.stamp, clock_type=self.get_clock().clock_type)

@@ -15,7 +15,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from test_msgs.action import Fibonacci
 
 NEAR = 0.15
-STANDS = 150
+STANDS = 125
 
 
 class Courier(Node):
