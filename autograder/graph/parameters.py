@@ -10,7 +10,7 @@ from rcl_interfaces.srv import GetParameters, ListParameters, SetParameters
 from rclpy.parameter import Parameter, parameter_value_to_python
 
 from autograder.graph.observer import Observer
-from autograder.graph.services import call_all
+from autograder.graph.services import ServiceMissing, call_all
 
 GiveUp = Callable[[], bool]
 
@@ -23,8 +23,13 @@ def _call(
     observer: Observer, node: str, service: str, srv_type: type, request: Any, within: float, give_up: GiveUp
 ) -> Any:
     # A first request can get lost while the two sides are still being matched; these requests are safe to repeat.
-    for _ in range(2):
-        answer = call_all(observer, f"{node}/{service}", srv_type, [request], within / 2, give_up)[0]
+    for second in (False, True):
+        try:
+            answer = call_all(observer, f"{node}/{service}", srv_type, [request], within / 2, give_up)[0]
+        except ServiceMissing:
+            if second or give_up():
+                raise
+            continue  # the node may have all of the time to start
         if answer.response is not None:
             return answer.response
         if give_up():

@@ -24,7 +24,7 @@ class Stopper(Node):
     def on_stop(self, _):
         """End the program."""
         if self.last is None:  # give the last messages the time to leave
-            self.last = self.create_timer(1.5, lambda: self.done.done() or self.done.set_result(True))
+            self.last = self.create_timer(2.0, lambda: self.done.done() or self.done.set_result(True))
 
 
 def spin(node):

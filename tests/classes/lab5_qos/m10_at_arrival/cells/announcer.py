@@ -18,7 +18,7 @@ class Announcer(Node):
         if self.publisher.get_subscription_count() > 0:
             self.publisher.publish(String(data=self.get_parameter("text").value))
             self.timer.cancel()
-        elif self.looks == 200:
+        elif self.looks == 60:
             self.timer.cancel()  # nobody is there
 
 
