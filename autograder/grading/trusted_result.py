@@ -63,7 +63,7 @@ def undecided(cell: Cell, because: str, printed: str = "", kind: Kind = NO_RESUL
 
 
 def too_busy(cell: Cell, seconds: float) -> CheckResult:
-    """Return the result of a check whose programs were kept from the CPUs for some seconds even in the second run."""
+    """Return the result of a check whose programs were kept from the CPUs for some seconds even when it ran alone."""
     because = (
         f"Even when the check was run again alone, other processes kept its programs from the CPU for {seconds:.1f} s"
         " of the time in which it was decided. Run it again when the machine has less to do."
@@ -122,7 +122,8 @@ def open_checks(job: Job, result: SubmissionResult, alone: bool) -> Job | None:
 def settled(job: Job, first: SubmissionResult, again: SubmissionResult) -> SubmissionResult:
     """Return a result with the results that its open checks had when they were run again.
 
-    If they ran alone, what is still open then remains undecided.
+    If they ran beside others, a check is still open unless it got all points or lost the same ones for the same reason
+    again. If they ran alone, what is open then remains undecided.
 
     Args:
         job: the job that ran them again.
@@ -137,9 +138,16 @@ def settled(job: Job, first: SubmissionResult, again: SubmissionResult) -> Submi
     return first.model_copy(update={"checks": checks, "seconds": seconds})
 
 
+def _agree(first: CheckResult, again: CheckResult) -> bool:
+    """Return whether the second run of a check still is open, got all points, or lost the same for the same reason."""
+    codes = {failure.code for failure in (first.first_failure, again.first_failure) if failure is not None}
+    same = first.points == again.points and len(codes) < 2
+    return same or is_open(again) or again.points == again.max_points
+
+
 def _settled(cell: Cell, first: CheckResult, again: CheckResult, alone: bool) -> CheckResult:
-    """Return the result of a check that was run twice, with everything that a person may want to see from both runs."""
-    check = again
+    """Return the result of a check that was run again, with everything that a person may want to see from all runs."""
+    check = again if alone or _agree(first, again) else again.model_copy(update={"starved": first.starved})
     if alone and is_open(again):
         busy = too_busy(cell, again.starved)
         check = busy.model_copy(

@@ -75,20 +75,25 @@ Asked = tuple[str, list[str], bool]
 class Machine:
     """An executor that gives what it is told to, and notes what it was asked to run at once."""
 
-    def __init__(self, first: dict[str, float], again: dict[str, float], alone: dict[str, float]) -> None:
+    def __init__(
+        self, first: dict[str, float], again: dict[str, float], alone: dict[str, float], code: str = "silent"
+    ) -> None:
         self.starved, self.asked = {"first": first, "again": again, "alone": alone}, list[list[Asked]]()
+        self.codes = {"first": "silent", "again": code, "alone": "silent"}
 
     def run(self, jobs: Sequence[Job], started: Callable[[str], None]) -> Generator[SubmissionResult, None, None]:
         self.asked.append([(job.student, [cell.grade_id for cell in job.checks], job.alone) for job in jobs])
         for job in jobs:
             run = "alone" if job.alone else "first" if len(job.checks) > 1 else "again"
-            yield job.result([failing(cell, self.starved[run].get(job.student, 0.0), run) for cell in job.checks])
+            yield job.result(
+                [failing(cell, self.starved[run].get(job.student, 0.0), run, self.codes[run]) for cell in job.checks]
+            )
 
 
-def failing(cell: Cell, starved: float, run: str) -> CheckResult:
+def failing(cell: Cell, starved: float, run: str, code: str) -> CheckResult:
     """A check that lost its points in a time of which so many seconds were withheld; of the table none ever are."""
     starved *= cell.grade_id == "check_talker"
-    outcome = Outcome(status=Status.FAILED, title="a message comes", code="silent", observed=run)
+    outcome = Outcome(status=Status.FAILED, title="a message comes", code=code, observed=run)
     return CheckResult(
         grade_id=cell.grade_id,
         max_points=cell.points or 0.0,
@@ -137,6 +142,18 @@ def test_what_lost_nothing_is_not_run_again() -> None:
     assert trusted_result.is_open(check.model_copy(update={"points": 1.0}))
     assert trusted_result.is_open(check.model_copy(update={"points": None}))
     assert not trusted_result.is_open(check.model_copy(update={"points": 0.0, "starved": 0.0}))
+
+
+def test_a_check_that_fails_for_another_reason_the_second_time_runs_alone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lab = load_lab(toy.make_course(tmp_path / "course"), toy.LAB)
+    machine = Machine({"ann": 2.0, "bob": 3.0}, {}, {}, code="late")
+    monkeypatch.setattr(executors, "chosen", lambda *_: machine)
+    class_ = {who: toy.hand_in(tmp_path, who, lab.clean_notebook({})["cells"]) for who in ("ann", "bob")}
+    results = run_class(class_, tmp_path / "course", lab, Settings(Isolation.NONE, seed=1), lambda _: None)
+    assert machine.asked[2:] == [[("ann", ["check_talker"], True)], [("bob", ["check_talker"], True)]]
+    assert [result.checks[0].starved for result in results.values()] == [0.0, 0.0]  # the last run decides
 
 
 def test_a_single_check_that_was_starved_runs_again_alone_at_once(
