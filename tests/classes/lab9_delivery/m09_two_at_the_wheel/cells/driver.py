@@ -51,8 +51,8 @@ class Driver(Node):
                 if abs(turn) < 0.7:
                     limit = self.get_parameter("max_speed").value
                     command.linear.x = min(limit, 1.2 * away) * (1 - abs(turn) / 0.7)
-        elif self.pose is not None and time.monotonic() - self.told > 1.8:
-            command.angular.z = 0.5
+        elif self.pose is not None and time.monotonic() - self.told > 1.0:
+            command.angular.z = 1.0
         self.wheels.publish(command)
 
     def free_direction(self, scan, wanted, before, away):
