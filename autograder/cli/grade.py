@@ -193,7 +193,7 @@ def _show(run: ClassRun, paths: CoursePaths, lab: str, as_json: bool) -> None:
         screen.print(sentence, markup=False)
     for sentence in _to_grade(run, lab):
         screen.print(sentence, markup=False)
-    if any(check.run_again for result in run.results for check in result.checks):
+    if any(result.run_again for result in run.results):
         screen.print(_run_again(run.results))
     screen.print(_time(len(run.results), run.seconds))
     for label, path in (

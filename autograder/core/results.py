@@ -250,6 +250,11 @@ class SubmissionResult(_Model):
         return sum(check.max_points for check in self.checks)
 
     @property
+    def run_again(self) -> bool:
+        """Whether a check was run again because other processes had kept its programs from the CPUs."""
+        return any(check.run_again for check in self.checks)
+
+    @property
     def flags(self) -> list[str]:
         """What an instructor should look at, from all checks; each flag is listed once."""
         return list(dict.fromkeys(flag for check in self.checks for flag in check.flags))

@@ -14,7 +14,7 @@ from __future__ import annotations
 import json
 import tempfile
 import uuid
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -217,6 +217,8 @@ class Canaries:
     """The number of checks of canaries that the grader could not decide."""
     doubtful: set[str] = field(default_factory=set)
     """The students whose submissions ran at about the same time as a canary that flipped."""
+    flipped_again: bool = False
+    """Whether a canary flipped of which checks were run again, beside those of other submissions."""
     ran: int = 0
     """The number of canaries that have a result."""
     seconds: float = 0.0
@@ -263,6 +265,12 @@ class Canaries:
         self.flips += flips
         if flips:
             self.doubtful |= placed.beside
+            self.flipped_again |= result.run_again
+
+    def doubt_what_ran_again(self, results: Iterable[SubmissionResult]) -> None:
+        """Make results doubtful whose checks were run again if a canary flipped of which checks were run again, too."""
+        if self.flipped_again:
+            self.doubtful |= {result.student for result in results if result.run_again}
 
     def told(self, root: Path) -> list[str]:
         """Return sentences about the results of the canaries and their running time; empty if no canary ran."""

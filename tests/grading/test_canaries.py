@@ -272,6 +272,35 @@ def test_only_what_ran_beside_a_flip_is_doubtful(
     assert judged.files(judged.paths.results) == set(names)
 
 
+def starved(result: SubmissionResult) -> SubmissionResult:
+    """What a result becomes if its first check lost its points while others kept its programs from the CPUs."""
+    first, *rest = result.checks
+    lost = first.model_copy(update={"points": 0.0, "starved": 2.0})
+    return result.model_copy(update={"checks": [lost, *rest]})
+
+
+def test_a_flip_among_checks_that_ran_again_makes_all_doubtful_that_ran_again(judged: Course) -> None:
+    """The first submission ran at another time than the last canary, but their checks ran again at the same time."""
+    names = [f"s{number:02}" for number in range(60)]
+    notebooks = {name: toy.hand_in(judged.class_, name, judged.lab.clean_notebook({})["cells"]) for name in names}
+    canary = ""
+
+    def meddle(number: int, result: SubmissionResult) -> SubmissionResult:
+        nonlocal canary
+        if len(result.checks) == 1:
+            return none_full(result) if result.student == canary else result
+        if result.student not in names and number > 40 and result.checks[0].points:
+            canary = result.student  # a right answer to the first check, at the end of the class
+        return starved(result) if result.student in (names[0], canary) else result
+
+    judged.meddle = meddle
+    canaries = Canaries(judged.lab, known_answers(judged.root, judged.lab), ALONE)
+    run_class(notebooks, judged.root, judged.lab, ALONE, lambda _: None, canaries=canaries)
+    assert [flip.right for flip in canaries.flips] == [True]
+    doubtful = judged.files(judged.paths.doubtful)
+    assert names[0] in doubtful and names[1] not in doubtful
+
+
 def test_what_nobody_could_find_out_of_a_known_answer_is_no_flip(judged: Course) -> None:
     judged.hand_in("ann")
     judged.meddle = lambda _, result: (
