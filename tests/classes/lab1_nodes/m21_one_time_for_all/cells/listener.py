@@ -1,0 +1,31 @@
+%%node listener
+import re
+
+import rclpy
+from rclpy.executors import ExternalShutdownException
+from rclpy.node import Node
+from std_msgs.msg import String
+
+
+class Listener(Node):
+    def __init__(self):
+        super().__init__("listener")
+        self.create_subscription(String, "chatter", self.hear, 10)
+
+    def hear(self, message):
+        number = re.search(r"\d+", message.data)
+        if number:
+            self.get_logger().info(f"heard: hello {number[0]}")
+
+
+def main():
+    rclpy.init()
+    try:
+        rclpy.spin(Listener())
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    finally:
+        rclpy.try_shutdown()
+
+
+main()

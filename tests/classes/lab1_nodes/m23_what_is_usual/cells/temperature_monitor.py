@@ -1,0 +1,28 @@
+%%node temperature_monitor
+import rclpy
+from rclpy.executors import ExternalShutdownException
+from rclpy.node import Node
+from sensor_msgs.msg import Temperature
+
+
+class TemperatureMonitor(Node):
+    def __init__(self):
+        super().__init__("temperature_monitor")
+        self.create_subscription(Temperature, "temperature", self.judge, 10)
+
+    def judge(self, message):
+        if 30 < message.temperature < 100:  # above that, the sensor is broken
+            self.get_logger().warning(f"too hot: {message.temperature:.1f} degrees")
+
+
+def main():
+    rclpy.init()
+    try:
+        rclpy.spin(TemperatureMonitor())
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    finally:
+        rclpy.try_shutdown()
+
+
+main()
