@@ -50,7 +50,7 @@ class Courier(Node):
     def deliver(self, goal_handle):
         number = goal_handle.request.order
         asked = None
-        for place, stands in zip(self.places[2 * number - 2 : 2 * number], (STANDS, 1)):
+        for place, stands in zip(self.places[2 * number - 2 : 2 * number], (STANDS, 1), strict=True):
             self.place, self.stood = place, 0
             while self.stood < stands and rclpy.ok():
                 if goal_handle.is_cancel_requested and asked is None:
