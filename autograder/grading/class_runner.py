@@ -139,7 +139,7 @@ def run_jobs(
         for result in ran:
             job = by_student[result.student]
             believed = validated(result, job.checks)
-            if trusted_result.open_checks(job, believed, alone=True) is None:
+            if not trusted_result.has_open_checks(believed):
                 yield believed
                 continue
             to_run_again[job.student] = believed
@@ -151,7 +151,7 @@ def run_jobs(
             for result in ran:
                 job = again[result.student]
                 believed = trusted_result.settled(job, to_run_again[job.student], validated(result, job.checks))
-                if trusted_result.open_checks(job, believed, alone=True) is None:
+                if not trusted_result.has_open_checks(believed):
                     yield believed
                 else:
                     still_open[job.student] = believed
@@ -164,8 +164,9 @@ def run_jobs(
 
 def _to_run_again(jobs: Mapping[str, Job], results: Mapping[str, SubmissionResult], *, alone: bool) -> dict[str, Job]:
     """Return the jobs, by student, that run the open checks of these results again."""
-    again = {student: trusted_result.open_checks(jobs[student], result, alone) for student, result in results.items()}
-    return {student: job for student, job in again.items() if job is not None}
+    return {
+        student: trusted_result.to_run_again(jobs[student], result, alone=alone) for student, result in results.items()
+    }
 
 
 class _Stores:
@@ -212,11 +213,7 @@ class _Stores:
         lab, settings, found = self._lab, self._settings, {}
         for job in jobs if not settings.force else ():
             result = self.first.fitting(lab, job.student, job.digest, settings.isolation, settings.seed)
-            if (
-                result is not None
-                and not lacks_a_result(result)
-                and trusted_result.open_checks(job, result, alone=True) is not None
-            ):
+            if result is not None and not lacks_a_result(result) and trusted_result.has_open_checks(result):
                 found[job.student] = result
         return found
 

@@ -152,8 +152,9 @@ def run_in_workers(job: Job, workers: int, follower: Follower | None = None) -> 
             given_up.set()
             raise
     result = _result(job, checks, began)
-    again = trusted_result.open_checks(job, result, alone=True)
-    return result if again is None else _again(again, result, follower)
+    if not trusted_result.has_open_checks(result):
+        return result
+    return _again(trusted_result.to_run_again(job, result, alone=True), result, follower)
 
 
 def parts(job: Job) -> list[Job]:

@@ -112,11 +112,16 @@ def is_open(check: CheckResult) -> bool:
     return check.starved > 0 and (check.points is None or check.points < check.max_points)
 
 
-def open_checks(job: Job, result: SubmissionResult, alone: bool) -> Job | None:
-    """Return the job that runs the open checks of a result again, alone or not; None if there are no open checks."""
+def has_open_checks(result: SubmissionResult) -> bool:
+    """Return whether a check of a result is open, so that it has to be run again."""
+    return any(map(is_open, result.checks))
+
+
+def to_run_again(job: Job, result: SubmissionResult, *, alone: bool) -> Job:
+    """Return the job that runs the open checks of a result again, alone or not."""
     wanted = {check.grade_id for check in result.checks if is_open(check)}
     cells = [cell for cell in job.cells if cell.points is None or cell.grade_id in wanted]
-    return job.model_copy(update={"cells": cells, "alone": alone, "seed": result.seed}) if wanted else None
+    return job.model_copy(update={"cells": cells, "alone": alone, "seed": result.seed})
 
 
 def settled(job: Job, first: SubmissionResult, again: SubmissionResult) -> SubmissionResult:
@@ -138,16 +143,17 @@ def settled(job: Job, first: SubmissionResult, again: SubmissionResult) -> Submi
     return first.model_copy(update={"checks": checks, "seconds": seconds})
 
 
-def _agree(first: CheckResult, again: CheckResult) -> bool:
-    """Return whether the second run of a check still is open, got all points, or lost the same for the same reason."""
+def _lost_the_same(first: CheckResult, again: CheckResult) -> bool:
+    """Return whether both runs of a check lost the same points for the same reason."""
     codes = {failure.code for failure in (first.first_failure, again.first_failure) if failure is not None}
-    same = first.points == again.points and len(codes) < 2
-    return same or is_open(again) or again.points == again.max_points
+    return first.points == again.points and len(codes) < 2
 
 
 def _settled(cell: Cell, first: CheckResult, again: CheckResult, alone: bool) -> CheckResult:
     """Return the result of a check that was run again, with everything that a person may want to see from all runs."""
-    check = again if alone or _agree(first, again) else again.model_copy(update={"starved": first.starved})
+    check = again
+    if not alone and not (is_open(again) or again.points == again.max_points or _lost_the_same(first, again)):
+        check = again.model_copy(update={"starved": first.starved})  # it remains open
     if alone and is_open(again):
         busy = too_busy(cell, again.starved)
         check = busy.model_copy(

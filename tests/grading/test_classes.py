@@ -67,9 +67,9 @@ def grading(lab: Lab, student: str, complete: bool) -> Grade:
 def decided(job: Job, stop: threading.Event) -> SubmissionResult:
     """What a job comes to, with checks run again whose programs others kept from the CPUs."""
     first = run_in_worker(job, stop)
-    again = trusted_result.open_checks(job, first, alone=True)
-    if again is None:
+    if not trusted_result.has_open_checks(first):
         return first
+    again = trusted_result.to_run_again(job, first, alone=True)
     for _ in range(TRIES_ALONE):  # other tests run beside it all the same
         with _one_alone:
             second = run_in_worker(again, stop)

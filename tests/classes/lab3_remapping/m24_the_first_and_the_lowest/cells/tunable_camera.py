@@ -12,7 +12,7 @@ class TunableCamera(Node):
         super().__init__("tunable_camera")
         self.declare_parameter("camera_rate", 10)
         self.declare_parameter("camera_frame", "camera_frame")
-        self.frame = "camera_frame"
+        self.frame, self.sent = "camera_frame", 0
         profile = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         self.images = self.create_publisher(Image, "image", profile)
         self.timer = self.create_timer(1.0 / self.get_parameter("camera_rate").value, self.shoot)
@@ -34,7 +34,9 @@ class TunableCamera(Node):
         image = Image()
         image.header.frame_id = self.frame
         self.images.publish(image)
-        self.frame = self.get_parameter("camera_frame").value
+        self.sent += 1
+        if self.sent > 6:
+            self.frame = self.get_parameter("camera_frame").value
 
 
 def main():

@@ -12,11 +12,14 @@ class SensorPublisher(LifecycleNode):
         self.publisher = None
         self.timer = None
         self.count = 0
+        self.greeted = False
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
         self.count = 0
         self.publisher = self.create_publisher(String, "sensor_data", 10)
-        self.publish_reading()
+        if not self.greeted:
+            self.greeted = True
+            self.publish_reading()
         return TransitionCallbackReturn.SUCCESS
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
