@@ -18,7 +18,7 @@ class BrakeAssistant(Node):
 
     def ask(self):
         known = self.free_since is not None
-        free = known and (self.get_clock().now() - self.free_since).nanoseconds < 2e9
+        free = known and (self.get_clock().now() - self.free_since).nanoseconds < 3e9
         self.brake.publish(Bool(data=not free))
         if self.client.service_is_ready():
             box = {"low": Point(x=0.0, y=-1.5), "high": Point(x=10.0, y=1.5)}
