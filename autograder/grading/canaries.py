@@ -267,8 +267,12 @@ class Canaries:
             self.doubtful |= placed.beside
             self.flipped_again |= result.run_again
 
-    def doubt_what_ran_again(self, results: Iterable[SubmissionResult]) -> None:
-        """Make results doubtful whose checks were run again if a canary flipped of which checks were run again, too."""
+    def compare(self, results: Sequence[SubmissionResult]) -> None:
+        """Take the results of the class that ran among the canaries.
+
+        If a canary flipped of which checks were run again, results whose checks were run again are doubtful, too.
+        """
+        self.class_seconds = sum(result.seconds.get("total", 0.0) for result in results)
         if self.flipped_again:
             self.doubtful |= {result.student for result in results if result.run_again}
 
