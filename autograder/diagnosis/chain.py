@@ -35,6 +35,7 @@ SEEN: tuple[Link, ...] = (
     blocked.rate_unspun,
     programs.in_the_constructor,
     programs.not_added,
+    programs.in_events_executor,
     programs.never_spun,
     programs.pulled_down,
     programs.thread_left,

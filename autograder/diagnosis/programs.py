@@ -154,6 +154,11 @@ NODE_NOT_ADDED = Kind("node-not-added", "an executor without nodes spins; the no
 NOT_SPINNING = Kind(
     "not-spinning", "a node with callbacks was never spun, or the program ended without spinning", Group.SPINNING
 )
+EVENTS_EXECUTOR = Kind(
+    "events-executor",
+    "the main thread stays in a `spin()`, the code uses `EventsExecutor`, and no callback has run",
+    Group.SPINNING,
+)
 SHUTDOWN_IN_CALLBACK = Kind(
     "shutdown-in-callback", "a callback called shutdown, and the program did not end as it should", Group.PROGRAM
 )
@@ -206,6 +211,28 @@ def not_added(inside: Inside) -> Reason | None:
     return None
 
 
+def in_events_executor(inside: Inside) -> Reason | None:
+    """Return that the program hangs in the `spin()` of an `EventsExecutor`.
+
+    In rclpy 7.1.6, this `spin()` keeps the lock of its own queue. Therefore no callback runs, and DDS cannot go on
+    either, so that often not even the node is known to others.
+
+    Must have seen: a node in an executor that the probe does not watch, the name of this one in the code, the main
+    thread in the same `spin()` at each look, and no callback that ever ran.
+    """
+    foreign = any(node.foreign and not node.destroyed for node in inside.nodes.values())
+    if not foreign or not inside.source.uses("EventsExecutor") or any(thing.runs for thing in inside.callbacks):
+        return None
+    place = inside.main_place()
+    if place is None or "spin()" not in place.code:
+        return None
+    return EVENTS_EXECUTOR(
+        f"`{inside.name}` is in {place}, and no callback has run. `EventsExecutor` is experimental, and its `spin()`"
+        " hangs with this version of rclpy.",
+        "Use a `SingleThreadedExecutor` or a `MultiThreadedExecutor`.",
+    )
+
+
 def never_spun(inside: Inside) -> Reason | None:
     """Must have seen: a node with callbacks, and no executor that ever spun while it held that node."""
     with_callbacks = {thing.node for thing in inside.callbacks}
@@ -217,7 +244,7 @@ def cannot_answer(inside: Inside) -> Reason | None:
 
     Must have seen: the same as `never_spun`, but for any node, also one without callbacks.
     """
-    return _never_spun(inside, _unspun(inside))
+    return in_events_executor(inside) or _never_spun(inside, _unspun(inside))
 
 
 def _never_spun(inside: Inside, names: list[str]) -> Reason | None:

@@ -98,6 +98,10 @@ class Source:
         calls = [node for node in ast.walk(self._tree) if isinstance(node, ast.Call)]
         return min((call.lineno for call in calls if getattr(call.func, "attr", "") == name), default=0)
 
+    def uses(self, name: str) -> bool:
+        """Return whether the code contains this name, as a variable or as an attribute."""
+        return any(name in (getattr(node, "id", ""), getattr(node, "attr", "")) for node in ast.walk(self._tree))
+
     def declares(self, parameter: str) -> int:
         """Return the line of the only call that declares a parameter of this name, or 0."""
         calls = [node for node in ast.walk(self._tree) if isinstance(node, ast.Call) and node.args]

@@ -731,6 +731,21 @@ CASES = {
         says="not-spinning",
         because="If this call is in the program already, the program has not come to it.",
     ),
+    "events_executor": Case(
+        TALK,
+        main="from rclpy.experimental import EventsExecutor\nexecutor = EventsExecutor()\nexecutor.add_node(node)\n"
+        "executor.spin()",
+        says="events-executor",
+        because="`executor.spin()`",
+    ),
+    "events_executor_in_a_loop": Case(
+        TALK,
+        main="from rclpy.experimental import EventsExecutor\nexecutor = EventsExecutor()\nexecutor.add_node(node)\n"
+        "while rclpy.ok():\n    executor.spin_once(timeout_sec=0.05)",
+        says="silent",
+        never=("events-executor", "not-spinning"),
+        ready=lambda it: it.age > 2,
+    ),
     "spins_another_first": Case(
         TALK,
         main="other = rclpy.create_node('other')\nrclpy.spin(other)\nrclpy.spin(node)",
