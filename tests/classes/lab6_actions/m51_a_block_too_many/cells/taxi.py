@@ -38,7 +38,7 @@ class Taxi(Node):
 
     def execute(self, goal_handle):
         driven = []
-        for number in range(goal_handle.request.order):
+        for number in range(1, goal_handle.request.order + 2):
             time.sleep(self.block)
             with self.lock:
                 if not goal_handle.is_active:
