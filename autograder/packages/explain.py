@@ -97,6 +97,10 @@ def said_of_files(log: str) -> Reason | None:
     return None
 
 
+_HERE = {"ROS_VERSION": "2", "ROS_DISTRO": "jazzy", "ROS_PYTHON_VERSION": "3"}
+"""The values of the variables that a condition in package.xml may use."""
+
+
 def needed_packages(sources: Path, to_build: bool = False) -> list[str]:
     """Return the packages that package.xml names as needed at run time, or to build.
 
@@ -108,7 +112,8 @@ def needed_packages(sources: Path, to_build: bool = False) -> list[str]:
 
     package = parse_package(str(sources / "package.xml"))
     named = [*package.buildtool_depends, *package.build_depends] if to_build else package.exec_depends
-    return [str(one) for one in named]
+    package.evaluate_conditions(_HERE)  # a dependency may hold for some versions only (REP 149)
+    return [str(one) for one in named if one.evaluated_condition]
 
 
 def not_described(sources: Path, name: str) -> Reason | None:
