@@ -22,7 +22,7 @@ class SpeedSensor(Node):
     def enable(self, request, response):
         self.enabled = request.data
         if not self.enabled:
-            self.publisher.publish(Float64(data=0.0))  # nobody shall keep an old speed
+            self.publisher.publish(Float64(data=0.0))  # nobody may keep an old speed
         response.success = True
         return response
 
