@@ -51,7 +51,7 @@ end = time.monotonic() + 120
 while not {*sys.argv[2:]} <= {*node.get_node_names()} and time.monotonic() < end:
     time.sleep(0.05)
 print("heard" if time.monotonic() < end else "heard nothing", flush=True)
-time.sleep(600)
+rclpy.spin(node)
 """
 
 

@@ -16,5 +16,10 @@ def started() -> Iterator[list[subprocess.Popen[str]]]:
     processes: list[subprocess.Popen[str]] = []
     yield processes
     for process in processes:
-        process.kill()
-        process.communicate()
+        process.terminate()  # who is killed leaves locks behind in shared memory, and others wait for them
+    for process in processes:
+        try:
+            process.communicate(timeout=WITHIN)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.communicate()
