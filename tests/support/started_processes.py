@@ -19,7 +19,7 @@ def started() -> Iterator[list[subprocess.Popen[str]]]:
         process.terminate()  # who is killed leaves locks behind in shared memory, and others wait for them
     for process in processes:
         try:
-            process.communicate(timeout=WITHIN)
+            process.communicate(timeout=10)  # seconds
         except subprocess.TimeoutExpired:
             process.kill()
             process.communicate()
