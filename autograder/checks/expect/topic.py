@@ -80,7 +80,7 @@ class _Wanted:
         which = f" that {'says' if self.need == 1 else 'say'} {self.saying}" if self.saying else ""
         which = which or " with the expected content" * (self.where is not None)
         which += " arrives" if self.need == 1 else " arrive"
-        rate = f" at {self.rate:g} Hz" if self.rate else ""
+        rate = f" at {self.rate:.4g} Hz" if self.rate else ""
         return f"{number} message{'s' * (self.need != 1)}{which} on `{topic}`{rate}"
 
 
@@ -338,10 +338,10 @@ class Topic(Sources):
             self._fail(
                 wanted.title,
                 RATE(
-                    f"The messages arrive at {measured} instead of {rate:g} Hz{bursts}. "
+                    f"The messages arrive at {measured} instead of {rate:.4g} Hz{bursts}. "
                     + diagnosis.paces(self._scene(), wanted.recording.topic),
                 ),
-                expected=f"{rate:g} Hz within {tolerance:.0%}",
+                expected=f"{rate:.4g} Hz within {tolerance:.0%}",
                 observed=measured,
                 hint=wanted.hint,
             )
